@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Writes condyle/_condyle.pyi, the description of the extension module for editors and type checkers.
+"""Writes condyle/_condyle.pyi, which describes the extension module for editors and type checkers.
 
     python3 python/stubs.py [--check]        with --check nothing is written; it fails if the file is out of date
 
-Names, signatures and docstrings come from the installed module: they are written once, in the Rust sources. The module
-does not know the types; the tables below define them by the names of arguments and of functions. A name without a type
-is an error, and so is an unused entry.
+Names, signatures and docstrings are read from the installed module; their source is the Rust code. The module does not
+contain types: the tables below define types by the names of arguments and functions. A name without a type and an
+unused entry of a table are errors.
 
 The file is kept in the repository for two reasons. A wheel is packed before its module can be imported. And type
-checkers read an editable installation, and the sources, without building them.
+checkers read editable installations and source folders, in which the module may not be built.
 """
 
 import ast
@@ -52,7 +52,7 @@ ALIASES = {
 }
 
 # The functions of `condyle.pinocchio`.
-SPELLED = [  # the first two do not take `data`
+SPELLED = [  # the first two functions do not take `data`
     "_spelled_difference",
     "_spelled_integrate",
     "_spelled_crba",
@@ -77,7 +77,7 @@ SPELLED = [  # the first two do not take `data`
     "updateFramePlacements",
 ]
 
-# The type of an argument, by its name, `Class.name` or `function.name`. Arguments with default None may be None.
+# Types of arguments, by `Class.name`, `function.name` or the argument's name. Arguments with default None may be None.
 ARGUMENTS = {
     "ArrayLike": """
         Model.with_damping.damping Model.with_damping.polynomial Model.with_friction.friction
@@ -167,7 +167,7 @@ ARGUMENTS = {
     "Sequence[int] | None": "stages",
     "_Controls": "us",
     "Problem": "problem",
-    # arrays of floats, or of numbers that carry their derivatives
+    # functions that get arrays of floats, or arrays of numbers that carry their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
     "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
         Action.calc_diff DifferentialAction.calc_diff Residual.own_cost.calc_diff""",
@@ -201,9 +201,8 @@ ARGUMENTS = {
     "list[ContactConstraint]": "_generate.constraints",
 }
 
-# The type of a result or a property, by its name, `Class.name` or `function`. Defaults: a function that takes `out`
-# returns an array, a static method returns its class, and a method of a class in this table returns the type of that
-# class.
+# Types of results and properties, by `Class.name` or the function's name. An entry for a class holds for its methods.
+# Without an entry, a function that takes `out` returns an array, and a static method returns its class.
 RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
@@ -322,7 +321,7 @@ RESULTS = {
 
 
 class Table:
-    """A table from names to types, which records missing names and unused ones."""
+    """A table from names to types. It records names that are missing in the table, and names that were not used."""
 
     def __init__(self, names_by_type: dict[str, str]) -> None:
         self.types = {name: kind for kind, names in names_by_type.items() for name in names.split()}
@@ -330,7 +329,7 @@ class Table:
         self.missing: list[str] = []
 
     def find(self, *names: str, otherwise: str | None = None) -> str:
-        """Returns the type of the first name that has one."""
+        """Returns the type of the first of these names that the table contains."""
         for name in names:
             if name in self.types:
                 self.unused.discard(name)
@@ -341,8 +340,8 @@ class Table:
 
 
 def wrapped(head: str, parts: list[str], tail: str, indent: str = "") -> str:
-    """Formats a definition or a list as Ruff does: in one line, else its parts in one line, else each part in its own
-    line.
+    """Formats a definition or a list as Ruff does: in one line if it fits, else with all parts in a second line, else
+    with each part in its own line.
     """
     inside = ", ".join(parts)
     if len(indent + head + inside + tail) <= WIDTH:
@@ -360,15 +359,15 @@ def docstring(item: Any, indent: str) -> str:
 
 
 class Writer:
-    """Writes the items of a module, whose named tuples are defined in another one."""
+    """Writes the items of a module; the named tuples of their types are defined in another module."""
 
     def __init__(self, module: ModuleType, types: ModuleType) -> None:
         self.module, self.types = module, types
         self.arguments, self.results = Table(ARGUMENTS), Table(RESULTS)
 
     def out(self, result: str) -> str:
-        """Returns the type of `out` for a function with this result: the arrays that it fills, such as an earlier
-        result.
+        """Returns the type of the argument `out` for a function with this result: arrays that the function fills, such
+        as an earlier result.
         """
         if result == "_Array":
             return result
@@ -433,7 +432,7 @@ class Writer:
         for member in sorted(k for k, v in members.items() if inspect.isdatadescriptor(v)):
             head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
             text += head + docstring(members[member], "        ") + "\n\n"
-        for member, value in sorted(members.items()):  # the order of a class's members depends on the linker
+        for member, value in sorted(members.items()):  # otherwise the linker determines the order
             special = member.startswith("__") and name not in known and f"{name}.{member}" not in known
             if callable(value) and not special and member not in ("__new__", "__repr__"):
                 method = self.function(getattr(item, member), member, name, "    ")
@@ -479,7 +478,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
-    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")  # other names there equal names of ours
+    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")  # its other names equal names of Condyle
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
 """{inspect.getdoc(module)}"""

@@ -10,39 +10,39 @@ A `Model` is a robot and never changes; a `Data` is scratch memory for one threa
 >>> round(float(a[2]), 6)  # it falls
 -9.81
 
-Numbers and layout are the same as in Pinocchio: linear parts before angular ones, quaternions x, y, z, w, joints in the
-same order. Functions return new arrays, or fill the arrays given as `out`. Arguments may be anything that NumPy
-understands as an array of real numbers; float64 C-contiguous arrays are read without a copy. A wrong shape is a
+Numbers and layout are the same as in Pinocchio: linear parts before angular parts, quaternions x, y, z, w, and joints
+in the same order. Functions return new arrays, or fill the arrays given as `out`. An argument may be any object that
+NumPy can convert to an array of real numbers; float64 C-contiguous arrays are read without a copy. A wrong shape is a
 `ValueError`.
 
-Many states in one call: positions, velocities, efforts and forces may have one more axis in front, and results then
-have it too. The dynamics and its derivatives compute several states at once in SIMD lanes. The interpreter's lock is
-released, and as many threads are used as the `Data` was made for:
+One call can compute many states: positions, velocities, efforts and forces may have one more axis, the first; the
+results then have this axis, too. Dynamics and their derivatives are computed in SIMD lanes for several states at once.
+The call releases the interpreter's lock and uses the number of threads for which the `Data` was made:
 
 >>> arm = condyle.robots.arm7()
 >>> data = condyle.Data(arm, threads=2)
 >>> condyle.crba(arm, data, np.zeros((100, 7))).shape
 (100, 7, 7)
 
-`out` may be an input, or share memory with one; results that would share memory with each other are refused. Batches
-and solves release the interpreter's lock while they compute. No other thread may write to their arrays then, since they
-would read a mix of old and new numbers.
+`out` may be an input, or share memory with an input; results that would share memory with each other are an error.
+Batches and solves release the interpreter's lock while they compute. During this time no other thread may write to
+their arrays, since they would read a mix of old and new numbers.
 
-A forked process may continue with everything that it has inherited, and starts its own threads. Signals are checked
-during a call, every 10 ms in batches and every 25 ms in solves and simulations. An exception of a signal handler, such
-as KeyboardInterrupt for Ctrl-C, ends the call. A solver then has the best iterate as its `solution`, a simulation has
-the state after its last step, and `out` holds the results so far.
+A forked process may use all objects that it has inherited, and starts its own threads. Signals are checked during a
+call, every 10 ms in batches and every 25 ms in solves and simulations. An exception of a signal handler, such as
+KeyboardInterrupt for Ctrl-C, ends the call. Then the `solution` of a solver is the best iterate, a simulation has the
+state after its last step, and `out` contains the results that were computed before.
 
-The environment variable `CONDYLE_LEVEL` chooses the SIMD level: "baseline", "neon", "avx2" or "avx512". If this
-processor lacks the level, or the name is unknown, the import fails. `LEVEL` is the level in use.
+The environment variable `CONDYLE_LEVEL` chooses the SIMD level: "baseline", "neon", "avx2" or "avx512". If the
+processor does not support this level, or the name is unknown, the import fails. `LEVEL` is the level in use.
 
-Derivatives of your own function of the state are exact, by `HyperDual` numbers in arrays of objects:
+Your own function of the state is differentiated exactly, with `HyperDual` numbers in arrays of objects:
 
 >>> def effort(x):
 ...     return (condyle.rnea(arm, data, x[:7], x[7:], np.zeros(7)) ** 2).sum()
 >>> value, by_q_and_v = condyle.gradient(arm, np.full(14, 0.3), effort)
 
-By theme; for details of a name see for example `help(condyle.rnea)`:
+The names by topic; for details of a name see for example `help(condyle.rnea)`:
 
 Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `Coupling`, `BodyId`, `WORLD`,
     `Frame`, `Limits`, `Spring`, `GravityCompensation`, `Actuator`, `ModelWarning`, `load` (by a robot's name),

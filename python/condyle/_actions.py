@@ -1,4 +1,4 @@
-"""Actions and actuation matrices built from other ones in a few lines."""
+"""Functions that make an actuation matrix for thrusters, and an action for a differential equation."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
@@ -10,7 +10,7 @@ from ._condyle import Action, Model, ProblemError
 
 _Array = NDArray[np.float64]
 _SCHEMES = {
-    # per scheme: times of the stages within the step, and their weights; each stage starts from the stage before
+    # scheme: (times of its stages within a step, weights of the stages); a stage uses the result of the stage before
     "euler": ([0.0], [1.0]),
     "runge_kutta_2": ([0.0, 0.5], [0.0, 1.0]),
     "runge_kutta_3": ([0.0, 1 / 3, 2 / 3], [0.25, 0.0, 0.75]),
@@ -21,19 +21,19 @@ _SCHEMES = {
 def thrusters(
     model: Model, placements: Sequence[ArrayLike], torques: Sequence[float] | float = 0.0, joints: bool = True
 ) -> _Array:
-    """Returns the `actuation` of a free-flying base with thrusters: S of shape (nv, nu), with one control for each
-    thruster, its force.
+    """Returns the `actuation` of a free-flying base with thrusters: S of shape (nv, nu). The control of a thruster is
+    its force.
 
-    A thruster pushes along the z axis of its placement. At position p, its force f also turns the base by p × f + c f,
-    where c is the ratio of its rotor's torque to its thrust. Crocoddyl's `ActuationModelFloatingBaseThrusters` has c as
-    `ctorque`, positive for `CW` and negative for `CCW`.
+    A thruster at position p pushes along the z axis of its placement, with the force f. The moment on the base is p × f
+    + c f, where c is the ratio of torque to thrust of the thruster's rotor. In Crocoddyl's
+    `ActuationModelFloatingBaseThrusters`, c is `ctorque`, positive for `CW` and negative for `CCW`.
 
     model: a robot whose root joint is a free-flyer.
     placements: the thrusters' placements in the base's frame, homogeneous matrices (4, 4).
-    torques: c of each thruster (m), or of all.
-    joints: whether the other joints have controls of their own, which follow the thrusters' controls.
+    torques: c of each thruster (m), or one number for all thrusters.
+    joints: whether each other joint has a control, too; these controls follow the thrusters' controls.
 
-    Raises `ProblemError` for a robot of another kind, or an invalid placement.
+    Raises `ProblemError` for a robot without a free-flyer at the root, or an invalid placement.
 
     >>> place = np.eye(4)
     >>> place[:3, 3] = [0.2, 0.0, 0.1]
@@ -66,8 +66,8 @@ def ode_action(
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
 ) -> Action:
-    """Returns an `Action` for a differential equation ẋ = f(x, u) with a cost per second, in steps of Δt with constant
-    controls.
+    """Returns an `Action` that integrates a differential equation ẋ = f(x, u) and a cost per second over a time step
+    Δt. Controls are constant during the step.
 
     For accelerations see `DifferentialAction`. Derivatives are exact derivatives of calc, as for `Action`.
 

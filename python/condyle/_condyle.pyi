@@ -297,8 +297,9 @@ def aba(
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 
-    Raises `ModelError` if M is singular at every position. If M is singular only at this position, as for a point mass
-    on its own axis of rotation, the result is not finite, or is a large number made of rounding errors.
+    Raises `ModelError` if M is singular at every position. M may also be singular only at this position, as for a point
+    mass on the axis about which it turns. Then the result is not finite, or is a large number caused by rounding
+    errors.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -363,11 +364,13 @@ def forward_dynamics(
     method: _Method | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the acceleration of `aba` by a chosen method (forward dynamics), nv numbers (rad/s², m/s²).
+    """Computes forward dynamics, like `aba`, by the method that `method` names: the acceleration q̈, nv numbers (rad/s²,
+    m/s²).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', a
     dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros of the tree, O(n d²) for depth d; None, the
-    fastest: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to rounding.
+    fastest of these: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to
+    rounding.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -388,7 +391,8 @@ def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -
     """
 
 def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
+    """Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled. M itself is not
+    computed.
 
     q: nq numbers.
 
@@ -457,16 +461,18 @@ def static_torque(
 
 @final
 class BodyId:
-    """The identity of a body in a builder, as `ModelBuilder.body` and other methods return it. `WORLD` always exists."""
+    """The identity of a body in a builder, returned by `ModelBuilder.body` and other methods. `WORLD` is valid in every
+    builder.
+    """
 
 @final
 class ModelBuilder:
     """A builder that makes a `Model` body by body, parents first.
 
-    Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass. A joint
-    that is composed of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of
-    bodies here. Its q and v have the same layout, but each joint except the last adds a body without mass. `nbodies`,
-    `names` and the rows of f_ext count these bodies.
+    Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass.
+    Pinocchio's composite, universal and spherical ZYX joints are a `chain` of bodies here. The chain has the same q and
+    v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext include these
+    bodies.
 
     name: the name of the robot.
 
@@ -497,18 +503,18 @@ class ModelBuilder:
         control: tuple[float, float] | None = None,
         force: tuple[float, float] | None = None,
     ) -> None:
-        """Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change
-        limits, armature and damping, which belong to the joints.
+        """Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. Limits, armature and
+        damping belong to the joints; an actuator does not change them.
 
         joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
         tendon: the tendon's name, if the actuator drives a tendon.
-        gear: a number, or up to six; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1
-        for a motor, which has neither. control, force: (minimum, maximum); None for no limits.
+        gear: one to six numbers; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1 if
+        both are 0, as for a motor. control, force: (minimum, maximum); None for no limits.
         """
 
     def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
-        """Adds a whole robot, with its world at `placement` in the frame of `parent`; `prefix` is added before all its
-        names.
+        """Adds a whole robot. The pose of its world in the frame of `parent` is `placement`. `prefix` is added before all
+        its names.
 
         >>> from condyle import ModelBuilder, WORLD
         >>> two = ModelBuilder("two arms")
@@ -539,33 +545,33 @@ class ModelBuilder:
     ) -> BodyId:
         """Adds a body and its joint.
 
-        name: the body's name, and the joint's unless `joint_name` is given.
+        name: the name of the body, and also of the joint unless `joint_name` is given.
         parent: the body to which the joint is attached.
         placement: the joint's frame at position zero, in the parent's frame.
         inertia: in the body's frame, which is the joint's frame at position zero.
         position: (minimum, maximum) position (rad, m), for joints with one coordinate; None for no limits.
         velocity: maximum speed (rad/s, m/s); None for no limit.
         effort: maximum effort (N m, N), or (minimum, maximum); None for no limits.
-        damping, friction: viscous (N m s/rad, N s/m) and Coulomb friction (N m, N).
+        damping: viscous friction (N m s/rad, N s/m). friction: Coulomb friction (N m, N).
         damping_polynomial: (d₁, d₂) of the damping coefficient d₀ + d₁|v| + d₂v², with d₀ = damping.
         armature: rotor inertia as seen at the joint (kg m², kg).
         """
 
     def build(self) -> Model:
-        """Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
-        added. The builder cannot be used afterwards.
+        """Builds the model: checks all data and numbers the bodies depth first, and siblings in the order of the calls
+        that added them. The builder cannot be used afterwards.
 
         Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
         joint with an invalid leader.
         """
 
     def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
-        """Adds a body after several joints in a row: a composite joint. Each joint is placed in the frame of the joint
-        before.
+        """Adds a body at the end of a chain of joints: a composite joint. The placement of each joint is relative to the
+        frame of the joint before.
 
-        Its coordinates are the coordinates of the joints, one joint after the other. Between the joints are bodies
-        without mass, `name#1`, `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about
-        unit vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+        The coordinates of the joints follow one another in q and v. Bodies without mass, named `name#1`, `name#2`, and
+        so on, connect the joints. Returns the last body, which has `inertia`. A universal joint about unit vectors a
+        and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
 
         joints: a list of (joint, placement).
         """
@@ -573,12 +579,12 @@ class ModelBuilder:
     def compensate_gravity(
         self, body: BodyId, ratio: float = 1.0, part: Inertia | None = None, placement: ArrayLike | None = None
     ) -> None:
-        """Supports a ratio of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
-        mass. The supported weight follows when the inertia of the body changes.
+        """Supports a fraction of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
+        mass. If the inertia of the body changes later, the force changes with it.
 
-        ratio: the supported ratio of the weight; 1 supports all of it.
-        part: None for the whole body, or the inertia of a part of the body that has this ratio instead. It is included
-            in the inertia of the body, and is in a frame at `placement` in the body's frame.
+        ratio: the supported fraction of the weight; 1 supports the whole weight.
+        part: None for the whole body, or the inertia of the part of the body to which `ratio` applies. The inertia of
+            the body must include this inertia, which is given in a frame with the pose `placement` in the body's frame.
         """
 
     def frame(
@@ -588,18 +594,21 @@ class ModelBuilder:
         placement: ArrayLike | None = None,
         kind: Literal["link", "joint", "user"] = "user",
     ) -> None:
-        """Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user'. Frames of different kinds may
-        have the same name.
+        """Adds a frame with the pose `placement` in the body's frame. kind: 'link', 'joint' or 'user'. Frames of different
+        kinds may have the same name.
         """
 
     def gravity(self, gravity: ArrayLike) -> None:
         """Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). The default is (0, 0, −9.81)."""
 
     def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
-        """Adds an inertia, given in a frame at `placement` in the body's frame, to a body."""
+        """Adds an inertia to a body. The inertia is given in its own frame, which has the pose `placement` in the body's
+        frame.
+        """
 
     def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
-        """Makes a joint follow another one: its position is ratio q + offset, and it has no coordinate of its own.
+        """Makes a joint follow another one: the follower's position is ratio q + offset, where q is the leader's position.
+        The follower has no coordinate in q.
 
         follower, leader: the bodies that the joints carry.
         """
@@ -617,7 +626,7 @@ class ModelBuilder:
         """Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
 
         body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
-        spring is at rest, as many numbers as the joint has in q.
+        spring is at rest, with as many numbers as the joint has in q.
 
         >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
         >>> robot = ModelBuilder("door")
@@ -639,25 +648,25 @@ def _casadi_hold(
     """Holds a slot of CasADi's interface that computes a function of a robot, until `_casadi_release`.
 
     function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
-    'constrained_dynamics'. states: number of states per call; arguments and results have the columns of all states, one
-    state after the other.
+    'constrained_dynamics'. states: number of states per call; arguments and results contain the columns of all states,
+    one state after the other.
 
-    Returns the name of its symbols.
+    Returns the name of the slot, from which CasADi derives the names of the symbols.
     """
 
 def _casadi_hold_knot(of: Any, t: int | None) -> str:
-    """Holds a slot that computes the next state and the cost of knot t of an action or of a problem, until
-    `_casadi_release`. Without t, the index of the knot is an argument of the function.
+    """Holds a slot until `_casadi_release`. The slot computes the next state and the cost of knot t of an action or of a
+    problem. Without t, the index of the knot is an argument of the function.
     """
 
 def _casadi_release(name: str) -> None:
-    """Ends a hold; the slot stays in use as long as CasADi has functions of it."""
+    """Ends a hold of a slot; the slot stays in use as long as CasADi has objects for its functions."""
 
 def centroidal_map(
     model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
 ) -> CentroidalMap:
-    """Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the quantities from which it is made, in O(n), as
-    `CentroidalMap(Ag, Ig, com, Jcom)`.
+    """Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the centroidal inertia, the centre of mass and
+    its Jacobian, in O(n), as `CentroidalMap(Ag, Ig, com, Jcom)`.
 
     q: nq numbers. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass. out:
     four arrays, such as an earlier result.
@@ -693,7 +702,7 @@ def centroidal_momentum_rate(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
     """Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). It equals
-    the weight and the external forces, taken about the centre of mass.
+    the sum of the weight and of the external forces about the centre of mass.
 
     q: nq numbers; v, a: nv.
     """
@@ -712,8 +721,8 @@ def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _A
 def com_acceleration(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3
-    numbers (m/s²); O(n).
+    """Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s²);
+    O(n). Gravity is not subtracted.
 
     q: nq numbers; v, a: nv.
     """
@@ -721,7 +730,7 @@ def com_acceleration(
 def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 
-    q: nq numbers. It is a part of `centroidal_map`.
+    q: nq numbers. The result is also a member of `centroidal_map`.
     """
 
 def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
@@ -862,7 +871,7 @@ def random_configuration(model: Model, seed: int | None = None) -> _Array:
     """
 
 def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
-    """Moves the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+    """Transports the columns of X, which are tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 
     v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
     equals `transport` with −v.
@@ -879,20 +888,20 @@ class ConstraintSet:
     """Constraints of one model, contacts and loops, and the scratch memory of `constrained_dynamics` and similar
     functions.
 
-    Make one set for each combination of contacts; all sets may share one `Data`. Like a `Data`, a set may be used by
-    one thread at a time.
+    Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
+    set.
 
-    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found.
-    Redundant constraints then share the smallest forces. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ =
-    0 one iteration is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard,
-    Proximal and sparse resolution of constrained dynamic equations (2021).
+    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. In the first iteration λ' is 0, in each later one it is
+    the previous λ. Redundant constraints then share the forces so that the forces are smallest. Choose μ small compared
+    with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
+    Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
 
     model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
-    to 10000, which is always reached.
+    to 10000; none of them is skipped.
 
     Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
-    the same. Also raises it if a reference frame is 'world', a gain is negative or not finite, a target is not finite,
-    or its placement is not a homogeneous matrix.
+    the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is
+    not finite, or the placement of a target is not a homogeneous matrix.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> feet = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
@@ -924,10 +933,10 @@ class ConstraintSet:
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
     ) -> None:
-        """Changes the target of constraint k: the placement of its frame and its motion there. Parts that are not given do
-        not change.
+        """Changes the target of constraint k: placement, velocity and acceleration of its frame. Members that are not
+        given do not change.
 
-        Raises `ModelError` for numbers that are not finite and for an invalid placement; the old target is kept then.
+        Raises `ModelError` for numbers that are not finite and for an invalid placement; then the old target is kept.
         """
 
 def constrained_dynamics(
@@ -943,8 +952,9 @@ def constrained_dynamics(
     """Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
     dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
 
-    constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
-    other, or one that cannot be satisfied at a singular posture, give finite numbers and a residual.
+    constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. If constraints contradict each
+    other, or a constraint cannot be satisfied at a singular posture, the results are finite and `residual` is above
+    zero.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -993,9 +1003,10 @@ def constrained_dynamics_equations(
 
         M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 
-    `constrained_dynamics_derivatives` solves these equations; nothing is inverted here. constraints: a `ConstraintSet`,
-    whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move
-    with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
+    `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
+    `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`;
+    the forces move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an
+    earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -1016,8 +1027,8 @@ def impulse_dynamics(
     """Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
     lambda_, residual, redundant)`.
 
-    constraints: a `ConstraintSet`, whose gains, velocities and accelerations are ignored; q: nq numbers; v: nv;
-    restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+    constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q: nq
+    numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])
@@ -1053,9 +1064,9 @@ def impulse_dynamics_derivatives(
 class Data:
     """Scratch memory of the algorithms for one model: made once, and used by one thread at a time.
 
-    It serves all models with the same bodies and joints, whatever their gravity, armature or inertias. No algorithm
-    reads results of an earlier one, so calls may come in any order. Use from two threads at once is a `RuntimeError`;
-    use with another robot's model is a `ValueError`.
+    It can be used with all models that have the same bodies and joints, even with other gravity, armature or inertias.
+    No algorithm reads results of an earlier call, so the order of calls does not matter. Use from two threads at once
+    is a `RuntimeError`; use with another robot's model is a `ValueError`.
 
     model: the robot; threads: the number of threads for calls with many states (q of shape (N, nq)), at most 1024. Such
     calls also compute several states at once in SIMD lanes, and release the interpreter's lock.
@@ -1081,8 +1092,8 @@ def aba_hessian(
     nv); the other blocks are zero.
 
     q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is
-    the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. It is the Hessian
-    with respect to δ at `integrate(q, δ)`.
+    the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. Derivatives with
+    respect to q are derivatives with respect to δ at `integrate(q, δ)`.
     """
 
 def aba_input_derivative(
@@ -1251,8 +1262,8 @@ def rnea_hessian(
     dadq)`, each (nv, nv); the other blocks are zero.
 
     q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is the
-    derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. It is the Hessian with
-    respect to δ at `integrate(q, δ)`.
+    derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. Derivatives with respect
+    to q are derivatives with respect to δ at `integrate(q, δ)`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -1275,9 +1286,9 @@ def rnea_input_derivative(
     most O(n) per column.
 
     q: nq numbers; v, a: nv; wrt: the input; f_ext: as for `rnea`. Values of wrt: 'gravity', the acceleration of free
-    fall, 3 numbers; 'armature', 'damping', nv each (damping counts as if `passive_torque` is added to τ); ('force',
-    body), the external force on a body, 6, in its frame; ('inertia', body), its 10 inertial parameters; or ('friction',
-    smoothing), nv, for the smoothing of `passive_torque`.
+    fall, 3 numbers; 'armature', nv numbers; 'damping', nv numbers, as if `passive_torque` were added to τ; ('force',
+    body), the external force on a body in the body's frame, 6 numbers; ('inertia', body), the 10 inertial parameters of
+    a body; or ('friction', smoothing), nv numbers, with the smoothing of `passive_torque`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
@@ -1298,8 +1309,8 @@ def rnea_second_derivatives(
     """Computes the exact second derivatives of `rnea` as full tensors in O(n² depth), as `RneaSecondDerivatives(dqdq,
     dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. That function
-    returns the tensors contracted with a vector, and is many times faster.
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. If the product of
+    the tensors with a vector is enough, `rnea_hessian` is many times faster.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
@@ -1319,21 +1330,24 @@ def static_torque_derivative(
     """
 
 def _borrowed(capsule: Any) -> tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]:
-    """Describes the array that a DLPack capsule lends. It is valid as long as the capsule exists; ownership is not taken."""
+    """Describes the array that a DLPack capsule lends. The caller keeps the capsule as long as it uses the array;
+    ownership is not taken.
+    """
 
 def _lend(
     owner: Any, address: int, bits: int, shape: list[int], strides: list[int], device: int, versioned: bool
 ) -> Any:
-    """Makes a DLPack capsule that lends floating-point numbers on a CUDA device; their owner is kept alive until they are
-    returned.
+    """Makes a DLPack capsule that lends floating-point numbers on a CUDA device. The owner of the numbers is kept alive
+    until the borrower returns them.
     """
 
 @final
 class Cholesky:
     """The factor M = L Lᵀ of any symmetric positive definite matrix.
 
-    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same methods
-    and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
+    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`: it has the same
+    methods, and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm
+    4.2.1.
 
     n: the number of rows of M, at most 4096.
 
@@ -1349,11 +1363,11 @@ class Cholesky:
         """The factor L, lower triangular."""
 
     def factorize(self, M: ArrayLike) -> None:
-        """Computes the factor of M, a symmetric positive definite matrix; the docstring of the class has the cost.
+        """Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
+        cost.
 
-        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception raised
-        by a signal handler, such as KeyboardInterrupt, stops the computation between rows; no factor exists
-        then.
+        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
+        signal handler, such as KeyboardInterrupt, stops the computation between rows. Then no factor exists.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
@@ -1373,14 +1387,14 @@ class Cholesky:
 
 @final
 class DivideConquer:
-    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
+    """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and scratch memory.
 
     The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
-    joining two pieces costs about six times as much as eliminating a body. With two threads, and as many runs as
-    threads, it is faster than `aba` from about 200 bodies on; with one thread it is always slower. With joints that
-    share coordinates (mimic), the passes run once for the robot with all joints free, and once more for each of these
-    joints. The results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer
-    articulated-body algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+    joining two pieces costs about six times as much as eliminating a body. With two threads and two runs, the algorithm
+    is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with mimic joints,
+    the passes run once with all joints free, and once more for each joint that shares a coordinate. The results are
+    bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for
+    parallel O(log(n)) calculation of rigid-body dynamics (1999).
 
     model: the robot; grain: the maximum number of bodies in a run.
 
@@ -1396,7 +1410,9 @@ class DivideConquer:
     def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
     @property
     def size(self) -> AssemblySize:
-        """The work of the assembly, and the depth of its pieces, which run one after the other, as `AssemblySize`."""
+        """The numbers of operations of the assembly, and the depth of its pieces, which run one after the other, as
+        `AssemblySize`.
+        """
 
     def aba(
         self,
@@ -1407,7 +1423,8 @@ class DivideConquer:
         f_ext: ArrayLike | None = None,
         out: _Array | None = None,
     ) -> _Array:
-        """Computes the acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
+        """Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
+        + grain) steps.
 
         model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
         f_ext: as for `rnea`.
@@ -1418,11 +1435,11 @@ class Ltdl:
     """A factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
     diagonal.
 
-    With depth d of the tree (columns on the path to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
-    `inverse` O(n² d); for a chain d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
-    matrix for branched kinematic trees (2005).
+    With n = nv and the depth d of the tree (the largest number of columns on a path to the root), `factorize` costs O(n
+    d²), `solve` O(n d), `inverse` O(n² d). For a chain, d = n. Source: Featherstone, Efficient factorization of the
+    joint-space inertia matrix for branched kinematic trees (2005).
 
-    model: the robot, which defines the zeros of M.
+    model: the robot whose tree defines the zeros of M.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -1441,29 +1458,29 @@ class Ltdl:
 
     @property
     def nonzeros(self) -> int:
-        """The number of entries of L and D that may differ from zero, without the ones on L's diagonal."""
+        """The number of entries of L and D that may differ from zero. The diagonal of L, which is one, is not counted."""
 
     @property
     def order(self) -> list[int]:
-        """The coordinates in their order from the root to the tips; they are eliminated in reverse order.
+        """The coordinates in order from the root to the tips; the factorisation eliminates them in reverse order.
 
-        It is 0, 1, 2, … unless joints share coordinates.
+        The order is 0, 1, 2, and so on, unless joints share coordinates.
         """
 
     def factorize(self, M: ArrayLike) -> None:
-        """Computes the factor of M, a symmetric positive definite matrix; the docstring of the class has the cost.
+        """Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
+        cost.
 
-        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception raised
-        by a signal handler, such as KeyboardInterrupt, stops the computation between rows; no factor exists
-        then.
+        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
+        signal handler, such as KeyboardInterrupt, stops the computation between rows. Then no factor exists.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
         """Returns the inverse M⁻¹, both triangles filled."""
 
     def row(self, k: int) -> list[tuple[int, float]]:
-        """Returns the off-diagonal entries of row k of L, from the diagonal to the root, as (index, value). Both indices
-        count in `order`.
+        """Returns the off-diagonal entries of row k of L, from the diagonal to the root, as (index, value). Rows and
+        columns are numbered as in `order`.
         """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
@@ -1483,9 +1500,9 @@ class HyperDual:
     """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
     directions, and the mixed second derivative.
 
-    Store them in NumPy arrays of objects. Arithmetic and NumPy's elementary functions work on these, and so do all
-    functions of a model and a state, which then return such arrays. Comparisons use `re`. `condyle.jacobian`,
-    `gradient` and `hessian` create these numbers and read the derivatives.
+    Store these numbers in NumPy arrays of objects. Arithmetic and NumPy's elementary functions accept such arrays. All
+    functions of a model and a state accept them, too, and then return such arrays. Comparisons use `re`.
+    `condyle.jacobian`, `gradient` and `hessian` create these numbers and read the derivatives.
 
     Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 
@@ -1610,7 +1627,7 @@ class HyperDual:
 def check(inertia: Inertia) -> None:
     """Checks that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
 
-    Point masses, rods and plates have no volume; they lie on the boundary, and are refused.
+    Point masses, rods and plates have no volume: their J is singular, and they are refused.
 
     >>> from condyle import inertial_parameters
     >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
@@ -1640,8 +1657,9 @@ def log_cholesky(inertia: Inertia) -> _Array:
     """Returns the log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Every
     vector of ten numbers belongs to exactly one physical inertia.
 
-    α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). They make identification an unconstrained
-    problem. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+    α = ½ ln m with the mass m; dᵢ: logarithms of lengths in metres; s: lengths (m); t: the centre of mass (m). With
+    these parameters, identification is an unconstrained problem. Source: Rucker and Wensing, Smooth parameterization of
+    rigid-body inertia (2022).
 
     Raises `NotPhysicalError` for an inertia that is not physical.
 
@@ -1656,7 +1674,7 @@ def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     """Returns the Jacobian ∂π/∂θ of the ten parameters with respect to the log-Cholesky parameters, (10, 10), never
     singular.
 
-    theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the derivative of the efforts with respect to θ.
+    theta: 10 numbers. If Y is a regressor, Y ∂π/∂θ is the derivative of the efforts with respect to θ.
 
     >>> from condyle import inertial_parameters
     >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ
@@ -1708,11 +1726,11 @@ class Joint:
 
     @property
     def nq(self) -> int:
-        """The number of coordinates of its position."""
+        """The number of coordinates of the joint in q."""
 
     @property
     def nv(self) -> int:
-        """The number of its degrees of freedom, which is the number of its coordinates in v."""
+        """The number of degrees of freedom of the joint, which is the number of its coordinates in v."""
 
     @property
     def pitch(self) -> float | None:
@@ -1762,8 +1780,8 @@ def body_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of
-    its own frame; O(n).
+    """Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_acceleration` of the body's own
+    frame; O(n).
 
     q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1778,8 +1796,8 @@ def body_classical_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its
-    own frame; O(n).
+    """Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of the
+    body's own frame; O(n).
 
     q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1808,7 +1826,7 @@ def body_jacobian_rate(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+    """Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of the body's own frame.
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1839,7 +1857,7 @@ def body_velocity(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+    """Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of the body's own frame; O(n).
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1847,8 +1865,9 @@ def body_velocity(
 def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 
-    q: nq numbers. Joint i carries body i, whose frame is the one in the URDF; body 0 is the world. The pose of a frame
-    f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also `frame_placement`.
+    q: nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is the
+    world. The pose of a frame f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also
+    `frame_placement`.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data = condyle.Data(quadruped)
@@ -1866,8 +1885,8 @@ def frame_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its
-    spatial velocity as seen from the world, expressed in the reference; O(n).
+    """Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). It is the rate of the frame's
+    spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
 
     q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
     """
@@ -1882,9 +1901,9 @@ def frame_classical_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the
-    reference (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the
-    frame's origin; O(n).
+    """Computes the classical acceleration of a frame, 6 numbers; O(n). The linear part v̇ + ω × v (m/s²) belongs to the
+    body's point at the origin of the reference; the angular acceleration follows (rad/s²). In 'local_world_aligned' the
+    linear part is p̈ of the frame's origin p.
 
     q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 
@@ -1923,8 +1942,8 @@ def frame_jacobian_rate(
     """Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 
     q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-    acceleration for 'local' and 'world', and the classical one for 'local_world_aligned', whose origin moves with the
-    frame.
+    acceleration for 'local' and 'world'. For 'local_world_aligned', whose origin moves with the frame, it is the
+    classical acceleration.
     """
 
 def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
@@ -1945,8 +1964,8 @@ def frame_point_jacobian(
     """Computes the Jacobian J of a point of a frame, (3, nv): the point's velocity along the axes of the world is J v
     (m/s).
 
-    q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
-    the world and S the columns of the joints between the world and the frame.
+    q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, where p is the point
+    in the world's frame and S has a column (S_v, S_ω) for each joint between the world and the frame.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
@@ -1958,7 +1977,7 @@ def frame_point_jacobian(
 def frame_point_velocity(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+    """Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s).
 
     q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
     """
@@ -1988,8 +2007,8 @@ def frame_velocity(
 class Model:
     """A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 
-    Body 0 is the world. The other bodies are numbered depth first, parents before children, siblings in the order of
-    their joints' names, as in Pinocchio. A model is read from a file, built by a `ModelBuilder`, or taken from
+    Body 0 is the world. The other bodies are numbered as in Pinocchio: depth first, parents before children, and
+    siblings by the names of their joints. A model is read from a file, built by a `ModelBuilder`, or taken from
     `condyle.robots`; it can be pickled.
 
     >>> arm = condyle.robots.arm7()
@@ -1999,8 +2018,8 @@ class Model:
 
     @property
     def actuators(self) -> list[Actuator]:
-        """The actuators of the file, as `Actuator`, in the order of the file. `limits` already includes their ranges, and
-        the joints' `armature` and `damping` include theirs.
+        """The actuators of the file, as `Actuator`, in the order of the file. `limits`, `armature` and `damping` of the
+        joints already include the ranges, the armature and the damping of actuators.
         """
 
     @property
@@ -2020,13 +2039,13 @@ class Model:
     @property
     def damping_polynomial(self) -> _Array:
         """The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
-        with d₀ in `damping`. It acts where `damping` acts.
+        with d₀ in `damping`. It is used by the same functions as `damping`.
         """
 
     @property
     def frames(self) -> list[Frame]:
-        """The frames, as `Frame(name, kind, body, placement)`. Each joint of the URDF, also a fixed one, has two: the
-        joint's and the link's.
+        """The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed one, there are two
+        frames: one of the joint and one of its link.
         """
 
     @property
@@ -2041,23 +2060,27 @@ class Model:
 
     @property
     def gravity_compensation(self) -> list[GravityCompensation]:
-        """The supported weights, as `GravityCompensation(body, mass, mass_com, ratio)`: MuJoCo's `gravcomp`. They act only
-        in `passive_torque` and in a `Simulation` that includes them.
+        """The supported fractions of the weights of bodies, as `GravityCompensation(body, mass, mass_com, ratio)`:
+        MuJoCo's `gravcomp`. They act only in `passive_torque` and in a `Simulation` that includes them.
         """
 
     @property
     def idx_qs(self) -> list[int]:
-        """The index in q at which each joint's position begins; for a mimic joint, the index of the joint that it follows."""
+        """The index in q at which each joint's position begins; for a mimic joint, the index for the joint that it
+        follows.
+        """
 
     @property
     def idx_vs(self) -> list[int]:
-        """The index in v at which each joint's velocity begins; for a mimic joint, the index of the joint that it follows."""
+        """The index in v at which each joint's velocity begins; for a mimic joint, the index for the joint that it
+        follows.
+        """
 
     @property
     def inertial_parameters(self) -> _Array:
-        """The inertial parameters π, with which regressors are multiplied: ten numbers for each body except the world, 10
-        (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
-        inertia about the origin of the body's frame.
+        """The inertial parameters π, by which regressors are multiplied: ten numbers for each body except the world, 10
+        (nbodies − 1) in all. The ten numbers are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the
+        rotational inertia about the origin of the body's frame.
         """
 
     @property
@@ -2068,7 +2091,7 @@ class Model:
 
     @property
     def joint_placements(self) -> _Array:
-        """The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4)."""
+        """The pose of each joint's frame in the frame of the parent body, at joint position zero: (nbodies, 4, 4)."""
 
     @property
     def joint_types(self) -> list[str]:
@@ -2082,7 +2105,7 @@ class Model:
 
     @property
     def keyframe_controls(self) -> dict[str, _Array]:
-        """The controls of the `keyframes`: a dictionary by name, with a number for each of `actuators`."""
+        """The controls of the `keyframes`: a dictionary from names to arrays, with one number for each of `actuators`."""
 
     @property
     def keyframe_velocities(self) -> dict[str, _Array]:
@@ -2122,7 +2145,7 @@ class Model:
 
     @property
     def nqs(self) -> list[int]:
-        """The number of coordinates that each joint has of its own: 0 if it mimics another joint, and 0 for the world."""
+        """The number of coordinates that each joint has in q: 0 if it mimics another joint, and 0 for the world."""
 
     @property
     def nv(self) -> int:
@@ -2130,9 +2153,7 @@ class Model:
 
     @property
     def nvs(self) -> list[int]:
-        """The number of degrees of freedom that each joint has of its own: 0 if it mimics another joint, and 0 for the
-        world.
-        """
+        """The number of coordinates that each joint has in v: 0 if it mimics another joint, and 0 for the world."""
 
     @property
     def parents(self) -> list[int]:
@@ -2159,8 +2180,8 @@ class Model:
         """The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
         `line`.
 
-        They report implausible inertias and limits, joints along which the inertia matrix is singular, unknown names in
-        the file, and contents that a model cannot represent.
+        They report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in the
+        file, and contents that a model cannot represent.
         """
 
     def __copy__(self) -> Model:
@@ -2177,8 +2198,8 @@ class Model:
     ) -> Model:
         """Returns this robot with another one attached to one of its frames, as a new model.
 
-        The new bodies are numbered after all existing descendants of the body that carries them, as by Pinocchio's
-        `appendModel`. Name and gravity are this robot's.
+        The new bodies are numbered as by Pinocchio's `appendModel`: after all existing descendants of the body to which
+        they are attached. The result has the name and the gravity of this robot.
 
         frame: the name or index of a frame; None is the world.
         model: the other robot.
@@ -2193,11 +2214,13 @@ class Model:
         """
 
     def constraints(self) -> dict[str, ContactConstraint | Coupling]:
-        """Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
-        stabilisation, and coupled joints as `Coupling`. Inactive ones and the `<mimic>` of a URDF or SDF are left out.
+        """Returns the constraints in the robot's file that are not part of the tree, by name. Loops are
+        `ContactConstraint`s without stabilisation; coupled joints are `Coupling`s. Inactive constraints are left out,
+        and so is the `<mimic>` of a URDF or SDF.
 
-        The algorithms for trees ignore both. `constrained_dynamics` closes loops of its `ConstraintSet`. No function
-        enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
+        The algorithms for trees ignore loops and couplings. `constrained_dynamics` closes the loops that are in its
+        `ConstraintSet`. No function enforces a `Coupling`. A linear coupling becomes a part of the tree if the file is
+        read with `mimic=True`.
 
         >>> robot = condyle.robots.quadruped()
         >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]
@@ -2207,10 +2230,10 @@ class Model:
         """
 
     def frame(self, name: str) -> int:
-        """Returns the index of the frame with this name. If frames of several kinds have it, a link's comes first, then
-        the user's, then a joint's.
+        """Returns the index of the frame with this name. If frames of several kinds have the name, a link's frame is
+        preferred, then a user's frame, then a joint's frame.
 
-        Raises `ModelError`, with the most similar name.
+        Raises `ModelError` if the name does not exist; the message suggests the most similar name.
         """
 
     @staticmethod
@@ -2234,18 +2257,19 @@ class Model:
 
         q and v have the layout of MuJoCo's `qpos` and `qvel`, with two exceptions: quaternions are x, y, z, w, and a
         free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's frame). Several joints on
-        one body become a chain, with bodies without mass, `name#1`, `name#2`, …, between them. Contents that a model
-        cannot represent are left out and reported in `warnings`.
+        one body become a chain of joints, connected by bodies without mass, `name#1`, `name#2`, and so on. Contents
+        that a model cannot represent are left out and reported in `warnings`.
 
         path: a path, as text or `os.PathLike`.
-        mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2, instead of being a constraint outside the
-            model; its `polycoef` must be linear.
+        mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2; its `polycoef` must then be linear.
+            Otherwise it is one of the `constraints`, which the tree does not include.
         strict: whether a warning (`warnings`) is an error.
         weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
-            `warnings`, instead of being an error.
+            `warnings`. Otherwise it is an error.
         packages, allow: as for `from_urdf`.
 
-        Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+        Raises `ParseError`, with file, line and element, or `ModelError` for an invalid robot, and `ValueError` for an
+        unknown kind of warning.
         """
 
     @staticmethod
@@ -2271,26 +2295,27 @@ class Model:
     ) -> Model:
         """Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
 
-        The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of
-        MuJoCo's compiler is included: meshes, `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
-        Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
-        is not imported.
+        The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. The results of
+        MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`. If numbers were
+        changed after compilation, the changed numbers are used. Contents that a model cannot represent are reported in
+        `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not imported.
 
         mimic, strict, allow: as for `from_mjcf`.
 
-        Raises `TypeError` for anything but an `MjModel`, `ParseError`, `ModelError`; `ValueError` for an unknown kind.
+        Raises `TypeError` if the argument is not an `MjModel`, `ParseError` or `ModelError` if its contents are
+        invalid, and `ValueError` for an unknown kind of warning.
         """
 
     @staticmethod
     def from_pinocchio(model: Any) -> Model:
-        """Converts a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that results are equal.
-        `to_pinocchio` is the inverse.
+        """Converts a `pinocchio.Model`. The result has the same joints, bodies, frames, limits, damping and friction, so
+        algorithms give equal results. `to_pinocchio` is the inverse.
 
-        Composite, universal and spherical ZYX joints become several joints, with bodies without mass between them.
-        Limits of quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+        Composite, universal and spherical ZYX joints become several joints, connected by bodies without mass. Limits of
+        quaternions, cosines and sines, geometry, and reference configurations are left out.
 
-        Raises `ModelError` if its joints are not in depth-first order, in which Pinocchio's file readers number them,
-        or if a joint is of an unsupported kind.
+        Raises `ModelError` if a joint has an unsupported kind, or if the joints are not in depth-first order.
+        Pinocchio's file readers number joints in this order.
         """
 
     @staticmethod
@@ -2304,20 +2329,21 @@ class Model:
         allow: Sequence[_Kind] | None = None,
         model: str | None = None,
     ) -> Model:
-        """Reads a model from an SDF file (Gazebo), with the models that it includes.
+        """Reads a model from an SDF file (Gazebo), and the models that the file includes.
 
-        All models of a file, or of its first world, become one robot; its names then begin with the model's name:
+        All models of a file, or of its first world, become one robot. Each name then begins with the name of its model:
         `robot::arm`. Joints are visited breadth first from the root, in the order of the file. A joint that would give
-        a link a second parent closes a loop. A universal joint becomes two revolute ones.
+        a link a second parent closes a loop. A universal joint becomes two revolute joints.
 
         path: a path, as text or `os.PathLike`.
         root_joint: as for `from_urdf`.
-        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+        mimic: whether an axis with a `<mimic>` follows another axis. Otherwise it moves freely.
         strict: whether a warning (`warnings`) is an error.
-        packages, allow: as for `from_urdf`; `model://` addresses are searched in `packages` too.
+        packages, allow: as for `from_urdf`; `packages` are also searched for `model://` addresses.
         model: the name of the one model to read; None reads all models of the file.
 
-        Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+        Raises `ParseError`, with file, line and element, or `ModelError` for an invalid robot, and `ValueError` for an
+        unknown kind of warning.
         """
 
     @staticmethod
@@ -2354,21 +2380,22 @@ class Model:
 
         Fixed joints are merged into their parent body and remain as frames. Meshes are never read. A file whose name
         ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`. That program evaluates expressions
-        of the file, so use it only for files from sources that you trust.
+        in the file, so read only files from sources that you trust.
 
         path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
         root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
             'spherical' or 'translation'; None fixes the root link to the world.
-        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
-            their own.
+        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow. Otherwise they have
+            their own coordinates.
         strict: whether a warning (`warnings`) is an error.
-        packages: folders that contain packages, or are packages; searched before the folders in `ROS_PACKAGE_PATH` and
-            `AMENT_PREFIX_PATH` of the environment.
+        packages: folders that contain packages, or are packages. They are searched before the folders in the
+            environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
         allow: kinds of warnings that are not errors even if `strict` is set: 'massless', 'negative', 'triangle',
             'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
         arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
 
-        Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+        Raises `ParseError`, with file, line and element, or `ModelError` for an invalid robot, and `ValueError` for an
+        unknown kind of warning.
         """
 
     @staticmethod
@@ -2391,15 +2418,15 @@ class Model:
     def joint(self, name: str) -> int:
         """Returns the index of the body that the joint with this name carries.
 
-        Raises `ModelError`, with the most similar name.
+        Raises `ModelError` if the name does not exist; the message suggests the most similar name.
         """
 
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
         """Returns the same robot with some joints locked at their positions in q.
 
         Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
-        joint that it follows. A locked joint keeps its part of the length of a tendon, and holds the other joint of a
-        coupling if that is linear. Warnings about the file are kept.
+        joint that it follows. A locked joint still contributes to the length of a tendon. If a linear coupling connects
+        it to another joint, that joint is held, too. Warnings about the file are kept.
 
         joints: a list of names or indices of bodies.
         q: nq numbers.
@@ -2407,18 +2434,21 @@ class Model:
         >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
-        Raises `ModelError`, also if `q` is not finite or contains a rotation whose length is not 1 (up to 1e-3).
+        Raises `ModelError` if a joint does not exist, or if `q` is not finite or contains a rotation whose length is
+        not 1 (up to 1e-3).
         """
 
     def reference_configurations(self, path: _Path, strict: bool = False) -> dict[str, _Array]:
-        """Reads the named positions of an SRDF file, its `<group_state>`s: a dictionary from names to q, nq numbers each.
+        """Reads the named positions of an SRDF file, which are its `<group_state>`s. Returns a dictionary from names to q,
+        nq numbers each.
 
-        Joints that a state does not mention stay as in `neutral`; for a joint that turns without limits the state may
-        give its angle. States with the same name, of several groups, form one position. All other contents of the file
-        are ignored.
+        Joints that a state does not mention stay as in `neutral`. For a joint that turns without limits, the state may
+        give the angle. If states of several groups have the same name, they form one position. All other contents of
+        the file are ignored.
 
         path: a path, as text or `os.PathLike`.
-        strict: whether joints that the robot lacks are errors; an SRDF is often shared by robots with fewer joints.
+        strict: whether a joint that the robot does not have is an error. Without `strict` it is ignored, since robots
+        with fewer joints often share an SRDF.
 
         Raises `ParseError`, with file, line and element.
         """
@@ -2446,14 +2476,14 @@ class Model:
     def to_pinocchio(self) -> Any:
         """Returns the same robot as a `pinocchio.Model`; requires Pinocchio 3 or later.
 
-        Mimic joints remain mimic joints; it is an error if one turns without limits. Springs, damping that depends on
-        the speed, gravity compensation, actuators, keyframes and constraints are left out. Each causes a `UserWarning`
-        whose argument is a `ModelWarning`.
+        Mimic joints remain mimic joints; a mimic joint that turns without limits is an error. Springs, damping that
+        depends on the speed, gravity compensation, actuators, keyframes and constraints are left out. Each item that is
+        left out causes a `UserWarning`, whose argument is a `ModelWarning`.
         """
 
     def tree(self, frames: bool = False) -> str:
         """Returns the tree of bodies as text: each joint with its kind, its indices in q and v, and the body that it
-        carries; frames: whether to add the names of other frames to their bodies.
+        carries. frames: whether to list the other frames of each body, too.
 
         >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
         universe
@@ -2463,14 +2493,14 @@ class Model:
     def with_armature(self, armature: ArrayLike) -> Model:
         """Returns the same robot with another armature, nv numbers (kg m², kg).
 
-        Raises `ModelError` if one is negative or not finite.
+        Raises `ModelError` if a number is negative or not finite.
         """
 
     def with_damping(self, damping: ArrayLike, polynomial: ArrayLike | None = None) -> Model:
         """Returns the same robot with another viscous damping, nv numbers (N m s/rad, N s/m).
 
-        polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2). None keeps
-        them.
+        polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2). None keeps the
+        old coefficients.
 
         Raises `ModelError` if a number is not finite, or a damping is negative.
 
@@ -2480,15 +2510,15 @@ class Model:
         """
 
     def with_frame(self, name: str, parent: str | int | None, placement: ArrayLike | None = None) -> Model:
-        """Returns the same robot with one more frame of the user's, the last one of `frames`. All other numbers stay the
-        same.
+        """Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
+        unchanged.
 
-        name: the new frame's name; parent: the name or index of the frame to which it is attached, or the name of a
-        body; None is the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the
-        identity.
+        name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the
+        name of a body; None is the world; placement: the pose of the new frame in the parent's frame, a homogeneous (4,
+        4) matrix; None is the identity.
 
         Raises `ModelError` if the parent does not exist, the placement is not a homogeneous matrix, or another frame of
-        the user's has this name.
+        kind 'user' has this name.
 
         >>> tip = np.eye(4)
         >>> tip[2, 3] = 0.1
@@ -2500,18 +2530,18 @@ class Model:
     def with_friction(self, friction: ArrayLike) -> Model:
         """Returns the same robot with another Coulomb friction, nv numbers (N m, N).
 
-        Raises `ModelError` if one is negative or not finite.
+        Raises `ModelError` if a number is negative or not finite.
         """
 
     def with_gravity(self, gravity: ArrayLike) -> Model:
         """Returns the same robot with another gravity (m/s², 3 numbers, in the world's frame).
 
-        Raises `ModelError` if it is not finite.
+        Raises `ModelError` if the gravity is not finite.
         """
 
     def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
-        """Returns the same robot with other inertias, one for each body in the form of `inertias`, the world's first.
-        Implausible values are reported in its `warnings` and `singular_joints`.
+        """Returns the same robot with other inertias: a list like `inertias`, with one `Inertia` for each body, beginning
+        with the world. Implausible values are reported in the `warnings` and `singular_joints` of the result.
 
         Raises `ModelError` if a mass is negative or a number is not finite.
 
@@ -2532,8 +2562,8 @@ class Model:
         effort_lower: ArrayLike | None = None,
         effort_upper: ArrayLike | None = None,
     ) -> Model:
-        """Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps a
-        limit; an infinite number removes it.
+        """Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps the
+        old limits; an infinite number removes a limit.
 
         effort: maximum magnitude; sets both `effort_lower` and `effort_upper`, and cannot be combined with either.
 
@@ -2545,8 +2575,8 @@ class Model:
         """
 
     def with_mimic(self, follower: str | int, leader: str | int, ratio: float = 1.0, offset: float = 0.0) -> Model:
-        """Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's, and
-        it has no coordinate of its own. The leader's limits then apply to it.
+        """Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's
+        position. It has no coordinate in q. The limits of the leader's coordinate then apply to both joints.
 
         follower, leader: the joints' names, or the indices of their bodies.
 
@@ -2554,14 +2584,14 @@ class Model:
         >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
         6
 
-        Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or
-        another joint follows the follower.
+        Raises `ModelError` if a joint does not have exactly one degree of freedom, the leader is itself a mimic joint,
+        or another joint follows the follower.
         """
 
     def write_mjcf(self, path: _Path, original: _Path) -> None:
-        """Writes the same numbers into a copy of the MJCF `original`; see `write_urdf`.
+        """Writes the numbers that `write_urdf` writes into a copy of the MJCF `original`.
 
-        Bodies and joints that differ must be in the file itself, not in an included file. Effort limits are written as
+        Changed bodies and joints must be in the file itself, not in an included file. Effort limits are written as
         `actuatorfrcrange` of the joint.
 
         path: the new file. original: the file from which the robot was read.
@@ -2574,14 +2604,14 @@ class Model:
         stay the same.
 
         Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
-        new file gives this model again, up to rounding. `original` may be `path`. If fixed joints merge several links,
-        the difference goes to the link that the joint carries. An armature becomes the rotor inertia of a
-        `<transmission>`.
+        new file gives this model again, up to rounding. `original` and `path` may be the same file. If fixed joints
+        merge several links into one body, changes of its inertia are written to the link that the moving joint carries.
+        An armature becomes the rotor inertia of a `<transmission>`.
 
         path: the new file. original: the file from which the robot was read.
 
-        Raises `ParseError`, with the item and both numbers, if the format cannot express a value, such as an infinite
-        limit, or if the file belongs to another robot.
+        Raises `ParseError` if the format cannot express a value, such as an infinite limit, or if the file belongs to
+        another robot. The message contains the element and both numbers.
         """
 
 def _model_from_bytes(data: bytes) -> Model:
@@ -2592,18 +2622,18 @@ class Action:
     """An action written in Python.
 
     nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; only at the terminal knot the next state may
-        be None.
+    calc: a function of (t, x, u) that returns the next state and the cost; the next state may be None only at the
+        terminal knot.
     calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
-        ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, calc is called with arrays of numbers that
-        carry their exact derivatives. One call serves all knots if calc does not use t and has no branches that differ
-        between knots. So compute its results from its arguments (`np.array([...])`, `np.concatenate`), and do not write
-        them into arrays of floats. If this fails, calc is differentiated by hyper-dual numbers, and if that fails, by
-        differences.
+        ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without calc_diff, calc is called with arrays of
+        numbers that carry their exact derivatives. So calc must make new arrays for its results (`np.array([...])`,
+        `np.concatenate`), and not write into arrays of floats. One call serves all knots if calc does not use t and has
+        no branches that differ between knots. If this method fails, calc is differentiated by hyper-dual numbers, and
+        if they also fail, by differences.
     lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
     space: the space of states: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate,
-        difference). Then integrate(x, dx) is x ⊕ dx, difference(x0, x1) is the dx with x0 ⊕ dx = x1, and dx has ndx
-        numbers. Derivatives are taken with respect to dx.
+        difference). In this tuple, integrate(x, dx) returns x ⊕ dx, difference(x0, x1) returns the dx with x0 ⊕ dx =
+        x1, and dx has ndx numbers. Derivatives are taken with respect to dx.
     batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and results with N
         rows.
 
@@ -2651,8 +2681,8 @@ class Activation:
 
     @staticmethod
     def smooth2(epsilon: float = 1.0) -> Activation:
-        """Returns the smooth cost √(ε + ‖r‖²), approximately ‖r‖. Its Hessian is approximated by ε/a³ times the identity;
-        ε/a³ is the least eigenvalue of the exact Hessian.
+        """Returns the smooth cost √(ε + ‖r‖²), approximately ‖r‖. With the cost a, the Hessian is approximated by ε/a³
+        times the identity; ε/a³ is the least eigenvalue of the exact Hessian.
         """
 
     @staticmethod
@@ -2665,36 +2695,38 @@ class Activation:
 
     @staticmethod
     def weighted_barrier(lower: ArrayLike, upper: ArrayLike, w: ArrayLike) -> Activation:
-        """Returns the weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl squares wᵢ in its
-        value.
+        """Returns the weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has wᵢ² instead of wᵢ
+        in the value of this activation.
         """
 
 @final
 class AugmentedLagrangian:
     """The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 
-    It repeats two steps. First it minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP. Then, if
-    the limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. It ends when limits and the gradient of ℓ + yᵀg
-    vanish to the tolerances.
+    The method repeats two steps. First FDDP minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖² with z = g + μ y, where
+    ℓ is the cost of a knot, g its limits, y their multipliers, and Π the projection onto the bounds. Then, if the
+    limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. The method ends when the violation of limits and the
+    gradient of ℓ + yᵀg are below the tolerances.
 
     `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve, unless
-    that solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
-    multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. It is
-    "constraints_violated" if the penalty reached its maximum and the limits do not hold. This proves nothing: another
-    warm start may find a solution. It is "infeasible" if the initial state itself violates a limit of knot 0 that no
-    control can change. `outcome.worst` has the knot, the limit and the amount. The cost of the solution includes the
-    terms of the limits, the cost of `outcome` does not. The solution's trace and gains are from the last inner solve,
-    its timings from the whole solve. Controls of a warm start outside their bounds are moved into them.
+    the last solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
+    multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. The status is
+    "constraints_violated" if the penalty reached its maximum and the limits do not hold. This does not prove that no
+    solution exists: another warm start may find one. The status is "infeasible" if the initial state itself violates a
+    limit of knot 0 that no control can change. `outcome.worst` contains the knot, the limit and the amount of the
+    largest violation. The cost of the solution includes the penalties of the limits; the cost of `outcome` does not.
+    The solution's trace and gains are from the last inner solve, its timings from the whole solve. Controls of a warm
+    start are moved into their bounds.
 
     problem: the problem to solve; all memory is allocated for its shape, once.
-    inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` applies
-        to the whole solve.
+    inner: a dict of settings of `Fddp` for the inner solves. The tolerances of inner solves are chosen automatically;
+        `time_budget` applies to the whole solve.
     settings: any of these, by name. `tolerance`: the largest accepted distance of a limit from its bounds.
         `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the maximum number
         of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its maximum,
         and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem with limits or
-        bounds once, from the initial state held still at all knots (default: yes). A solve fails if it is not finite,
-        or violates limits at the largest penalty. The better result is returned.
+        bounds once (default: yes). The second solve starts from the initial state, held still at all knots. A solve
+        fails if it is not finite, or violates limits at the largest penalty. The better result is returned.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2715,7 +2747,7 @@ class AugmentedLagrangian:
     ) -> AugmentedLagrangian: ...
     @property
     def outcome(self) -> Outcome:
-        """The state of the limits after the last solve, an `Outcome`."""
+        """The violation of limits and other results of the last solve, as an `Outcome`."""
 
     @property
     def solution(self) -> Solution | None:
@@ -2731,8 +2763,8 @@ class AugmentedLagrangian:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, a delayed solve does not shorten the following ones: each makes at least one
-        iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
+        least one iteration.
 
         callback, verbose, progress: as for `solve`.
 
@@ -2742,13 +2774,13 @@ class AugmentedLagrangian:
     def shift(self, last: int) -> None:
         """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
 
-        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, with its own costs and
-        limits. A model of the problem serves the new last knot, with the costs and limits that the model has
-        for all knots. The last control is repeated, and the last state follows from it. At a second shift
-        without a solver step in between, the last state is repeated too, because a rollout with repeated
+        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
+        limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
+        model has for all knots. The last control is repeated, and the last state follows from it. At a second
+        shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
         controls would diverge.
 
-        last: the index of that model.
+        last: the index of the new last knot's model.
 
         Raises `ProblemError` if the model does not exist.
         """
@@ -2761,18 +2793,18 @@ class AugmentedLagrangian:
         verbose: bool = False,
         progress: bool = False,
     ) -> Solution:
-        """Solves the problem from a warm start, and returns a `Solution`, whose status tells how the solve ended.
+        """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
 
         Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-        an iteration. An exception of a signal handler, such as KeyboardInterrupt, is raised here. `solution` is
-        then the best iterate, from which `resume` continues.
+        an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
+        Then `solution` is the best iterate, from which `resume` continues.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
         callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            solve ends ("interrupted"). Its exceptions are raised here.
+            solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
         verbose: whether to print a line for each iteration.
-        progress: whether to show the progress, by tqdm if it is installed, else as lines.
+        progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
 
         Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
         """
@@ -2781,14 +2813,14 @@ class AugmentedLagrangian:
 class ConstrainedAction:
     """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
 
-    `Fddp` alone treats it as a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+    `Fddp` alone treats the constraint as a cost for leaving the bounds. For residuals of a robot, `Limit` is faster.
 
     action: the action.
     size: the number of entries of g, at most 4096.
     calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
     calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
-        space of the state. Without it, central differences of calc.
-    lower, upper: bounds of g, infinite for no bound; g = 0 if both are None.
+        space of the state. Without calc_diff, central differences of calc are used.
+    lower, upper: bounds of g, infinite for no bound. If both are None, the constraint is g = 0.
 
     >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
     >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
@@ -2811,13 +2843,13 @@ class ConstrainedAction:
 
 @final
 class ContactDynamics:
-    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
+    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as for `FreeDynamics`.
 
     model: the robot.
-    contacts: a dict of `ContactConstraint`s by name; residuals call them by these names. May be empty.
+    contacts: a dict of `ContactConstraint`s by name, which may be empty. Residuals refer to a contact by this name.
     dt: Δt in seconds.
     costs: a list of `Cost`.
-    damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
+    damping: μ in J M⁻¹ Jᵀ + μ 1 (1/kg), which makes this matrix invertible for redundant contacts.
     costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`.
 
     Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot, and for two contacts on
@@ -2848,27 +2880,27 @@ class ContactDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ContactDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """Returns the controls that hold the robot still at the state x, nu numbers; controls and contact forces together
-        have the smallest norm.
+        """Returns the controls that hold the robot still at the state x, nu numbers. Among all solutions, controls and
+        contact forces together have the smallest norm.
         """
 
 @final
 class ContactInverseDynamics:
-    """A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), and
-    τ = M q̈ + h − Jᵀλ; otherwise as `FreeDynamics`.
+    """A knot of a robot in contact, whose controls are the nv accelerations of the robot and the forces of its contacts: u
+    = (q̈, λ), and τ = M q̈ + h − Jᵀλ. Integrator and cost are as for `FreeDynamics`.
 
-    The knot has two kinds of `Limit` to zero by default. One bounds the undriven efforts, Nᵀτ = 0 with Nᵀ S = 0
-    (`undriven efforts`; for a floating base the first 6). The other bounds each contact's J q̈ + γ = 0 (`contact …`).
-    `AugmentedLagrangian` enforces them; `Fddp` alone treats them as costs. Nothing is inverted, so contacts may be
-    redundant. Crocoddyl's `DifferentialActionModelContactInvDynamics` has the same equations, and without contacts
-    `DifferentialActionModelFreeInvDynamics`.
+    By default the knot has two kinds of `Limit`, which keep a residual at zero. The limit named `undriven efforts`
+    keeps Nᵀτ = 0, where Nᵀ S = 0; for a floating base these are the first 6 efforts. A limit named `contact` and the
+    contact's name keeps J q̈ + γ = 0. `AugmentedLagrangian` enforces both; `Fddp` alone treats them as costs. No matrix
+    is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
+    `DifferentialActionModelContactInvDynamics`, and without contacts as in `DifferentialActionModelFreeInvDynamics`.
 
     model: the robot.
     contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. May be empty.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.contact_force` uses λ.
+    costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.contact_force` on λ.
     costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`. The actuation
-        defines which efforts are driven; bounds apply to all nv + rows controls.
+        defines which efforts have actuators. Bounds apply to all controls: nv accelerations and the rows of λ.
 
     Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot.
 
@@ -2897,8 +2929,8 @@ class ContactInverseDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ContactInverseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """Returns zero accelerations and the contact forces that hold the robot still at the state x: nv zeros and λ.
-        Efforts and forces together have the smallest norm.
+        """Returns the controls that hold the robot still at the state x: nv zeros, the accelerations, and the contact
+        forces λ. Among all solutions, efforts and forces together have the smallest norm.
         """
 
 @final
@@ -2908,8 +2940,8 @@ class Cost:
     name: used by `Problem.set_weight` and in errors.
     weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
-    activation: an `Activation`. None is the barrier of the bounds for a cone or a centre of pressure, the sum for
-        `Residual.own_cost`, and quadratic for other residuals.
+    activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone or a centre of pressure,
+        the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
 
     >>> from condyle.optimal import Cost, Residual
     >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -2922,20 +2954,21 @@ class Cost:
 class DifferentialAction:
     """An action whose accelerations and cost per second are written in Python; it advances by a time step.
 
-    The state is x = (q, v). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
+    The state is x = (q, v). With semi-implicit Euler, v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt ℓ,
+    where ℓ is the cost per second.
 
     nv, nu: the sizes of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
     calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; at the terminal knot the
         accelerations may be None.
     dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
     calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among da_dq, da_dv, da_du, the
-        derivatives of the accelerations, and q, r, Q, S, R, the derivatives of ℓ as for `Action`. Without it, calc is
-        differentiated as for `Action`. Second derivatives of the accelerations, for a solver's `second_order`, always
-        come from calc. They are zero if calc cannot be called with numbers that carry derivatives. Second derivatives
-        of ⊕ are taken as zero.
+        derivatives of the accelerations, and q, r, Q, S, R, the derivatives of ℓ as for `Action`. Without calc_diff,
+        calc is differentiated as for `Action`. The second derivatives of the accelerations, which a solver's
+        `second_order` needs, are always computed from calc. They are zero if calc cannot be called with numbers that
+        carry derivatives. Second derivatives of ⊕ are taken as zero.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
-    model: the robot to which the positions q and their ⊕ belong; None for vectors of nv numbers.
+    model: the robot that defines the positions q and the operation ⊕; None if q is a vector of nv numbers.
     controls: 'constant', 'linear' or 'quadratic', as for `FreeDynamics`.
 
     Raises `ProblemError` if dt is not above 0.
@@ -2966,25 +2999,26 @@ class DifferentialAction:
 
 @final
 class Fddp:
-    """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the equations and
+    """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or plain, with the equations and
     constants of Crocoddyl.
 
-    If controls are bounded, it follows Crocoddyl's box solvers.
+    If controls are bounded, the solver has the equations of Crocoddyl's box solvers.
 
     problem: the problem to solve; all memory is allocated for its shape, once.
-    settings: any of these, by name. `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose
-        trials are plain rollouts. `second_order`: whether to use the curvature of the dynamics if the models provide it
-        (full DDP). `inverse_dynamics_form`: whether the sweep takes knots of robots as equations of inverse dynamics if
-        possible (default: yes). The steps are the same and take less time. `project_warm_start`: whether controls of a
-        warm start outside their bounds are moved into them, in `solve` and in `resume` (default: yes). Crocoddyl keeps
-        them; its iterates need False. `time_budget` (s): a solve that has used it up returns its current result, with
-        the status "time_limit". The first iteration always runs, unless the budget is 0. A later phase runs if the
-        median of its last five durations fits. `timings.overrun` is the excess of a solve that takes longer.
-        `segments`: the number of parts of the horizon on which a sweep works at the same time, at most 1024, default 1.
-        It uses as many threads as are available. The results differ by rounding, but not with the number of threads.
-        `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep in
-        parallel), at most 1024, default 1. The results are bit-identical. `max_iterations`, `tolerance`,
-        `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+    settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or
+        "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics
+        if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse
+        dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
+        `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
+        yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
+        has used it up returns its current result, with the status "time_limit". The first iteration always runs, unless
+        the budget is 0. A later phase of an iteration runs only if the median of its last five durations fits into the
+        budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the number of
+        segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep uses as many
+        threads as are available. The number of segments changes the results by rounding errors; the number of threads
+        does not change them. `threads`: the number of threads that share an iteration on a robot (derivatives and
+        gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical. `max_iterations`,
+        `tolerance`, `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
         `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
         `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
     """
@@ -3004,8 +3038,8 @@ class Fddp:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, a delayed solve does not shorten the following ones: each makes at least one
-        iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
+        least one iteration.
 
         callback, verbose, progress: as for `solve`.
 
@@ -3015,13 +3049,13 @@ class Fddp:
     def shift(self, last: int) -> None:
         """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
 
-        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, with its own costs and
-        limits. A model of the problem serves the new last knot, with the costs and limits that the model has
-        for all knots. The last control is repeated, and the last state follows from it. At a second shift
-        without a solver step in between, the last state is repeated too, because a rollout with repeated
+        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
+        limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
+        model has for all knots. The last control is repeated, and the last state follows from it. At a second
+        shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
         controls would diverge.
 
-        last: the index of that model.
+        last: the index of the new last knot's model.
 
         Raises `ProblemError` if the model does not exist.
         """
@@ -3034,18 +3068,18 @@ class Fddp:
         verbose: bool = False,
         progress: bool = False,
     ) -> Solution:
-        """Solves the problem from a warm start, and returns a `Solution`, whose status tells how the solve ended.
+        """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
 
         Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-        an iteration. An exception of a signal handler, such as KeyboardInterrupt, is raised here. `solution` is
-        then the best iterate, from which `resume` continues.
+        an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
+        Then `solution` is the best iterate, from which `resume` continues.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
         callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            solve ends ("interrupted"). Its exceptions are raised here.
+            solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
         verbose: whether to print a line for each iteration.
-        progress: whether to show the progress, by tqdm if it is installed, else as lines.
+        progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
 
         Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
         """
@@ -3054,22 +3088,22 @@ class Fddp:
 class FreeDynamics:
     """A knot of a robot that moves freely under its joints' efforts.
 
-    q̈ = aba(q, v, S u). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt Σ w a(r),
-    and the state is x = (q, v).
+    q̈ = aba(q, v, S u). With semi-implicit Euler, v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt Σ w a(r)
+    over all `Cost`s, with weight w, activation a and residual r. The state is x = (q, v).
 
     model: the robot.
     dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
     costs: a list of `Cost`.
-    costs_at: lists of `Cost` by index of the knot, for knots with costs of their own; so one action can serve a phase
-        of several knots.
+    costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve several
+        knots of a phase.
     actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
     limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
-    limits_at: lists of `Limit` by index of the knot, for knots with limits of their own.
-    controls: their course in time within a knot: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times
-        nu controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt ('runge_kutta_3': 0, Δt/3 and 2 Δt/3).
-        Bounds apply to each of these values.
+    limits_at: lists of `Limit` by index of the knot. At these knots they replace `limits`.
+    controls: the polynomial that the controls follow within a knot: 'constant', 'linear' or 'quadratic'. The knot then
+        has nu, 2 nu or 3 nu controls: one value of u; values at the times 0 and Δt/2; or values at 0, Δt/2 and Δt
+        ('runge_kutta_3': 0, Δt/3 and 2 Δt/3). Bounds apply to each of these values.
 
     Raises `ProblemError` for a cost, a limit or an actuation that does not fit the robot.
     """
@@ -3095,11 +3129,12 @@ class FreeDynamics:
 
 @final
 class FrictionCone:
-    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
+    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper for a force
+    f.
 
     mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
-    rotation: the surface's axes (its normal is z) in the contact's axes, (3, 3); least, greatest: bounds on the normal
-    force (N), by default 0 and infinite.
+    rotation: the surface's axes in the contact's axes, (3, 3), with the surface's normal as z axis; least, greatest:
+    bounds on the normal force (N), by default 0 and infinite.
 
     Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is not a
     rotation matrix.
@@ -3127,8 +3162,8 @@ class FrictionCone:
 
 @final
 class ImpulseDynamics:
-    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w
-    a(r).
+    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
+    w a(r), as for `FreeDynamics` without Δt.
 
     There are no controls.
 
@@ -3137,7 +3172,7 @@ class ImpulseDynamics:
     costs: a list of `Cost`, which are evaluated at the state before the impact.
     restitution: ε, 0 to 1.
     damping: μ (1/kg).
-    limits: a list of `Limit`, or None; they are also evaluated at the state before the impact.
+    limits: a list of `Limit`, or None; limits are also evaluated at the state before the impact.
 
     Raises `ProblemError` as `ContactDynamics` does.
     """
@@ -3158,11 +3193,13 @@ class ImpulseDynamics:
 
 @final
 class InverseDynamics:
-    """A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
+    """A knot of a robot whose nv controls are the robot's accelerations: q̈ = u, τ = rnea(q, v, u). Integrator and cost
+    are as for `FreeDynamics`.
 
     model: the robot.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.undriven_effort` the undriven part of τ.
+    costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
+        efforts without actuators.
     integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 
     Raises `ProblemError` for a cost or a limit that does not fit the robot.
@@ -3193,7 +3230,8 @@ class Limit:
     name: used in errors.
     residual: a `Residual`.
     lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
-        centre of pressure has its own bounds, and any other r must be 0. Entries where both are equal are equalities.
+        centre of pressure has its own bounds, and every other r must be 0. An entry with equal lower and upper bounds
+        is an equality.
 
     >>> from condyle.optimal import Limit, Residual
     >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
@@ -3206,11 +3244,11 @@ class Limit:
 
 @final
 class Lqr:
-    """An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
-    u ≤ upper.
+    """An action with linear dynamics x⁺ = A x + B u + f, the quadratic cost ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, and bounds
+    lower ≤ u ≤ upper.
 
-    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. None is zero, or no bound.
-    Without R and B the action has no controls, as at a terminal knot. nx and nu are at most 4096.
+    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu numbers. None means zero, or no
+    bounds. Without R and B the action has no controls, as at a terminal knot. nx and nu are at most 4096.
 
     >>> from condyle.optimal import Lqr
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -3237,14 +3275,13 @@ class Problem:
     x0: the initial state, nx numbers.
     models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
         `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-    stages: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive knots
-        with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
-        differ only in their costs and limits.
+    stages: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed as a group
+        if they have the same model, or if their models belong to one robot and differ only in their costs and limits.
     terminal: the model of the terminal knot, without controls.
 
     Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
-    is not 1 (up to 1e-3). Also raises it for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot,
-    or 2²⁸ numbers in the matrices [A B] of all knots.
+    is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, more than 4096 numbers in a state or in
+    the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together.
     """
 
     def __new__(
@@ -3267,13 +3304,13 @@ class Problem:
         """The initial state, nx numbers; `set_x0` sets it."""
 
     def _evaluate(self, xs: ArrayLike, us: _Controls, moved: int) -> Evaluation:
-        """Computes the evaluation of a solution, unless the horizon was shifted since."""
+        """Computes the evaluation of a solution; an error if the horizon was shifted after the solve."""
 
     @staticmethod
     def _from_parts(x0: ArrayLike, parts: Sequence[Any], stages: Sequence[int] | None) -> Problem: ...
     def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqNode]:
-        """Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqNode`s, which a `Sweep`
-        solves.
+        """Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
+        `LqNode`s, which a `Sweep` solves.
 
         xs, us: as for `evaluate`.
         """
@@ -3289,14 +3326,14 @@ class Problem:
     def from_json(text: str) -> Problem:
         """Reads a robot's problem from the text that `to_json` returned.
 
-        Raises `ProblemError` for text that is not a problem, for parts that do not fit together, and for sizes beyond
-        the limits of `Problem`.
+        Raises `ProblemError` if the text is not a problem, if models, states or costs do not fit together, or if a size
+        is beyond the limits of `Problem`.
         """
 
     def quasi_static(self, xs: ArrayLike) -> _Array | list[_Array]:
-        """Computes the quasi-static controls of all knots, which hold each knot's state still as well as possible: (N,
-        nu), or a list of N arrays if knots differ in nu. For a robot they follow from statics, for other actions from
-        Newton's method.
+        """Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
+        (N, nu), or a list of N arrays if knots differ in nu. For robots they are computed by statics, for other actions
+        by Newton's method.
 
         xs: states, (N + 1, nx).
         """
@@ -3306,24 +3343,25 @@ class Problem:
 
         us: (N, nu), or a list of N arrays if knots differ in nu.
 
-        Other threads can run meanwhile. An exception raised by a signal handler, such as KeyboardInterrupt, stops it
+        Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
         between knots.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
-        """Sets a knot's own costs, such as an MPC's new targets. They move with their knot in a `shift`. Call it between
-        solves.
+        """Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs
+        move with the knot. Call this method between solves.
 
         knot: its index, 0 to N; N is the terminal knot.
         costs: a list of `Cost`.
 
-        Raises `ProblemError` for a term that does not fit, or if the knot's action does not belong to a robot.
+        Raises `ProblemError` if a term does not fit the robot, or if the knot's action does not belong to a robot.
         """
 
     def set_weight(self, name: str, weight: float) -> None:
-        """Changes the weight of the terms with this name in all knots, the terminal one included. Call it between solves.
+        """Changes the weight of all cost terms with this name, in all knots including the terminal one. Call this method
+        between solves.
 
-        Raises `KeyError` if no term has this name, `ProblemError` if the weight is negative or not finite.
+        Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
         """
 
     def set_x0(self, x0: ArrayLike) -> None:
@@ -3334,7 +3372,7 @@ class Problem:
 
     def to_json(self) -> str:
         """Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
-        is null.
+        is written as null.
 
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
         different robots.
@@ -3345,8 +3383,9 @@ class Residual:
     """A residual: a vector r(x, u) of a robot, which a `Cost` minimises or a `Limit` bounds.
 
     A frame is given by its name or index in a model. A contact is given by its name in `ContactDynamics`,
-    `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot
-    it uses the frame with that name, or is refused. A target that is not given is zero; a rotation is the identity.
+    `ContactInverseDynamics` or `ImpulseDynamics`. A residual stores the name of its frame. In a problem of another
+    robot it uses the frame with the same name; if this robot has no such frame, it is an error. A target that is not
+    given is zero; a target rotation is the identity.
 
     >>> from condyle.optimal import Residual
     >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -3362,7 +3401,7 @@ class Residual:
     @staticmethod
     def center_of_pressure(contact: str, size: _Size, rotation: ArrayLike | None = None) -> Residual:
         """Returns the position of a rigid contact's centre of pressure relative to a rectangle: four numbers, all at most
-        0 while it is inside.
+        0 while the centre of pressure is inside.
 
         size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes in the contact's axes,
         (3, 3).
@@ -3376,14 +3415,14 @@ class Residual:
 
     @staticmethod
     def contact_acceleration(contact: str) -> Residual:
-        """Returns the acceleration of a contact if accelerations are controls, r = J q̈ + γ along the axes of its rows: 1,
-        2, 3 or 6 numbers. It is 0 while the contact holds.
+        """Returns the acceleration of a contact, r = J q̈ + γ, for actions whose controls include the accelerations: 1, 2,
+        3 or 6 numbers along the axes of the contact's rows. It is 0 while the contact holds.
         """
 
     @staticmethod
     def contact_force(contact: str, target: ArrayLike | None = None) -> Residual:
-        """Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows:
-        1, 2, 3 or 6 numbers; target has 6.
+        """Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of the
+        contact's rows: 1, 2, 3 or 6 numbers; target always has 6.
         """
 
     @staticmethod
@@ -3392,7 +3431,9 @@ class Residual:
 
     @staticmethod
     def control_gravity() -> Residual:
-        """Returns the efforts and forces in excess of those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers."""
+        """Returns the difference between the actual efforts and forces and those that hold the robot still, r = τ − g(q) +
+        Jᵀλ, nv numbers.
+        """
 
     @staticmethod
     def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
@@ -3438,12 +3479,12 @@ class Residual:
         calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
         calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
     ) -> Residual:
-        """Returns a residual that is written in Python, r(t, x, u) at knot t, size numbers.
+        """Returns a residual r(t, x, u) that is written in Python; t is the index of the knot.
 
         size: the number of entries, at most 4096.
-        calc: a function of (t, x, u) that returns them; x = (q, v); u is empty at the terminal knot.
+        calc: a function of (t, x, u) that returns r; x = (q, v); u is empty at the terminal knot.
         calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the
-            tangent space of the state. Without it, calc is differentiated as for `Action`.
+            tangent space of the state. Without calc_diff, calc is differentiated as for `Action`.
 
         >>> from condyle.optimal import Residual
         >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
@@ -3454,15 +3495,16 @@ class Residual:
         calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
         calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
     ) -> Residual:
-        """Returns a cost that is written in Python: a number ℓ(t, x, u) at knot t with its own Hessian, as a residual of
-        one entry. The default activation of its `Cost` is `Activation.sum()`, so the term is weight · ℓ.
+        """Returns a cost that is written in Python, as a residual of one entry: a number ℓ(t, x, u) with its own Hessian,
+        where t is the index of the knot. The default activation of a `Cost` with this residual is `Activation.sum()`,
+        so the term is weight · ℓ.
 
         calc: a function of (t, x, u) that returns ℓ; x = (q, v); u is empty at the terminal knot.
-        calc_diff: a function of (t, x, u) that returns a dict of the nonzero parts among q, r, Q, S, R: gradient and
-            Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without it, calc is
+        calc_diff: a function of (t, x, u) that returns a dict of the nonzero arrays among q, r, Q, S, R: gradient and
+            Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without calc_diff, calc is
             differentiated as for `Action`.
 
-        Knots with such a cost are solved with respect to their controls, not in inverse-dynamics form.
+        For knots with such a cost, the sweep of `Fddp` does not use the inverse-dynamics form.
 
         >>> from condyle.optimal import Cost, Residual
         >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
@@ -3474,8 +3516,8 @@ class Residual:
 
     @staticmethod
     def undriven_effort() -> Residual:
-        """Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base
-        the 6 numbers of the force on it. They are 0 in a feasible motion.
+        """Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base,
+        6 numbers: the force on the base. They are 0 in a feasible motion.
         """
 
     @staticmethod
@@ -3484,12 +3526,13 @@ class Residual:
 
 @final
 class Sweep:
-    """The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
+    """The backward Riccati sweep over a horizon of linear-quadratic knots: an iteration of `Fddp` without derivatives and
+    line search.
 
     nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
     controls.
 
-    Raises `ProblemError` if their shapes do not fit together.
+    Raises `ProblemError` if the shapes of the nodes do not fit together.
 
     >>> from condyle.optimal import Lqr, Problem, Sweep
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
@@ -3528,8 +3571,8 @@ class Unicycle:
 
 @final
 class WrenchCone:
-    """The wrench cone of a rectangular sole, lower ≤ A w ≤ upper: friction, centre of pressure within the rectangle, and
-    yaw moment.
+    """The wrench cone of a rectangular sole, lower ≤ A w ≤ upper for a wrench w. The rows bound friction, the centre of
+    pressure (within the rectangle) and the yaw moment.
 
     friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 
@@ -3555,8 +3598,8 @@ def joint_torque_regressor(
     """Computes the joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
     `Model.inertial_parameters`; O(n depth).
 
-    q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors τ = Y π + armature a; for the
-    linear coordinates of a free joint, armature (a + ω × v) replaces armature a.
+    q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors, τ = Y π + armature · a. For the
+    linear coordinates of a free joint, armature · (a + ω × v) replaces armature · a.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -3566,21 +3609,21 @@ def joint_torque_regressor(
     """
 
 def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without
-    the rotors, as a linear function of `Model.inertial_parameters`; O(n).
+    """Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers; O(n). T = y · π is `kinetic_energy` without
+    the rotors, as a linear function of π, the `Model.inertial_parameters`.
 
     q: nq numbers; v: nv.
     """
 
 def passive_torque(model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
     """Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
-    damping d may be d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
+    damping coefficient is d = d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 
-    q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
-    −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest position; for joints with several degrees of freedom
-    the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`, except for joints with
-    `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of actuators. No other function
-    includes these efforts: add them to τ where needed.
+    q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. The effort of a
+    spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for joints with several
+    degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. The only
+    exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of
+    actuators. No other function of a model includes passive torques: add them to τ where needed.
 
     >>> arm = condyle.robots.arm7()
     >>> q, v = np.zeros(7), np.ones(7)
@@ -3603,8 +3646,8 @@ def passive_torque_derivatives(
     """
 
 def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a
-    linear function of `Model.inertial_parameters`; O(n).
+    """Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers; O(n). V = y · π is `potential_energy` as a
+    linear function of π, the `Model.inertial_parameters`.
 
     q: nq numbers.
     """
@@ -3635,25 +3678,25 @@ def quadruped() -> Model:
 class Simulation:
     """A simulation of a robot: its state, and the scratch memory to advance it.
 
-    Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
-    external forces are constant during a step.
+    A motion is q(t) = q₀ ⊕ ξ(t), with a tangent vector ξ(t). The equations of motion are q̇ = v, with the velocity v in
+    the body's frame, and v̇ = aba(q, v, τ). τ and the external forces are constant during a step.
 
     model: the robot; it starts at rest at `neutral`, at time 0.
     integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
-        momentum is conserved to rounding.
+        momentum is conserved up to rounding.
     dt: h, the length of a step (s), above 0.
-    passive: the smoothing ε of `passive_torque` (rad/s, m/s), which adds damping, friction, springs and gravity
-        compensation; None leaves them out.
-    tolerance: Newton's method ('variational') ends when the imbalance of the momenta is at most this fraction of their
-        sum.
+    passive: the smoothing ε (rad/s, m/s) of `passive_torque`, which is then added to τ: damping, friction, springs and
+        gravity compensation. None leaves it out.
+    tolerance: for 'variational', Newton's method ends when the imbalance of the momenta is at most this fraction of the
+        sum of the momenta.
     max_iterations: the maximum number of iterations of Newton's method.
     ground: a `Ground` on which the robot stands, slides and lands; None for no ground. Requires 'semi_implicit_euler'.
 
     A simulation can be copied and pickled; the copy continues with bit-identical results.
 
-    Raises `ModelError` if M is singular or the ground is invalid, `ValueError` if dt is not above 0 or not finite, or
-    tolerance is negative.
+    Raises `ModelError` if M is singular or the ground is invalid, and `ValueError` if dt is not positive and finite, or
+    the tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -3678,7 +3721,7 @@ class Simulation:
     ) -> Simulation: ...
     @property
     def contacts(self) -> GroundContacts:
-        """The contacts of the ground's points in the last step, as `GroundContacts`."""
+        """The contacts between the ground and the points of the robot in the last step, as `GroundContacts`."""
 
     @property
     def ground(self) -> Ground | None:
@@ -3703,11 +3746,11 @@ class Simulation:
         """Restores the state of a pickle."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
-        """Makes a number of steps, and calls a control law before each of them. Ends early if a step is not made, and
-        returns its status. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
+        """Makes a number of steps, and calls a control law before each step. If a step fails, ends early and returns the
+        status of this step. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
 
         control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
-            efforts; other threads can then run meanwhile.
+            efforts; then other Python threads can run meanwhile.
 
         An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
         step is kept.
@@ -3723,20 +3766,20 @@ class Simulation:
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """Makes a step with constant efforts and forces, and returns its status: 'done'; 'not_converged' if Newton's
         method did not reach the tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses
-        violate the laws of contact by more than the ground's tolerance; or 'not_finite'. The step is made for 'done'
-        and 'contacts_not_converged'.
+        violate the laws of contact by more than the ground's tolerance; or 'not_finite'. The state advances only for
+        'done' and 'contacts_not_converged'.
 
         tau: nv numbers (N m, N); f_ext: as for `rnea`.
         """
 
 @disjoint_base
 class _SpelledData:
-    """The `condyle.Data` with Pinocchio's interface, and the stored state for functions of a joint or a frame."""
+    """A `condyle.Data` with Pinocchio's interface, and the stored state for functions of a joint or a frame."""
 
     def __new__(cls, model: _SpelledModel) -> _SpelledData: ...
     @property
     def _frame_poses(self) -> _Array:
-        """The poses of the bodies for frames, from the last `updateFramePlacements`, (njoints, 4, 4)."""
+        """The poses of the bodies from which frames are computed, from the last `updateFramePlacements`, (njoints, 4, 4)."""
 
     @property
     def _given(self) -> int:
@@ -3752,7 +3795,7 @@ class _SpelledData:
 
     @property
     def _state(self) -> tuple[_Array, _Array, _Array]:
-        """q, v and a of the last `forwardKinematics`, zeros for those that were not given."""
+        """q, v and a of the last `forwardKinematics`. Vectors that were not given are zeros."""
 
     @property
     def com(self) -> list[_Array]:
@@ -3777,13 +3820,15 @@ class _SpelledModel:
 def centerOfMass(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
 ) -> _Array:
-    """Computes c, also stored as data.com[0]; with v and a also data.vcom[0] and data.acom[0]."""
+    """Computes the centre of mass, also stored as data.com[0]. With v, also computes data.vcom[0]; with v and a, also
+    data.acom[0].
+    """
 
 def computeCentroidalMomentum(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> Force:
-    """Computes hg, also stored as data.hg."""
+    """Computes the centroidal momentum, also stored as data.hg."""
 
 def computeCoriolisMatrix(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes C with C v + g = h and Ṁ − 2 C skew-symmetric, also stored as data.C."""
+    """Computes the Coriolis matrix C, also stored as data.C. C v + g = h, and Ṁ − 2 C is skew-symmetric."""
 
 def computeFrameJacobian(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, frame_id: int, frame: ReferenceFrame | None = None
@@ -3791,13 +3836,13 @@ def computeFrameJacobian(
     """Computes the Jacobian of a frame, (6, nv)."""
 
 def computeGeneralizedGravity(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """Computes g, also stored as data.g."""
+    """Computes the gravity efforts g, also stored as data.g."""
 
 def computeMinverse(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
     """Computes M⁻¹, also stored as data.Minv."""
 
 def _spelled_crba(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """Computes M, both triangles, also stored as data.M."""
+    """Computes M with both triangles, also stored as data.M."""
 
 def _spelled_difference(model: _SpelledModel, q0: ArrayLike, q1: ArrayLike) -> _Array:
     """Computes q₁ ⊖ q₀."""
@@ -3850,20 +3895,21 @@ def _spelled_integrate(model: _SpelledModel, q: ArrayLike, v: ArrayLike) -> _Arr
     """Computes q ⊕ v."""
 
 def jacobianCenterOfMass(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """Computes ∂c/∂q, (3, nv), also stored as data.Jcom."""
+    """Computes the Jacobian of the centre of mass, (3, nv), also stored as data.Jcom."""
 
 def nonLinearEffects(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes C v + g, also stored as data.nle."""
+    """Computes the nonlinear effects C v + g, also stored as data.nle."""
 
 def updateFramePlacements(model: _SpelledModel, data: _SpelledData) -> None:
-    """Computes data.oMf of the last forwardKinematics."""
+    """Computes data.oMf from the positions of the last forwardKinematics."""
 
 @final
 class FrictionContact:
-    """A contact with friction: the touching frame is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+    """A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
+    ‖f_t‖ ≤ μ f_n.
 
-    `ContactTarget.activation` defines whether the contact touches at a tick, and how strongly. Numbers are checked when
-    a `WholeBodyController` is made.
+    `ContactTarget.activation` defines at each tick whether the contact touches, and how far it is loaded. The
+    constructor of `WholeBodyController` checks the numbers.
 
     Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
     max_force: bounds on the normal force of the whole contact (N).
@@ -3875,7 +3921,7 @@ class FrictionContact:
 
     @property
     def axes(self) -> Literal["world", "frame"]:
-        """The axes in which the normal is given: 'world' or 'frame'."""
+        """The axes along which the normal is given: 'world' or 'frame'."""
 
     @property
     def corners(self) -> _Array | None:
@@ -3887,7 +3933,7 @@ class FrictionContact:
 
     @property
     def frame(self) -> str:
-        """The name of its frame."""
+        """The name of the contact's frame."""
 
     @property
     def friction(self) -> float:
@@ -3921,7 +3967,7 @@ class FrictionContact:
         """Returns a point contact: the frame's origin is held, the frame may turn about it.
 
         normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is z, level ground.
-        axes: the axes of the normal: 'world', in which it is constant, or 'frame', with which it turns.
+        axes: the axes of the normal: 'world' for a constant normal, or 'frame' for a normal that turns with the frame.
         """
 
     @staticmethod
@@ -3936,7 +3982,7 @@ class FrictionContact:
     ) -> FrictionContact:
         """Returns a contact of a rectangular sole about the frame's origin, whose normal is the frame's z axis.
 
-        size: its sides along the frame's x and y (m); forces, yaw_friction: as for `surface`.
+        size: the sides of the sole along the frame's x and y (m); forces, yaw_friction: as for `surface`.
         """
 
     @staticmethod
@@ -3953,13 +3999,15 @@ class FrictionContact:
         """Returns an edge contact (two corners: the frame may turn about the edge) or a convex polygon (three or more
         corners: the frame is held).
 
-        corners: positions in the frame (m), (n, 3), in their order around the polygon, in one plane across the normal.
+        corners: positions in the frame (m), (n, 3), in order around the polygon, in one plane perpendicular to the
+            normal.
         forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
             about the normal; or 'corners', a force with a friction cone at each corner.
         normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
             None is z.
-        yaw_friction: γ (m), with which a wrench's moment about the normal is at most γ f_n. None is ⅔ μ r, with r the
-            radius of the largest circle about the corners' mean within the polygon; ½ μ l for an edge of length 2 l.
+        yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔ μ r, where r is the
+            radius of the largest circle in the polygon about the mean of the corners; for an edge of length 2 l it is ½
+            μ l.
         """
 
 @final
@@ -3967,17 +4015,18 @@ class Plan:
     """A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
     touch in each interval.
 
-    `WholeBodyController.track` converts it to references. Between knots q is interpolated in the joints' groups, and v
-    is interpolated, with a = Δv / Δt. Two knots may have the same time: then the velocity jumps there (an impact).
+    `WholeBodyController.track` converts it to references. Between knots, q is interpolated with constant velocity (as
+    by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at this
+    time (an impact).
 
     model: the robot.
     times: N + 1 times in ascending order (s); two may be equal.
     states: (q, v) of the knots, (N + 1, nq + nv).
-    touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
-    controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next
-        one, (N, nu); None for no controls.
+    touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
+    controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
+        free-flyer's), (N, nu); None for no controls.
     gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
-    fade: the time over which a contact is loaded after it begins to touch, and unloaded before it ends (s).
+    fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it ends to touch.
 
     Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
     or pairs (cos, sin) do not have length 1.
@@ -4005,12 +4054,13 @@ class Plan:
         """The times of the first and the last knot (s)."""
 
     def activation(self, contact: int, t: float) -> float:
-        """Returns the activation of a contact, given by index, at a time: 0 while it does not touch, a ramp when it begins
-        and ends to touch, else 1.
+        """Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after it begins and
+        before it ends to touch, else 1. contact: the index of the contact.
         """
 
     def feedback(self, t: float, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-        """Computes the plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
+        """Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers; they are 0 for
+        a free-flyer.
 
         t: the time (s); q: nq numbers; v: nv.
 
@@ -4022,14 +4072,14 @@ class Plan:
 class Task:
     """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
 
-    The `References` contain its target. Tasks of priority 0 come first; tasks of priority 1 only use the freedom that
-    these leave, and so on. Within a priority only the ratios of the weights matter. Numbers are checked when a
-    `WholeBodyController` is made.
+    The `References` contain the target of the task. Tasks of priority 0 come first. Tasks of priority 1 only use the
+    freedom that tasks of priority 0 leave, and so on. Within a priority, only the ratios of the weights matter. The
+    constructor of `WholeBodyController` checks the numbers.
 
     Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
-    is `Gains.critical(100.0)`. mask: one flag for each number of the task, whether it is controlled; None is all. axes:
-    the axes of these numbers: 'world'; 'local', the frame's own (for tasks without a frame: the world's); or ('frame',
-    name), the axes of another frame.
+    is `Gains.critical(100.0)`. mask: for each number of the task, whether it is controlled; None controls all numbers.
+    axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame, of the
+    world); or ('frame', name), the axes of another frame.
     priority: 0 is the first priority; at most 2.
 
     >>> from condyle.wholebody import Task
@@ -4039,11 +4089,11 @@ class Task:
 
     @property
     def axes(self) -> _Axes:
-        """The axes of its numbers: 'world', 'local' or ('frame', name)."""
+        """The axes of the task's numbers: 'world', 'local' or ('frame', name)."""
 
     @property
     def frame(self) -> str | None:
-        """The name of its frame; None without a frame."""
+        """The name of the task's frame; None for a task without a frame."""
 
     @property
     def gains(self) -> Gains:
@@ -4051,19 +4101,19 @@ class Task:
 
     @property
     def joints(self) -> _Array:
-        """Factors of the posture's weight, nv numbers; empty if all are 1."""
+        """Factors of the weight for the coordinates of a posture task, nv numbers; empty if all factors are 1."""
 
     @property
     def kind(self) -> str:
-        """The controlled quantity: the name of the task's constructor."""
+        """The controlled quantity, as the name of the constructor that made the task."""
 
     @property
     def mask(self) -> list[bool]:
-        """The mask: for each of its numbers, whether it is controlled."""
+        """The mask: for each number of the task, whether it is controlled."""
 
     @property
     def priority(self) -> int:
-        """Its priority; 0 is the first."""
+        """The priority of the task; 0 is the first."""
 
     @property
     def weight(self) -> float:
@@ -4077,8 +4127,8 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """Returns a task for the rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers;
-        weight 0.1.
+        """Returns a task for the rate of the angular momentum about the centre of mass: 3 numbers; weight 0.1. Only the gain d
+        acts.
         """
 
     @staticmethod
@@ -4095,9 +4145,9 @@ class Task:
     def contact_force(
         frame: str, weight: float | None = None, mask: Sequence[bool] | None = None, priority: int = 0
     ) -> Task:
-        """Returns a task for the force of this frame's contact: 6 numbers, force and moment at the contact's centre in its
-        axes (t₁, t₂, n); a point contact has the first 3; weight 1e-3. It has no gains, and does not act while the
-        contact is off.
+        """Returns a task for the force of this frame's contact; weight 1e-3. It has 6 numbers: force and moment at the
+        contact's centre, along the contact's axes (t₁, t₂, n); for a point contact, the first 3 of them. The task has
+        no gains, and does not act while the contact is off.
         """
 
     @staticmethod
@@ -4151,8 +4201,8 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """Returns a task for the velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6
-        numbers, linear first; weight 10.
+        """Returns a task for the velocity of a frame's origin and rotation: 6 numbers, linear first; weight 10. The pose does
+        not matter: only the gain d acts.
         """
 
 @final
@@ -4182,7 +4232,7 @@ class WholeBodyController:
     without its contact, for a number outside its range, and for an effort limit of 0 in the model or the settings.
 
     A controller can be copied and pickled; the copy continues with bit-identical results. With the back end 'clarabel',
-    whose solvers are built again, results are equal up to its tolerance.
+    the copy builds its solvers again, so results are equal only up to the tolerance.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -4208,8 +4258,8 @@ class WholeBodyController:
         """All settings of the controller: `Settings`."""
 
     def hold(self, q: ArrayLike) -> References:
-        """Returns the `References` that keep the robot at rest at a position: all tasks at their current values, each
-        contact held and touching, the weight shared equally by the contacts.
+        """Returns the `References` that keep the robot at rest at a position: all tasks keep their current values, all
+        contacts touch and are held, and the contacts share the weight equally.
 
         q: nq numbers.
 
@@ -4219,27 +4269,27 @@ class WholeBodyController:
 
     def kkt_residuals(self, q: ArrayLike, v: ArrayLike, references: References) -> KktResiduals:
         """Returns the distance of the last step from the optimum of its first-priority program, as `KktResiduals`: the
-        errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the same state
-        and references as to the last step. For tests: it assembles the program anew.
+        errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the state and references
+        of the last step again. Use this method in tests: it assembles the program anew.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
-        """Computes the `Command` at a state. It always returns a command: without a solution, a safe one, whose status
-        tells why. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an invalid
-        quaternion, pair (cos, sin) or rotation of a reference; the reason names the joint or the frame. Other threads
-        can run meanwhile.
+        """Computes the `Command` at a state. It always returns a command: without a solution, a safe command whose status
+        shows the cause. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an
+        invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the joint or the frame.
+        Other Python threads can run meanwhile.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
 
     def track(self, plan: Plan, t: float, references: References) -> None:
-        """Sets references to a plan at a time: the joints, and the resulting centre of mass, momentum and frames; the
-        contacts with their activation, held where the plan has them. The contacts share the force that the plan's c̈
-        requires.
+        """Sets references to the state of a plan at a time: the joints, and the resulting centre of mass, momentum and
+        frames. Contacts get the plan's activation, and are held at the poses that the plan gives them. The contacts
+        share the force that the plan's acceleration c̈ of the centre of mass requires.
 
         plan: a `Plan` of the same robot with the same number of contacts.
         t: the time (s); before the first knot and after the last one, the plan rests at that knot.
@@ -4247,14 +4297,14 @@ class WholeBodyController:
         """
 
 def _check_pose(name: str, pose: ArrayLike) -> None:
-    """Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is valid."""
+    """Raises `ValueError` if the rotation in a pose, which is a (4, 4) matrix, is not valid."""
 
 def _check_rotations(name: str, q: ArrayLike, rotations: Sequence[tuple[str, int, int]]) -> None:
-    """Raises `ValueError` unless all rotations of a position have length 1; each rotation is given by its joint and its
-    range in q.
+    """Raises `ValueError` if a quaternion or a pair (cos, sin) in a position does not have length 1. Each of them is given
+    by its joint and its range in q.
     """
 
 def _controller_from_numbers(
     model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings, numbers: ArrayLike
 ) -> WholeBodyController:
-    """Creates the controller of a pickle. The model, which is one of its parts, checks the version."""
+    """Creates the controller of a pickle. The pickle contains the model, whose own pickle checks the version."""

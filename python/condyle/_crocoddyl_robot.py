@@ -13,7 +13,7 @@ _Array = NDArray[np.float64]
 
 
 class NoCounterpartError(Exception):
-    """Raised for an object of Crocoddyl without a counterpart here; the message has its name."""
+    """Raised for an object of Crocoddyl without a counterpart in Condyle; the message names the object."""
 
 
 _FREE = {
@@ -23,7 +23,7 @@ _FREE = {
     "JointModelTranslation": Joint.translation,
 }
 _ALIGNED = {"JointModelR": Joint.revolute, "JointModelRUB": Joint.continuous, "JointModelP": Joint.prismatic}
-"""Names of joints about or along x, y or z, without that letter."""
+"""Names of Pinocchio's joints about or along x, y or z, without the letter of the axis."""
 _UNALIGNED = {
     "JointModelRevoluteUnaligned": Joint.revolute,
     "JointModelPrismaticUnaligned": Joint.prismatic,
@@ -42,7 +42,7 @@ class Robot:
             inertia = Inertia.from_com(own.mass, own.lever, own.inertia)
             on = bodies[theirs.parents[i]]
             bodies.append(builder.body(f"body of {name}", on, _joint(theirs, i), place, inertia, joint_name=name))
-        # our frames must have unique names
+        # frames of a `Model` must have unique names
         self._names: list[str] = []
         for k, frame in enumerate(theirs.frames):
             self._names.append(f"{frame.name} ({k})" if frame.name in self._names else frame.name)
@@ -53,16 +53,16 @@ class Robot:
         self._numbers = [users[name] for name in self._names]
 
     def is_of(self, theirs: Any, armature: _Array) -> bool:
-        """Returns whether it is the same robot with the same armature."""
+        """Returns whether this robot was made from an equal `pinocchio.Model` with the same armature."""
         return np.array_equal(self.armature, armature) and (self.theirs is theirs or bool(self.theirs == theirs))
 
     def frame(self, number: int) -> int:
-        """Returns the index in our model of a frame of the Pinocchio model."""
+        """Returns the index in `model` of a frame, given by its index in the Pinocchio model."""
         return self._numbers[number]
 
 
 def _joint(theirs: Any, i: int) -> Joint:
-    """Returns joint i of a model."""
+    """Converts joint i of a Pinocchio model."""
     joint = theirs.joints[i]
     name = joint.shortname()
     own = joint.extract() if hasattr(joint, "extract") else joint

@@ -19,7 +19,9 @@ NO_BOUND = 1e300
 """Magnitude from which a bound counts as infinite."""
 REFERENCES = {"LOCAL": "local", "WORLD": "world", "LOCAL_WORLD_ALIGNED": "local_world_aligned"}
 HELD = {"LOCAL": "local", "WORLD": "local_world_aligned", "LOCAL_WORLD_ALIGNED": "local_world_aligned"}
-"""Axes of contacts. In Crocoddyl, WORLD means the world's axes at the frame's origin."""
+"""Condyle's word for the axes of a contact, by Crocoddyl's word. In Crocoddyl's contacts, WORLD means the world's axes
+at the frame's origin.
+"""
 AT_THE_END = {
     "ResidualModelControl",
     "ResidualModelJointAcceleration",
@@ -29,7 +31,9 @@ AT_THE_END = {
     "ResidualModelContactWrenchCone",
     "ResidualModelContactCoPPosition",
 }
-"""Residuals that are constant in Crocoddyl's terminal models: zero, or minus the reference of the efforts."""
+"""Residuals that are constant in Crocoddyl's terminal models: ResidualModelJointEffort is minus its reference, the
+others are zero.
+"""
 
 
 def kind(theirs: Any) -> str:
@@ -40,7 +44,7 @@ def kind(theirs: Any) -> str:
 
 
 def bounds(numbers: Any) -> _Array:
-    """Returns bounds, infinite for no bound."""
+    """Converts bounds; a bound of large magnitude becomes infinite."""
     x = np.asarray(numbers, float)
     out: _Array = np.where(np.abs(x) < NO_BOUND, x, np.copysign(np.inf, x))
     return out
@@ -71,14 +75,15 @@ class Drives:
         return np.array(data.tau), np.array(data.dtau_du, float).reshape(shape), np.array(data.dtau_dx, float)
 
     def given(self) -> _Array | None:
-        """Returns S for our actions; None if each joint has a control, except a free-flyer at the root."""
+        """Returns S as Condyle's actions take it; None if each joint except a free-flyer at the root has a control."""
         return None if self.usual else self.matrix
 
 
 class Terms:
     """Converts the costs and constraints of an action.
 
-    names: names of the contacts by index of their frame; drives: the actuation model, if accelerations are controls.
+    names: the name of each contact, by the index of the contact's frame; drives: the actuation model, if accelerations
+    are controls.
     """
 
     def __init__(self, robot: Robot, names: dict[int, str], drives: Drives | None = None, end: bool = False) -> None:
@@ -96,12 +101,14 @@ class Terms:
         return [self._limit(item) for item in counts if not self._vanishes(item.constraint)]
 
     def _vanishes(self, term: Any) -> bool:
-        """Returns whether a term is zero in a terminal model because its residual is; other constants are errors."""
+        """Returns whether a term is zero in a terminal model because its residual is zero there. A constant term that
+        is not zero is an error.
+        """
         residual: Any = getattr(term, "residual", None)
         if not self.end or kind(residual) not in AT_THE_END:
             return False
         r = np.zeros(residual.nr) - (residual.reference if kind(residual) == "ResidualModelJointEffort" else 0.0)
-        if hasattr(term, "activation"):  # costs have an activation, constraints do not
+        if hasattr(term, "activation"):  # only costs have an activation; constraints do not
             data = term.activation.createData()
             term.activation.calc(data, r)
             if data.a_value:
@@ -136,7 +143,9 @@ class Terms:
         return self.names[theirs.id]
 
     def _residual(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
-        """Returns a residual, the indices of its entries that Crocoddyl's residual has, and its number of entries."""
+        """Converts a residual. Also returns the indices of the entries that Crocoddyl's residual has, and the number of
+        all entries.
+        """
         make = _RESIDUALS.get(kind(theirs))
         if kind(theirs) == "ResidualModelJointEffort":
             return self._efforts(theirs)
@@ -145,15 +154,16 @@ class Terms:
         return make(self, theirs), (np.arange(theirs.nr), theirs.nr)
 
     def _means_the_same(self, name: str) -> bool:
-        """Returns whether a residual is the same here. The gravity residual in contact and the jump at the terminal
-        knot differ.
+        """Returns whether a residual has the same value in Condyle. Two residuals differ: the gravity residual in
+        contact, and the velocity jump at the terminal knot.
         """
         if name == "ResidualModelControlGrav":
             return self.drives is None and not self.end and not self.names
         return not (self.end and name == "ResidualModelImpulseCoM")
 
     def _efforts(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
-        """Returns the residual of efforts: the controls, or the efforts of inverse dynamics."""
+        """Converts a residual of joint efforts: to a residual of the controls, or of the efforts of inverse dynamics.
+        """
         if self.drives is None:
             return Residual.control(theirs.reference), (np.arange(theirs.nr), theirs.nr)
         if not self.drives.usual:
@@ -170,7 +180,7 @@ def _cone(theirs: Any) -> FrictionCone:
 
 
 def _framed(make: Callable[..., Residual]) -> Callable[["Terms", Any], Residual]:
-    """Returns a function that converts a residual of a frame with a target."""
+    """Returns a function that converts residuals with a frame and a target; `make` creates the residual."""
 
     def made(terms: "Terms", theirs: Any) -> Residual:
         target = getattr(theirs.reference, "homogeneous", theirs.reference)
@@ -209,7 +219,9 @@ _RESIDUALS: dict[str, Callable[[Terms, Any], Residual]] = {
 
 
 def activation(theirs: Any, entries: tuple[_Array, int]) -> Activation:
-    """Returns the activation of a residual; entries: indices of its active entries, and its number of entries."""
+    """Converts the activation of a residual. entries: the indices of the residual's active entries, and the number of
+    its entries.
+    """
     which, n = entries
     name, all_of_them = kind(theirs), len(which) == n
     if name == "ActivationModelQuad" and all_of_them:
@@ -224,7 +236,7 @@ def activation(theirs: Any, entries: tuple[_Array, int]) -> Activation:
         return Activation.barrier(lower, upper)
     if name in ("ActivationModelSmooth1Norm", "ActivationModelSmooth2Norm") and all_of_them:
         data = theirs.createData()
-        theirs.calc(data, np.zeros(n))  # the values are n √ε, and √ε
+        theirs.calc(data, np.zeros(n))  # at r = 0 the value is n √ε for Smooth1Norm, and √ε for Smooth2Norm
         if name == "ActivationModelSmooth1Norm":
             return Activation.smooth1((data.a_value / n) ** 2)
         return Activation.smooth2(data.a_value**2)
@@ -232,7 +244,7 @@ def activation(theirs: Any, entries: tuple[_Array, int]) -> Activation:
 
 
 def contact(robot: Robot, theirs: Any) -> ContactConstraint:
-    """Converts a contact of a `ContactModelMultiple`, or an impulse."""
+    """Converts a contact of a `ContactModelMultiple`, or an impulse of an `ImpulseModelMultiple`."""
     name, place, turned, axes = kind(theirs), np.eye(4), None, HELD[str(theirs.type)]
     if name in ("ContactModel6D", "ContactModel3D", "ContactModel2D", "ContactModel1D"):
         kp, kd = theirs.gains

@@ -1,4 +1,4 @@
-"""NVIDIA's driver and run-time compiler for `condyle.cuda`, loaded when they are first needed."""
+"""NVIDIA's driver and NVIDIA's run-time compiler for `condyle.cuda`. Both are loaded when they are first needed."""
 
 import ctypes
 import os
@@ -98,13 +98,13 @@ class Driver:
         return int(getattr(self._library, function)(*arguments))
 
     def call(self, function: str, *arguments: Any) -> None:
-        """Calls a function; an error has its name and CUDA's message."""
+        """Calls a function; an error message contains the function's name and CUDA's message."""
         status = self.status(function, *arguments)
         if status != 0:
             raise RuntimeError(f"{function}: {self.text(status)} (status {status})")
 
     def text(self, status: int) -> str:
-        """Returns a status as its name and CUDA's message."""
+        """Converts a status to text: the name of the status and CUDA's message."""
         said = []
         for function in ("cuGetErrorName", "cuGetErrorString"):
             text = c_char_p()
@@ -138,7 +138,7 @@ def names() -> list[str]:
 
 
 class Current:
-    """Makes a context the thread's current one within a `with` block."""
+    """A `with` block during which a context is the current context of the thread."""
 
     def __init__(self, driver: Driver, context: c_void_p) -> None:
         self._driver, self._context = driver, context
@@ -152,8 +152,8 @@ class Current:
 
 
 class Device:
-    """A device with its primary context, which other libraries of the process also use; it is held until the process
-    ends.
+    """A device with its primary context, which other libraries of the process also use. The context is held until the
+    process ends.
     """
 
     def __init__(self, ordinal: int) -> None:
@@ -177,7 +177,7 @@ class Device:
         return value.value
 
     def current(self) -> "Current":
-        """Returns a `with` block in which this device's context is the thread's current one."""
+        """Returns a `with` block during which this device's context is the current context of the thread."""
         return Current(self.driver, self._context)
 
     def owns(self, address: int) -> bool:
@@ -188,14 +188,14 @@ class Device:
         return status == 0 and found.value == self.ordinal
 
     def hold(self, until: "Event", things: list[Any]) -> None:
-        """Keeps objects alive until an event has happened, and drops the oldest ones whose event has happened."""
+        """Keeps objects alive until an event has happened, and drops the oldest objects if their event has happened."""
         dropped = []
         with self._lock:
             while self._held and self._held[0][0].has_happened():
                 dropped.append(self._held.popleft())
             if things:
                 self._held.append((until, things))
-        dropped.clear()  # outside the lock: destructors may run any code
+        dropped.clear()  # objects are dropped after the lock is released, since destructors may run any code
 
 
 def device(ordinal: int) -> Device:
@@ -207,7 +207,7 @@ def device(ordinal: int) -> Device:
 
 
 class Memory:
-    """Memory of a device; freed with this object, after all streams have finished their work on it."""
+    """Memory of a device. It is freed with this object, after all streams have finished their work on the memory."""
 
     def __init__(self, device: Device, size: int) -> None:
         self.device = device
@@ -224,7 +224,7 @@ class Memory:
 
 
 class Event:
-    """The moment at which all work is done that was in a stream when this event was created."""
+    """An event that happens when a stream has done all work that it contained at the creation of the event."""
 
     def __init__(self, device: Device, stream: int) -> None:
         self.device = device
@@ -234,7 +234,7 @@ class Event:
             driver.call("cuEventRecord", self._handle, stream)
 
     def has_happened(self) -> bool:
-        """Returns whether the work is done; an error of a kernel counts as done."""
+        """Returns whether the event has happened; if a kernel failed, it counts as happened."""
         with self.device.current() as driver:
             return driver.status("cuEventQuery", self._handle) != _NOT_READY
 
@@ -250,7 +250,7 @@ class Event:
 
 
 class Function:
-    """A loaded kernel; its module is unloaded with this object."""
+    """A loaded kernel; the module of the kernel is unloaded with this object."""
 
     def __init__(self, device: Device, symbol: str, image: bytes, partitions: int, *, always: bool) -> None:
         self.device, self.partitions = device, partitions
@@ -276,9 +276,11 @@ class Function:
         return value.value
 
     def launch(self, stream: int, n: int, addresses: Sequence[int]) -> None:
-        """Launches one thread per state, or one per partition of a state if all of these fit on the device at a time.
+        """Launches one thread per state; or several threads per state, one for each partition, if all these threads fit on
+        the device at the same time.
 
-        Blocks are smaller than the optimal size for many states if that size would leave multiprocessors idle.
+        For few states, blocks are smaller than the size that is optimal for many states, so that all multiprocessors
+        have work.
         """
         rows = self.partitions if n <= self._most_partitioned else 1
         portion = -(-rows * n // self.device.multiprocessors)
@@ -295,12 +297,12 @@ class Function:
     def __del__(self) -> None:
         if getattr(self, "_module", None):
             with self.device.current() as driver:
-                driver.status("cuCtxSynchronize")  # the kernel may be running
+                driver.status("cuCtxSynchronize")  # wait, since the kernel may be running
                 driver.status("cuModuleUnload", self._module)
 
 
 def _compilers() -> list[str]:
-    """Returns possible files of NVIDIA's run-time compiler, in the wheels of this Python and in the system."""
+    """Returns the paths where NVIDIA's run-time compiler may be, in the wheels of this Python and in the system."""
     import importlib.util
 
     files = []
@@ -328,14 +330,16 @@ class Compiler:
         self._known = list(known)
 
     def architecture(self, capability: tuple[int, int]) -> str:
-        """Returns the target of a compilation: this device, or the newest known one before it."""
+        """Returns the architecture for which to compile: this capability, or the newest one below it that the compiler
+        knows.
+        """
         wanted = 10 * capability[0] + capability[1]
         best = max((known for known in self._known if known <= wanted), default=wanted)
         return f"sm_{wanted}" if best == wanted else f"compute_{best}"
 
     def compile(self, name: str, text: str, architecture: str) -> bytes:
-        """Compiles to machine code for an architecture such as "sm_90", or, for one such as "compute_90", to PTX for
-        these devices and newer ones.
+        """Compiles a text. For an architecture such as "sm_90" the result is machine code; for an architecture such as
+        "compute_90" it is PTX, which also works on newer devices.
         """
         program = c_void_p()
         library = self._library

@@ -1,4 +1,6 @@
-"""Arrays in a GPU's memory: our own, and arrays that other libraries lend by DLPack or `__cuda_array_interface__`."""
+"""Arrays in a GPU's memory: arrays of `condyle.cuda`, and arrays that other libraries lend by DLPack or
+`__cuda_array_interface__`.
+"""
 
 import sys
 from collections.abc import Sequence
@@ -12,7 +14,7 @@ from . import _condyle
 from ._cuda_driver import Device, Event, Memory
 
 LEGACY = 1
-"""The legacy default stream, by its number in DLPack and in the driver."""
+"""The number of the legacy default stream, in DLPack and in the driver."""
 _FLOAT, _READ_ONLY = 2, 1
 _CUDA, _CUDA_MANAGED = 2, 13
 _VERSION = (1, 0)
@@ -21,9 +23,9 @@ _VERSION = (1, 0)
 class DeviceArray:
     """An array in a GPU's memory, as `condyle.cuda` creates it.
 
-    Other libraries take it without a copy, after pending work: `torch.from_dlpack(x)`, `cupy.from_dlpack(x)`,
-    `jax.numpy.from_dlpack(x)`, and libraries that know `__cuda_array_interface__`, such as Numba. `x.numpy()` copies it
-    to the host.
+    Other libraries take the array without a copy, after pending work: with `torch.from_dlpack(x)`,
+    `cupy.from_dlpack(x)`, `jax.numpy.from_dlpack(x)`, or by `__cuda_array_interface__`, as in Numba. `x.numpy()` copies
+    the array to the host.
     """
 
     def __init__(
@@ -40,7 +42,7 @@ class DeviceArray:
         self.strides: tuple[int, ...] = strides
         """The distance between numbers along each axis, counted in numbers."""
         self._written = written
-        """The stream that wrote last, and the event of that write; all views share it."""
+        """The stream that wrote last, and the event after this write, in a list that all views share."""
 
     @property
     def device(self) -> int:
@@ -69,7 +71,7 @@ class DeviceArray:
         """Returns a copy in the host's memory, after pending work."""
         host = np.empty(self.shape, self.dtype)
         order = sorted(range(self.ndim), key=lambda k: (-self.strides[k], k))
-        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # in memory order
+        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # with the axes in the order of the memory
         if dense.nbytes > 0:
             self._before(LEGACY)
             with self._memory.device.current() as driver:
@@ -79,7 +81,7 @@ class DeviceArray:
         return host
 
     def _before(self, stream: int) -> None:
-        """Makes a stream wait until the numbers are written."""
+        """Makes a stream wait until the numbers of this array are written."""
         for writer, event in self._written:
             if writer != stream:
                 event.before(stream)
@@ -95,7 +97,7 @@ class DeviceArray:
         dl_device: tuple[int, int] | None = None,
         copy: bool | None = None,
     ) -> Any:
-        """Returns a capsule for another library, which passes the stream on which it will use the numbers."""
+        """Returns a capsule for another library. This library passes the stream on which it will use the numbers."""
         if dl_device is not None and tuple(dl_device) != self.__dlpack_device__():
             raise BufferError(f"dl_device: expected {self.__dlpack_device__()}, found {tuple(dl_device)}")
         if copy:
@@ -112,7 +114,9 @@ class DeviceArray:
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
-        """The description that Numba and others read, with the stream after whose work the numbers are valid."""
+        """The description that Numba and other libraries read. It contains a stream; the numbers are valid after the
+        work of this stream.
+        """
         size = self.dtype.itemsize
         return {
             "shape": self.shape,
@@ -135,7 +139,7 @@ def row_order(shape: Sequence[int]) -> tuple[int, ...]:
 
 
 class View(NamedTuple):
-    """Location and layout of an array's numbers, valid as long as `owner` exists."""
+    """The address and the layout of an array's numbers. They are valid as long as `owner` exists."""
 
     owner: Any
     address: int
@@ -156,7 +160,7 @@ def view(name: str, array: Any, device: Device, stream: int) -> View:
         _on_device(name, device, int(kind), int(ordinal))
         try:
             capsule = array.__dlpack__(stream=stream, max_version=_VERSION)
-        except TypeError:  # libraries without versioned DLPack
+        except TypeError:  # this library has no versioned DLPack
             capsule = array.__dlpack__(stream=stream)
         address, (code, bits, lanes), shape, strides, _, flags = _condyle._borrowed(capsule)
         dtype = f"float{bits}" if (code, lanes) == (_FLOAT, 1) else f"type {code} of {lanes} x {bits} bits"
@@ -183,7 +187,9 @@ def _on_device(name: str, device: Device, kind: int, ordinal: int) -> None:
 
 
 def _interface(name: str, array: Any, device: Device, stream: int) -> View:
-    """Returns a view of an array by its `__cuda_array_interface__`, which does not name the device."""
+    """Returns a view of an array by its `__cuda_array_interface__`. That interface does not name the device, so it is
+    checked.
+    """
     said = array.__cuda_array_interface__
     address, is_read_only = said["data"]
     shape, dtype, their = tuple(said["shape"]), np.dtype(said["typestr"]), said.get("stream")
@@ -225,7 +231,7 @@ def stream_number(stream: Any) -> int:
 
 
 def importer(array: Any) -> Any:
-    """Returns `from_dlpack` of an array's library, or None if it does not exist."""
+    """Returns the function `from_dlpack` of an array's library, or None if the library has no such function."""
     if isinstance(array, DeviceArray):
         return None
     namespace = getattr(array, "__array_namespace__", None)

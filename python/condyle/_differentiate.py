@@ -1,4 +1,4 @@
-"""Derivatives of a function of the state, by hyper-dual numbers; the Rust version is `differentiate.rs`."""
+"""Derivatives of a function of the state, by hyper-dual numbers. `differentiate.rs` does the same in Rust."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +12,7 @@ Function = Callable[[NDArray[Any]], Any]
 
 
 def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
-    """Returns the numbers of a state, and the number of its directions."""
+    """Returns the numbers of a state, and the number of directions in which it can change."""
     numbers = np.asarray(x, dtype=np.float64)
     if numbers.ndim != 1 or len(numbers) < model.nq:
         raise ValueError(f"x: expected a vector of at least {model.nq} numbers, found shape {numbers.shape}")
@@ -26,8 +26,8 @@ def _moved(model: Model, x: NDArray[np.float64], delta: NDArray[Any]) -> NDArray
 
 
 def _directions(n: int, first: int | None, second: int | None) -> NDArray[Any]:
-    """Returns the change δ = 0 of n entries. Entry `first` has the first infinitesimal part, entry `second` the second
-    one.
+    """Returns the change δ = 0 of n entries as hyper-dual numbers. Entry `first` has the infinitesimal part ε₁, entry
+    `second` has ε₂.
     """
     return np.array([HyperDual(0.0, eps1=float(k == first), eps2=float(k == second)) for k in range(n)], dtype=object)
 
@@ -40,7 +40,8 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
     """Computes the value f(x) and the exact Jacobian ∂f(x ⊕ δ)/∂δ, as `(value, J)`: m numbers, and (m, nv + others).
 
     x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
-        f takes an array like x, of `HyperDual`s, and returns a vector; it is called once for every two directions.
+    f: a function of an array like x, of `HyperDual`s, that returns a vector. It is called once for every two
+        directions.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)

@@ -1,4 +1,6 @@
-"""The inertia of a body: from mass and centre, or of simple shapes; transformation and sums."""
+"""The class `Inertia`: inertias from numbers or for simple shapes, their transformation to other frames, and their
+sums.
+"""
 
 from typing import NamedTuple
 
@@ -22,8 +24,9 @@ def parallel_axes(mass: ArrayLike, com: _Array) -> _Array:
 class Inertia(NamedTuple):
     """The inertia of a body, in the axes of its frame.
 
-    I * v is the momentum of a body with velocity v, a `condyle.algebra.Motion`. X * I, where X is an `SE3`, is the
-    inertia in another frame. I + J is the inertia of two bodies as one, given in one frame.
+    For an inertia I, I * v is the momentum at velocity v, a `condyle.algebra.Motion`. X * I, where X is an `SE3`, is
+    the inertia in another frame. I + J is the inertia of two connected bodies; both inertias are given in the same
+    frame.
 
     >>> from condyle.algebra import SE3, Motion
     >>> rod = condyle.Inertia.from_cylinder(2.0, radius=0.05, length=1.0)
@@ -43,13 +46,13 @@ class Inertia(NamedTuple):
     """The rotational inertia about the centre of mass (kg m²), (3, 3), as in a URDF."""
     rotational: _Array
     """The rotational inertia about the origin of the body's frame (kg m²), (3, 3). Functions that take an inertia read
-    this one and ignore `about_com`.
+    `rotational` and ignore `about_com`.
     """
 
     @classmethod
     def from_com(cls, mass: float, com: ArrayLike, about_com: ArrayLike) -> "Inertia":
-        """Returns the inertia of a body with this mass (kg), centre of mass (m), and rotational inertia about it (kg
-        m²).
+        """Returns the inertia of a body with this mass (kg), centre of mass (m), and rotational inertia about the
+        centre of mass (kg m²).
 
         >>> condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3)).rotational[0, 0].item()
         0.6
@@ -90,8 +93,8 @@ class Inertia(NamedTuple):
         balls.
         """
         r, l = _lengths("radius", radius, 1), _lengths("length", length, 1)  # noqa: E741
-        ball = 4.0 * r / (4.0 * r + 3.0 * l)  # fraction of the mass in the ball: 4/3 π r³ of 4/3 π r³ + π r² l
-        # the centre of mass of a half ball is 3/8 r from the cylinder: 2/5 r² + l²/4 + 3/8 l r about the middle
+        ball = 4.0 * r / (4.0 * r + 3.0 * l)  # fraction of the mass in the half balls: 4/3 π r³ of 4/3 π r³ + π r² l
+        # a half ball's centre of mass is 3/8 r from the cylinder, so its inertia per mass is 2/5 r² + l²/4 + 3/8 l r
         across = ball * (0.4 * r * r + 0.25 * l * l + 0.375 * l * r) + (1.0 - ball) * (3.0 * r * r + l * l) / 12.0
         along = ball * 0.4 * r * r + (1.0 - ball) * 0.5 * r * r
         return _solid(mass, np.array([across, across, along]))
@@ -104,7 +107,7 @@ class Inertia(NamedTuple):
         return np.block([[self.mass * np.eye(3), -h], [h, self.rotational]])
 
     def __add__(self, other: object) -> "Inertia":
-        """Returns the inertia of two bodies as one."""
+        """Returns the inertia of two connected bodies, given in the same frame."""
         if not isinstance(other, Inertia):
             return NotImplemented
         mass, rotational = self.mass + other.mass, self.rotational + other.rotational
@@ -112,25 +115,25 @@ class Inertia(NamedTuple):
         return type(self)(mass, com, rotational - parallel_axes(mass, com), rotational)
 
 
-setattr(Inertia, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced
+setattr(Inertia, "__repr__", _repr)  # noqa: B010 - type checkers do not allow a method to be replaced
 Inertia.__module__ = "condyle"
 
 
 def _solid(mass: float, moments: _Array) -> Inertia:
-    """Returns the inertia about the centre of mass from its moments per kilogram."""
+    """Returns an inertia with the centre of mass at the origin, from its principal moments per kilogram."""
     if not (np.isfinite(mass) and mass >= 0.0):
         raise ValueError(f"mass: expected at least 0 kg, found {mass}")
     return Inertia.from_com(mass, np.zeros(3), np.diag(mass * moments))
 
 
 def _others(squares: _Array) -> _Array:
-    """Returns (b² + c², a² + c², a² + b²)."""
+    """Returns (b² + c², a² + c², a² + b²), given (a², b², c²)."""
     out: _Array = squares.sum() - squares
     return out
 
 
 def _lengths(name: str, given: ArrayLike, count: int) -> _Array:
-    """Reads one length or several."""
+    """Reads one or several lengths; they must be finite and not negative."""
     found = np.array(given, np.float64)
     shape = () if count == 1 else (count,)
     if found.shape != shape:

@@ -11,18 +11,19 @@ PACKAGES = ("example_robot_data", "robot_descriptions")
 
 
 def load(name: str, package: str | None = None, root_joint: str | None = None) -> Model:
-    """Returns the robot with this name, from example_robot_data or robot_descriptions, whichever is installed and has
-    it.
+    """Returns the robot with this name, from example_robot_data or robot_descriptions: from the first of these packages
+    that is installed and has the robot.
 
-    name: the package's name for it: 'talos', 'panda', 'anymal_c_mj', ….
+    name: the name of the robot in the package, such as 'talos', 'panda' or 'anymal_c_mj'.
     package: 'example_robot_data' or 'robot_descriptions'; None is the first package that has the robot.
-    root_joint: as for `Model.from_urdf`, for the URDFs of robot_descriptions; example_robot_data defines it itself.
+    root_joint: as for `Model.from_urdf`, for the URDFs of robot_descriptions; example_robot_data defines the root joint
+    itself.
 
-    A robot of example_robot_data is the one that the package's own `load` returns, with its root joint and armature. It
-    is converted from Pinocchio, on which the package depends. robot_descriptions downloads the files of a robot on
-    first use.
+    A robot of example_robot_data is the robot that the package's own `load` returns, including its root joint and
+    armature. It is converted from Pinocchio, on which the package depends. robot_descriptions downloads the files of a
+    robot on first use.
 
-    Raises ImportError if neither package is installed, ValueError if none has the robot.
+    Raises ImportError if neither package is installed, and ValueError if no package has the robot.
     """
     if package is not None and package not in PACKAGES:
         raise ValueError(f"package: expected None, {' or '.join(map(repr, PACKAGES))}, found {package!r}")

@@ -1,7 +1,7 @@
-"""Compiled MuJoCo models as plain MJCF: without elements that need MuJoCo's compiler or other files.
+"""Converts compiled MuJoCo models to plain MJCF, which has no elements that need MuJoCo's compiler or other files.
 
-`Model.from_mujoco` reads this text like any MJCF, so the rules for limits, springs, actuators and warnings are the
-same. Numbers keep all digits.
+`Model.from_mujoco` reads this text like every MJCF, so the rules for limits, springs, actuators and warnings are the
+same. Numbers are written with all digits.
 """
 
 import sys
@@ -19,12 +19,12 @@ JOINTS = ("free", "ball", "slide", "hinge")
 CAMERAS = ("fixed", "track", "trackcom", "targetbody", "targetbodycom")
 JOINT_WRAP, SITE_WRAP = 1, 3
 SITE_OBJECT = 6
-"""The value of sites in MuJoCo's enumeration of object types."""
+"""The value for sites in MuJoCo's enumeration of object types."""
 FLAGS = {
     "constraint": 1 << 0, "equality": 1 << 1, "frictionloss": 1 << 2, "limit": 1 << 3, "spring": 1 << 5,
     "damper": 1 << 6, "gravity": 1 << 7, "clampctrl": 1 << 8, "actuation": 1 << 11,
 }  # fmt: skip
-"""Features that can be disabled, with their bits in MuJoCo 4; other versions are asked for their own bits."""
+"""Features that a model can disable, with their bits in MuJoCo 4. In other versions, the bits are read from MuJoCo."""
 
 _Attributes = dict[str, Any]
 
@@ -44,7 +44,7 @@ def mjcf(model: Any) -> str:
 
 
 class _Text:
-    """Writes the parts of the text, and gives names to unnamed items."""
+    """Writes the elements of the text, and gives names to unnamed items."""
 
     def __init__(self, model: Any) -> None:
         self.m = model
@@ -55,7 +55,7 @@ class _Text:
         self.tendons = self._names("tendon", model.ntendon)
 
     def text(self) -> str:
-        """Returns the whole document, a line for each element."""
+        """Returns the whole document, with one line for each element."""
         m = self.m
         compiler = {"angle": "radian", "autolimits": False, "inertiafromgeom": False, "balanceinertia": False}
         option = {"gravity": m.opt.gravity, "density": m.opt.density, "viscosity": m.opt.viscosity, "wind": m.opt.wind}
@@ -103,7 +103,9 @@ class _Text:
         return [self._name(int(address)) for address in getattr(self.m, f"name_{kind}adr")[:count]] if count else []
 
     def _name_the_unnamed(self) -> None:
-        """Names bodies and joints as our MJCF reader does, so that they can be referred to."""
+        """Gives unnamed bodies and joints the names that Condyle's MJCF reader gives them, so that other elements can
+        refer to them.
+        """
         taken = {*self.bodies}, {*self.joints}
         for body in range(1, self.m.nbody):
             name = self.bodies[body] = self.bodies[body] or _free(f"body{body}", taken[0])
@@ -279,13 +281,13 @@ class _Text:
         for k, name in enumerate(names):
             q, v = self.m.key_qpos[k], self.m.key_qvel[k]
             numbers = {"qvel": v, "ctrl": self._controls(self.m.key_ctrl[k]), "act": self.m.key_act[k]}
-            # else room that a file has asked for
+            # an unnamed keyframe without changes is only space that the file has reserved
             if name or any(map(np.any, numbers.values())) or not np.array_equal(q, self.m.qpos0):
                 given = {what: x for what, x in numbers.items() if len(x)}
                 yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q} | given)
 
     def _controls(self, numbers: Any) -> list[float]:
-        """Returns the control of each actuator. Inputs are counted as in an MJCF that does not name them."""
+        """Returns the control of each actuator, in the order of an MJCF whose controls have no names."""
         m, found = self.m, []
         for a in range(len(m.actuator_trntype)):
             first, count = (
@@ -308,11 +310,13 @@ TRANSMISSIONS = {
     "body": (("body", "bodies"),),
     "so3": (("joint", "joints"),),
 }
-"""Per type of transmission: the attribute that names the driven item, and the list with the names of these items."""
+"""For each type of transmission, the attribute that names the driven item, and the name of the list of these items'
+names.
+"""
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """Returns the name, or a similar one that is free, and marks it as taken."""
+    """Returns the name, or a similar name if it is taken, and marks the result as taken."""
     while name in taken:
         name += "_"
     taken.add(name)
@@ -320,13 +324,13 @@ def _free(name: str, taken: set[str]) -> str:
 
 
 def _row(model: Any, field: str, number: int) -> Any:
-    """Returns a row of a field, 0 if the MuJoCo version lacks the field."""
+    """Returns a row of a field of the model, or 0 if this version of MuJoCo does not have the field."""
     numbers = getattr(model, field, None)
     return 0.0 if numbers is None else numbers[number]
 
 
 def _polynomial(first: Any, others: Any) -> list[float]:
-    """Returns a coefficient, and the higher ones if one of these is not 0."""
+    """Returns the first coefficient of a polynomial, followed by the higher coefficients if one of these is not 0."""
     higher = [float(x) for x in np.ravel(others)]
     return [float(first), *higher] if any(higher) else [float(first)]
 
@@ -336,7 +340,7 @@ def _range(name: str, limited: str, limits: Any, numbers: Any) -> _Attributes:
 
 
 def _element(tag: str, attributes: _Attributes, inside: Iterable[str] = ()) -> str:
-    """Returns an element, with its numbers in all digits."""
+    """Returns the text of an element, with all digits of its numbers."""
     words = [f" {name}={quoteattr(_value(value))}" for name, value in attributes.items()]
     content = "".join(inside)
     return f"<{tag}{''.join(words)}" + (f">{content}</{tag}>" if content else "/>")

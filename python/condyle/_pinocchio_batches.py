@@ -29,7 +29,7 @@ class ModelPool:
         return self._model
 
     def _of(self, threads: int) -> ours.Data:
-        """Returns scratch memory for this number of threads, kept for the next call."""
+        """Returns scratch memory for this number of threads, and keeps it for the next call."""
         if threads not in self._data:
             self._data[threads] = ours.Data(self._model.ours, threads=threads)
         return self._data[threads]
@@ -38,14 +38,14 @@ class ModelPool:
 def rneaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, a: ArrayLike, tau: _Array | None = None
 ) -> _Array | None:
-    """Computes τ of each column, (nv, N), into `tau` if it is given."""
+    """Computes inverse dynamics τ for the state in each column, (nv, N). If `tau` is given, writes the result to it."""
     return _columns(ours.rnea, num_thread, pool, (q, v, a), tau)
 
 
 def abaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, tau: ArrayLike, a: _Array | None = None
 ) -> _Array | None:
-    """Computes q̈ of each column, (nv, N), into `a` if it is given."""
+    """Computes forward dynamics q̈ for the state in each column, (nv, N). If `a` is given, writes the result to it."""
     return _columns(ours.aba, num_thread, pool, (q, v, tau), a)
 
 

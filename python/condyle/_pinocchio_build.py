@@ -1,4 +1,4 @@
-"""Models with Pinocchio's interface: from files, from other models, and built-in ones."""
+"""Functions that make models with Pinocchio's interface: from files, from other models, and sample models."""
 
 import os
 from collections.abc import Sequence
@@ -37,17 +37,18 @@ def buildSampleModelHumanoid() -> Model:
 
 
 def buildSampleModelHumanoidRandom() -> Model:
-    """Returns a humanoid like Pinocchio's random one, on a free-flyer; its numbers differ, since NumPy draws them."""
+    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. Its numbers differ, since NumPy draws them.
+    """
     return Model(samples.random_humanoid())
 
 
 def buildReducedModel(model: Model, joints: Sequence[int], q: ArrayLike) -> Model:
-    """Returns the robot with joints locked at their positions in q."""
+    """Returns the robot with some joints locked at their positions in q."""
     return Model(model.ours.lock([model.names[joint] for joint in joints], q))
 
 
 def appendModel(modelA: Model, modelB: Model, frameInModelA: int, aMb: algebra.SE3) -> Model:
-    """Returns both robots as one, with the second robot's world at aMb in a frame of the first."""
+    """Returns both robots as one. The pose of the second robot's world in a frame of the first robot is aMb."""
     frame = frameInModelA - 1 if frameInModelA else None
     return Model(modelA.ours.append(frame, modelB.ours, aMb.homogeneous))
 
@@ -55,7 +56,7 @@ def appendModel(modelA: Model, modelB: Model, frameInModelA: int, aMb: algebra.S
 def transformJointIntoMimic(
     model: Model, index_mimicked: int, index_mimicking: int, scaling: float, offset: float
 ) -> Model:
-    """Returns the robot with one more joint that follows another one."""
+    """Returns the robot in which one more joint follows another joint."""
     return Model(model.ours.with_mimic(index_mimicking, index_mimicked, scaling, offset))
 
 
@@ -65,5 +66,5 @@ def loadReferenceConfigurations(model: Model, filename: str | os.PathLike[str], 
 
 
 def loadReferenceConfigurationsFromXML(model: Model, xmlStream: str, verbose: bool = False) -> None:
-    """Adds the named positions of an SRDF's text to model.referenceConfigurations."""
+    """Adds the named positions in the text of an SRDF to model.referenceConfigurations."""
     model.referenceConfigurations |= model.ours.reference_configurations_str(xmlStream)

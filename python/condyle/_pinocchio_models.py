@@ -21,7 +21,7 @@ ALIGNED: dict[str, Callable[..., Joint]] = {
     "JointModelP": Joint.prismatic,
     "JointModelH": Joint.helical,
 }
-"""Pinocchio's names of joints about or along x, y or z, without that letter."""
+"""Pinocchio's names of joints about or along x, y or z, without the letter of the axis."""
 UNALIGNED: dict[str, Callable[..., Joint]] = {
     "JointModelRevoluteUnaligned": Joint.revolute,
     "JointModelPrismaticUnaligned": Joint.prismatic,
@@ -79,7 +79,7 @@ def from_pinocchio(theirs: Any) -> Model:
 
 
 def warn_of_armature(model: Model) -> None:
-    """Warns of armature that the two libraries apply along different axes."""
+    """Warns if the robot has armature that Condyle and Pinocchio apply along different axes."""
     for name, kind, at in zip(model.names, model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer" and model.armature[at : at + 3].any():
             text = f"joint `{name}`: its armature {model.armature[at]} is along the axes of its parent in Condyle"
@@ -87,7 +87,7 @@ def warn_of_armature(model: Model) -> None:
 
 
 def warn_of_additions(model: Model) -> None:
-    """Warns of parts that a model of Pinocchio does not have."""
+    """Warns of the contents of a model that a `pinocchio.Model` cannot represent."""
     left_out = {
         "springs of joints": [spring.joint for spring in model.springs],
         "damping that depends on the speed of joints": [
@@ -108,12 +108,13 @@ def warn_of_additions(model: Model) -> None:
 
 
 TURNS = {"free_flyer": 3, "planar": 2}
-"""Index in a joint's position at which its rotation begins, if not 0."""
+"""For kinds of joints whose rotation does not begin at index 0 of the joint's position, the index at which it begins.
+"""
 
 
 def _check_order(theirs: Any) -> None:
-    """Checks that joints are numbered depth first: the parent of each joint is on the path from the root to the joint
-    before.
+    """Checks that joints are numbered depth first: the parent of each joint must be on the path from the root to the
+    joint with the previous number.
     """
     way = [0]
     for i in range(1, theirs.njoints):
@@ -129,7 +130,9 @@ def _check_order(theirs: Any) -> None:
 
 
 def _parts(joint: Any, name: str) -> list[_Part]:
-    """Returns the joints that make up a joint of Pinocchio, each with its placement in the frame of the one before."""
+    """Returns the joints that together equal one joint of Pinocchio, each with its placement in the frame of the joint
+    before.
+    """
     kind, here = joint.shortname(), np.eye(4)
     if kind in FREE:
         return [(FREE[kind](), here)]
@@ -157,14 +160,16 @@ def _parts(joint: Any, name: str) -> list[_Part]:
 
 
 def _motion(joint: Any) -> NDArray[np.float64]:
-    """Returns S, the motion at unit velocity of a joint with one degree of freedom, which is constant."""
+    """Returns S, the constant motion at unit velocity of a joint with one degree of freedom."""
     data = joint.createData()
     joint.calc(data, np.eye(max(joint.idx_q + 2, 2))[joint.idx_q])
     return np.array(data.S, float).ravel()
 
 
 def _follower(S: NDArray[np.float64], name: str) -> Joint:
-    """Returns a mimic joint that moves along S. Its axis has the length of S, which is the square of the ratio."""
+    """Returns the kind of a mimic joint that moves along S. The axis of the joint has the length of S, which is the
+    square of the ratio.
+    """
     linear, angular = S[:3], S[3:]
     if not S.any():
         raise ModelError(f"joint `{name}`: follows another one with the ratio 0")
@@ -185,7 +190,7 @@ def _limits(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
-    """Returns damping and friction; a joint has a single value of each here."""
+    """Returns damping and friction of a joint. In Condyle, each is a single value for the whole joint."""
     out = {}
     for what, numbers in ("damping", theirs.damping), ("friction", theirs.upperDryFrictionLimit):
         own = np.array(numbers[joint.idx_v : joint.idx_v + joint.nv])
@@ -196,13 +201,13 @@ def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
 
 
 def _check_lossless(theirs: Any, joint: Any, name: str) -> None:
-    """Checks that a joint that becomes a chain has neither damping nor friction."""
+    """Checks that a joint has neither damping nor friction, because it is converted to a chain of joints."""
     if any(_losses(theirs, joint, name).values()):
         raise ModelError(f"joint `{name}`: damping and friction of a {joint.shortname()} have no place here")
 
 
 def _is_link(frame: Any) -> bool:
-    """Returns whether a frame is the frame of a joint's body itself."""
+    """Returns whether a frame is the link frame that coincides with the frame of a joint."""
     return str(frame.type) == "BODY" and np.array_equal(frame.placement.homogeneous, np.eye(4))
 
 
@@ -225,7 +230,7 @@ def to_pinocchio(ours: Model) -> Any:
             theirs.addJoint(
                 ours.parents[i], _their_joint(pin, ours.joints[i], ours.joint_types[i]), place, ours.names[i]
             )
-        inertia, own = pin.Inertia.Zero(), ours.inertias[i]  # the constructor refuses inertias that occur in files
+        inertia, own = pin.Inertia.Zero(), ours.inertias[i]  # the constructor refuses some inertias of files
         inertia.mass, inertia.lever, inertia.inertia = own.mass, own.com, own.about_com
         theirs.inertias[i] = inertia
     for i, mimic in enumerate(ours.mimics):
@@ -255,7 +260,7 @@ def to_pinocchio(ours: Model) -> Any:
 
 
 def _their_joint(pin: Any, joint: Joint | None, kind: str) -> Any:
-    """Returns Pinocchio's joint of this kind, of the class for x, y or z if it has that axis."""
+    """Returns Pinocchio's joint of this kind. For the axes x, y and z, it has the class for that axis."""
     assert joint is not None
     free = {"spherical": "Spherical", "planar": "Planar", "translation": "Translation", "free_flyer": "FreeFlyer"}
     if kind in free:
@@ -273,7 +278,9 @@ def _their_joint(pin: Any, joint: Joint | None, kind: str) -> Any:
 
 
 def _unbounded(pin: Any, axis: NDArray[np.float64]) -> Any:
-    """Returns a joint that turns without limits about any axis; in Python only Pinocchio's URDF reader makes one."""
+    """Returns a joint that turns without limits about an axis. In Python, only Pinocchio's URDF reader can make such a
+    joint.
+    """
     xyz = " ".join(repr(float(x)) for x in axis)
     inertia = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
     ends = f'<parent link="a"/><child link="b"/><axis xyz="{xyz}"/>'

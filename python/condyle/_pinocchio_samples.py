@@ -1,4 +1,5 @@
-"""The sample robots of Pinocchio: an arm with six joints, a humanoid with such limbs, and a random humanoid."""
+"""The sample robots of Pinocchio: an arm with six joints, a humanoid whose limbs are such arms, and a random humanoid.
+"""
 
 import numpy as np
 
@@ -30,7 +31,9 @@ def _link(
     inertia: Inertia,
     limits: tuple[float, float, float, float] | None = (-3.14, 3.14, 10.0, 10.0),
 ) -> BodyId:
-    """Adds a body on a joint, with frames for both; limits: minimum and maximum position, velocity, and effort."""
+    """Adds a body on a joint, and a frame for the joint and for the body. limits: minimum and maximum position,
+    velocity, and effort.
+    """
     least, most, velocity, effort = limits or (None,) * 4
     position = None if least is None or most is None else (least, most)
     names = f"{name}_body", f"{name}_joint"

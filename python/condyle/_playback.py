@@ -20,7 +20,9 @@ GREY, ORANGE = (158, 170, 186), (235, 120, 20)
 
 
 class Player:
-    """A motion shown in the browser: `show` a knot, `play`, `pause`, `close`; in a notebook it displays itself."""
+    """A motion shown in the browser, with the methods `show`, `play`, `pause` and `close`. In a notebook, the object
+    displays the motion in the page.
+    """
 
     def __init__(
         self, model: Model, q: _Array, dt: float, shapes: list[Shape], arrows: list[_Array], server: Any
@@ -62,7 +64,7 @@ class Player:
         return f"http://localhost:{self.server.get_port()}"
 
     def show(self, knot: int) -> None:
-        """Shows a knot; indices beyond the last knot show the last one."""
+        """Shows a knot; for an index beyond the last knot, shows the last knot."""
         with self._moving:
             self.knot = min(max(knot, 0), len(self._poses) - 1)
             with self.server.atomic():
@@ -77,12 +79,12 @@ class Player:
             self.slider.value = self.knot * self.dt
 
     def play(self) -> None:
-        """Plays from the current knot, in a loop, until `pause`."""
+        """Plays the motion from the current knot, in a loop, until `pause` is called."""
         self.button.label = "pause"
         self._playing.set()
 
     def pause(self) -> None:
-        """Stops at the current knot."""
+        """Stops the motion at the current knot."""
         self.button.label = "play"
         self._playing.clear()
 
@@ -135,11 +137,11 @@ def play(
 
     q: positions, (N, nq), such as `solution.xs[:, :model.nq]`; they are shown without checks.
     dt: the time from one knot to the next (s).
-    forces: contact forces of each knot, by name of a frame; the first three numbers are drawn as an arrow at the frame,
-        in the world's axes. `solution.forces` has this form if contacts have the names of their frames and their rows
-        are 'local_world_aligned'.
-    urdf: the file with the robot's shapes and meshes; `packages` are folders for `package://`. Without it, and for
-        missing meshes, bodies are capsules from joint to joint.
+    forces: contact forces of each knot, by the name of a frame. The first three numbers of a force, along the world's
+        axes, are drawn as an arrow at the frame. `solution.forces` has this form if contacts have the names of their
+        frames and the reference 'local_world_aligned'.
+    urdf: the file with the robot's shapes and meshes; `packages` are folders for `package://`. Without a URDF, and for
+        missing meshes, bodies are shown as capsules from joint to joint.
     port: the page's port; if it is in use, the next free port is taken.
 
     Raises ImportError without viser (pip install condyle[viz]).
@@ -159,7 +161,7 @@ def play(
 
 
 def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Array]:
-    """Returns the end points of each knot's arrows, (n, 2, 3)."""
+    """Returns the arrows of each knot as pairs of end points, (n, 2, 3)."""
     data, out = Data(model), []
     for position, knot in zip(q, forces, strict=False):
         poses, ends = forward_kinematics(model, data, position), []
@@ -175,7 +177,7 @@ def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Arr
 
 
 def _some(points: _Array) -> NDArray[np.float32]:
-    """Returns points that can be drawn even if there are no arrows."""
+    """Returns the points of arrows, or an invisible arrow if there are no arrows, since viser needs at least one."""
     return (points if len(points) else np.zeros((1, 2, 3))).astype(np.float32)
 
 

@@ -11,7 +11,7 @@ _HEAD = "iter         cost         gap        stop        step  regularisation"
 
 
 class Reporter:
-    """A callback of a solver that prints its iterations, or shows them with tqdm."""
+    """A callback for a solver, which prints the iterations or shows them with tqdm."""
 
     def __init__(self, callback: Callable[[Iteration], object] | None, verbose: bool, progress: bool) -> None:
         self._callback, self._lines = callback, verbose
@@ -51,8 +51,8 @@ def _bar(**options: Any) -> Any:
 
 
 def counter(progress: bool | Callable[[int, int], object], total: int, done: int) -> Callable[[int | None], None]:
-    """Returns a function to be called with the number of newly finished variations, and with None at the end. It shows
-    the progress as `progress` requests.
+    """Returns a function that shows the progress of a sweep, as the argument `progress` requests. Call it with the
+    number of newly finished variations, and with None at the end.
     """
     bar = _bar(desc="sweep", unit=" variations", total=total, initial=done) if progress is True else None
 

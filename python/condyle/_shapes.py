@@ -1,4 +1,4 @@
-"""Shapes of a robot's bodies: from its URDF, or capsules from joint to joint."""
+"""Shapes of a robot's bodies: shapes of the robot's URDF, or capsules from joint to joint."""
 
 import os
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ _Array = NDArray[np.float64]
 
 
 class Shape(NamedTuple):
-    """A shape on a body: a mesh of trimesh, or triangles."""
+    """A shape on a body: a mesh of the package trimesh, or triangles."""
 
     body: int
     placement: _Array
@@ -27,7 +27,9 @@ class Shape(NamedTuple):
 
 
 def capsules(model: Model, only: set[int] | None = None) -> list[Shape]:
-    """Returns capsules from the origin of each body to each joint and link on it, for all bodies or those in `only`."""
+    """Returns capsules from the origin of a body to each joint and link frame on this body, for all bodies or the
+    bodies in `only`.
+    """
     ends: list[list[_Array]] = [[] for _ in range(model.nbodies)]
     for body in range(1, model.nbodies):
         ends[model.parents[body]].append(model.joint_placements[body][:3, 3])
@@ -49,7 +51,7 @@ def capsules(model: Model, only: set[int] | None = None) -> list[Shape]:
 
 
 def capsule(radius: float, length: float, sides: int = 16, rings: int = 4) -> tuple[_Array, NDArray[np.int64]]:
-    """Returns the triangles of a cylinder along z, from 0 to its length, with half a ball on each end."""
+    """Returns the triangles of a cylinder along z, from z = 0 to z = `length`, with half a ball on each end."""
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, 2 * rings + 2)
     profile = np.stack([radius * np.cos(angles), radius * np.sin(angles)], -1)
     profile[rings + 1 :, 1] += length
@@ -68,7 +70,7 @@ def _turned(profile: _Array, sides: int) -> tuple[_Array, NDArray[np.int64]]:
 
 
 def _along(end: _Array) -> _Array:
-    """Returns a pose whose z axis points to `end`."""
+    """Returns a pose at the origin whose z axis points to `end`."""
     X, length = np.eye(4), np.linalg.norm(end)
     if length > 0.0:
         z = end / length
@@ -80,7 +82,7 @@ def _along(end: _Array) -> _Array:
 
 
 def visuals(model: Model, urdf: str | os.PathLike[str], packages: Sequence[str | os.PathLike[str]]) -> list[Shape]:
-    """Returns the shapes of a URDF's `<visual>`s; for bodies without a readable shape, capsules."""
+    """Returns the shapes of a URDF's `<visual>`s, and capsules for bodies without a readable shape."""
     path = Path(urdf)
     root = import_module("xml.etree.ElementTree").parse(path).getroot()
     links = {frame.name: frame for frame in model.frames if frame.kind == "link"}
@@ -133,8 +135,8 @@ def _box(half: _Array) -> tuple[_Array, NDArray[np.int64]]:
 
 
 def mesh_path(name: str, urdf: Path, packages: Sequence[Path]) -> Path | None:
-    """Returns the file of a mesh, by its path. For `package://`, searches the given folders, the folders around the
-    URDF, and ROS's.
+    """Returns the file of a mesh, given by its path. A path with `package://` is searched in the given folders, in the
+    folders above the URDF, and in the folders of ROS's packages.
     """
     if not name.startswith("package://"):
         file = urdf.parent / name.removeprefix("file://")
@@ -160,7 +162,9 @@ def _origin(origin: Any) -> _Array:
 
 
 def _color(visual: Any, root: Any) -> tuple[int, int, int] | None:
-    """Returns the colour of a `<visual>`: its own, or the colour of a material of the robot that it names."""
+    """Returns the colour of a `<visual>`: the colour that it contains, or the colour of the robot's material that it
+    names.
+    """
     material = visual.find("material")
     if material is None:
         return None

@@ -24,7 +24,7 @@ class ReferenceFrame(Enum):
 
 
 class Motion(algebra.Motion):
-    """A `condyle.algebra.Motion` with Pinocchio's names; can also be made from six numbers."""
+    """A `condyle.algebra.Motion` with Pinocchio's names. It can also be made from six numbers."""
 
     __slots__ = ()
 
@@ -39,7 +39,7 @@ class Motion(algebra.Motion):
 
 
 class Force(algebra.Force):
-    """A `condyle.algebra.Force` with Pinocchio's names; can also be made from six numbers."""
+    """A `condyle.algebra.Force` with Pinocchio's names. It can also be made from six numbers."""
 
     __slots__ = ()
 
@@ -54,7 +54,7 @@ class Force(algebra.Force):
 
 
 class SE3(algebra.SE3):
-    """A `condyle.algebra.SE3` with Pinocchio's names; can also be made from a matrix (4, 4)."""
+    """A `condyle.algebra.SE3` with Pinocchio's names. It can also be made from a matrix (4, 4)."""
 
     __slots__ = ()
 
@@ -68,7 +68,7 @@ class SE3(algebra.SE3):
         return cls(np.eye(4))
 
     def actInv(self, x: Any) -> Any:
-        """Converts coordinates in frame a to coordinates in frame b."""
+        """Converts coordinates in frame a to coordinates in frame b, where this object is the pose aXb."""
         return self.act_inv(x)
 
     @property
@@ -78,7 +78,7 @@ class SE3(algebra.SE3):
 
 
 class Frame(NamedTuple):
-    """A frame: its name, the joint that moves it, and its pose in that joint's body."""
+    """A frame: its name, the joint that moves it, and its pose in the body that this joint carries."""
 
     name: str
     parentJoint: int  # noqa: N815
@@ -117,7 +117,7 @@ class JointModelFreeFlyer:
 
 
 class Model(ours._SpelledModel):
-    """A `condyle.Model`, available as `ours`, with Pinocchio's names."""
+    """A model with Pinocchio's names; the `condyle.Model` is available as `ours`."""
 
     def __init__(self, model: ours.Model) -> None:
         limits = model.limits
@@ -134,7 +134,7 @@ class Model(ours._SpelledModel):
         self.referenceConfigurations: dict[str, _Array] = {}
         self._frame_ids = {frame.name: k for k, frame in reversed(list(enumerate(self.frames)))}
         self._moving_mass = sum(inertia.mass for inertia in model.inertias[1:])
-        self._lengths = np.zeros(self.nq, bool)  # coordinates that do not belong to a rotation
+        self._lengths = np.zeros(self.nq, bool)  # whether each coordinate of q does not belong to a rotation
         turns = {"free_flyer": 4, "spherical": 4, "continuous": 2, "planar": 2}
         for kind, at, n in zip(model.joint_types, model.idx_qs, model.nqs, strict=True):
             self._lengths[at : at + n - turns.get(kind, 0)] = n > 0
@@ -143,11 +143,11 @@ class Model(ours._SpelledModel):
         return type(self), (self.ours,), self.__dict__
 
     def createData(self) -> "Data":
-        """Creates scratch memory, which also stores results."""
+        """Creates a `Data`: scratch memory, which also stores results."""
         return Data(self)
 
     def getFrameId(self, name: str) -> int:
-        """Returns the frame's index, or the number of frames if it does not exist."""
+        """Returns the index of a frame, or the number of frames if the frame does not exist."""
         return self._frame_ids.get(name, self.nframes)
 
     def existFrame(self, name: str) -> bool:
@@ -155,7 +155,7 @@ class Model(ours._SpelledModel):
         return self.getFrameId(name) < self.nframes
 
     def getJointId(self, name: str) -> int:
-        """Returns the joint's index, or the number of joints if it does not exist."""
+        """Returns the index of a joint, or the number of joints if the joint does not exist."""
         return self.names.index(name) if name in self.names else self.njoints
 
     def existJointName(self, name: str) -> bool:
@@ -164,7 +164,9 @@ class Model(ours._SpelledModel):
 
 
 class Data(ours._SpelledData):
-    """Stores results: oMi, oMf, v, a, tau, ddq, M, com, hg, …; each exists once a function has computed it."""
+    """Stores the results of functions, such as oMi, oMf, v, a, tau, ddq, M, com and hg. A result exists after a
+    function has computed it.
+    """
 
     vcom: list[_Array]
     acom: list[_Array]
@@ -206,7 +208,7 @@ class Data(ours._SpelledData):
 
     @property
     def v(self) -> Sequence[Motion]:
-        """The velocities of the joints' bodies, in their frames, at the last forwardKinematics with v."""
+        """The velocities of the joints' bodies, each in the frame of the body, at the last forwardKinematics with v."""
         if self._given < 2:
             raise AttributeError
         (q, v, _), model, data = self._state, self._model.ours, self._ours
@@ -214,7 +216,9 @@ class Data(ours._SpelledData):
 
     @property
     def a(self) -> Sequence[Motion]:
-        """The spatial accelerations of the joints' bodies, in their frames, at the last forwardKinematics with a."""
+        """The spatial accelerations of the joints' bodies, each in the frame of the body, at the last forwardKinematics
+        with a.
+        """
         if self._given < 3:
             raise AttributeError
         state, model, data = self._state, self._model.ours, self._ours
@@ -238,12 +242,12 @@ def log6(X: algebra.SE3 | ArrayLike) -> Motion:
 
 
 def Jlog3(R: ArrayLike) -> _Array:
-    """Computes ∂ log3(R exp δ)/∂δ."""
+    """Computes the Jacobian ∂ log3(R exp δ)/∂δ at δ = 0."""
     return algebra.Jlog3(log3(R))
 
 
 utils = SimpleNamespace(zero=np.zeros, eye=np.eye, rand=np.random.random)
-"""A part of `pinocchio.utils`."""
+"""Some functions of `pinocchio.utils`."""
 
 log = log6
 exp3, log3, skew = algebra.exp3, algebra.log3, algebra.skew

@@ -1,4 +1,4 @@
-"""Solves of many variations of a problem: in this process, or on the machines of a Ray cluster."""
+"""Solves many variations of a problem: in this process, or on the machines of a Ray cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -24,7 +24,7 @@ class Variations(NamedTuple):
     """
 
     status: NDArray[np.str_]
-    """The final status of each solve, as the status of a `Solution`; "error" if there is an `error`."""
+    """The final status of each solve, as in `Solution.status`; "error" if the variation failed with an `error`."""
     cost: _Array
     """The cost of each trajectory."""
     gap: _Array
@@ -38,15 +38,16 @@ class Variations(NamedTuple):
     xs: _Array | None
     """States, (V, N + 1, nx)."""
     us: _Array | None
-    """Controls, (V, N, nu); if knots differ in nu, the controls of all knots one after the other, (V, Σ nu)."""
+    """Controls, (V, N, nu). If knots differ in nu, the controls of all knots follow one another, (V, Σ nu)."""
     K: _Array | None
-    """Feedback gains, (V, N, nu, ndx), or (V, Σ nu · ndx); None unless `keep` names them."""
+    """Feedback gains, (V, N, nu, ndx), or (V, Σ nu · ndx) if knots differ in nu; None unless `keep` contains "K"."""
     k: _Array | None
-    """Feed-forward, as `us`; None unless `keep` names it."""
+    """Feed-forward, with the shape of `us`; None unless `keep` contains "k"."""
 
     @staticmethod
     def load(folder: "str | PathLike[str]") -> "Variations":
-        """Returns the results that a `sweep` has written to a folder: all, or the results of the finished chunks.
+        """Returns the results that a `sweep` has written to a folder. If the sweep has not ended, these are the results
+        of the finished chunks.
 
         Raises ValueError if the folder does not contain a sweep, or no chunk is finished.
         """
@@ -59,7 +60,7 @@ class Variations(NamedTuple):
 
 
 class Job(NamedTuple):
-    """The data that all variations share, sent to each worker once."""
+    """The data that all variations share; they are sent to each worker once."""
 
     problem: Problem
     start: tuple[Any, Any]
@@ -84,27 +85,30 @@ def sweep(
     workers: int | None = None,
     progress: bool | Callable[[int, int], object] = False,
 ) -> Variations:
-    """Solves variations of a problem: a library of motions, a sweep of parameters, Monte Carlo of a plan.
+    """Solves variations of a problem, for example for a library of motions, a sweep of parameters, or Monte Carlo
+    trials of a plan.
 
     problem: the nominal problem.
-    variations: initial states, (V, nx); or with `vary` a sequence of anything.
-    vary: a function of the problem and a variation. It returns the problem to solve, such as one of a heavier robot. Or
-        it changes the given problem and returns None; then it must set the same things for each variation, since the
-        next one gets the same problem. None sets the initial state.
+    variations: V initial states, (V, nx); or, with `vary`, a sequence of V objects of any type.
+    vary: a function of the problem and a variation. Either it returns the problem to solve, such as a problem with a
+        heavier robot; or it changes the given problem and returns None. In the second case, it must set the same values
+        for each variation, since the next variation gets the same problem. Without `vary`, the variation is the initial
+        state.
     start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
-        and starts from its solution. The first state is replaced by the variation's initial state.
+        and starts from the solution of this problem. The first state is replaced by the variation's initial state.
     solver: `Fddp` or `AugmentedLagrangian`, which is made for each problem with the `settings`.
-    keep: the parts of each solution to keep: "xs", "us", "K", "k".
-    folder: the folder to which results are written, chunk by chunk, as NPZ files. An interrupted sweep continues from
-        there when it is called again with the same arguments; `Variations.load` reads it. None writes nothing.
+    keep: the arrays of each solution to keep: "xs", "us", "K", "k".
+    folder: the folder to which results are written, chunk by chunk, as NPZ files. An interrupted sweep continues with
+        the unfinished chunks when it is called again with the same arguments; `Variations.load` reads the folder. None
+        writes nothing.
     chunk: the number of variations that are sent and written together.
     cluster: None solves in this process; True uses the processors of this machine, or of the cluster to which `ray` is
         connected; else the address of a Ray cluster (`pip install condyle[ray]`). Problem and start are sent once to
         each worker. Workers compute at this process's SIMD level (`condyle.LEVEL`), so results are bit-identical. If a
         worker is lost, another one repeats its chunk.
     workers: the number of workers on the cluster; None is one for each processor.
-    progress: whether to show the progress (with tqdm if it is installed); or a function of the number of finished
-        variations and the total number.
+    progress: whether to show the progress (with tqdm if it is installed); or a function that is called with the number
+        of finished variations and the total number.
 
     Returns `Variations`. The error of a variation is stored in its row, and does not end the sweep.
 
@@ -153,7 +157,7 @@ def sweep(
 def _solved(
     job: Job, missing: list[tuple[int, int, Any]], cluster: bool | str | None, workers: int | None
 ) -> Iterator[tuple[int, _Rows]]:
-    """Yields finished chunks: their indices and rows."""
+    """Yields the index and the rows of each finished chunk."""
     if cluster:
         from ._sweep_ray import on_cluster
 
@@ -165,14 +169,14 @@ def _solved(
 
 
 class Worker:
-    """Solves chunks, with one solver for all of them if the problem stays the same."""
+    """Solves chunks, with a single solver as long as the problem is the same."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self._same = None if job.vary else job.solver(job.problem, **job.settings)
 
     def solve(self, first: int, items: Any) -> _Rows:
-        """Returns the rows of the variations `items`; `first` is the index of the first one."""
+        """Returns the rows of the results for the variations `items`; `first` is the index of the first variation."""
         found: list[Solution | str] = []
         for number, item in enumerate(items, first):
             try:
@@ -222,12 +226,12 @@ def _start(
 
 
 def _flat(x: Any) -> _Array:
-    """Returns the numbers of all knots: as an array, or joined knot by knot if knots differ in size."""
+    """Returns the numbers of all knots as one array; if knots differ in size, their numbers are joined knot by knot."""
     return np.concatenate([np.ravel(part) for part in x]) if isinstance(x, list) else np.asarray(x, float)
 
 
 def _shapes(job: Job) -> dict[str, tuple[int, ...]]:
-    """Returns the shapes of the kept parts of a solution, from the start and the problem."""
+    """Returns the shapes of the arrays of a solution that are kept, computed from the start and the problem."""
     us = _flat(job.start[1])
     n, ndx = job.problem.horizon, job.problem.ndx
     wide = us.ndim == 2
@@ -240,7 +244,7 @@ def _shapes(job: Job) -> dict[str, tuple[int, ...]]:
 
 
 def _rows(found: list[Solution | str], job: Job) -> _Rows:
-    """Returns the table of some variations."""
+    """Converts the solutions, or error messages, of variations to the columns of `Variations`."""
     shapes = _shapes(job)
     solved = [None if isinstance(one, str) else one for one in found]
     rows: _Rows = {

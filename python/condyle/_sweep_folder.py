@@ -19,7 +19,7 @@ _HEAD = "sweep.json"
 
 
 class Folder:
-    """A folder with a head file, which identifies the sweep, and a file for each finished chunk."""
+    """A folder with one file that identifies the sweep, and a file for each finished chunk."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -35,7 +35,7 @@ class Folder:
     def create(
         cls, path: "str | os.PathLike[str]", job: "Job", items: Any, chunk: int, more: dict[str, str]
     ) -> "Folder":
-        """Creates the folder of a sweep, or opens one that contains a part of the same sweep."""
+        """Creates the folder of a sweep, or opens a folder that contains finished chunks of the same sweep."""
         path = Path(path)
         head: dict[str, Any] = {"variations": len(items), "chunk": chunk, "keep": list(job.keep), **more}
         head["solver"] = job.solver.__name__

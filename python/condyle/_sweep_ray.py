@@ -9,13 +9,15 @@ from ._condyle import LEVEL
 from ._sweep import Job, Worker
 
 _LOSSES = 3
-"""Maximum number of lost workers per chunk; after that the chunk is taken as the cause."""
+"""Maximum number of lost workers per chunk. If more are lost, the chunk is taken as the cause, and the sweep ends with
+an error.
+"""
 
 
 def on_cluster(
     job: Job, missing: list[tuple[int, int, Any]], address: str | None, workers: int | None
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Yields finished chunks: their indices and rows."""
+    """Yields the index and the rows of each finished chunk."""
     try:
         ray: Any = import_module("ray")
     except ImportError:
@@ -35,8 +37,8 @@ def on_cluster(
 def _shared(
     ray: Any, job: Job, missing: list[tuple[int, int, Any]], count: int
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Gives each worker one chunk at a time; a lost worker's chunk goes to a new worker."""
-    environment = {"env_vars": {"CONDYLE_LEVEL": LEVEL}}  # for results bit-identical to this process
+    """Gives each worker one chunk at a time; if a worker is lost, a new worker gets its chunk."""
+    environment = {"env_vars": {"CONDYLE_LEVEL": LEVEL}}  # so that results are bit-identical to results of this process
     remote = ray.remote(num_cpus=1, max_restarts=0, runtime_env=environment)(Worker)
     shared = ray.put(job)
     chunks = {number: (first, items) for number, first, items in missing}
@@ -47,7 +49,7 @@ def _shared(
         while waiting and free:
             worker, number = free.pop(), waiting.popleft()
             busy[worker.solve.remote(*chunks[number])] = worker, number
-        ready, _ = ray.wait(list(busy), timeout=0.1)  # short, so that signals are checked in between
+        ready, _ = ray.wait(list(busy), timeout=0.1)  # a short timeout, so that signals are checked often
         for reference in ready:
             worker, number = busy.pop(reference)
             try:

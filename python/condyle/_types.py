@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 else:
 
     def disjoint_base(cls: type) -> type:
-        """Tells type checkers that a class has instance storage of its own, besides its base's."""
+        """Marks a class for type checkers as a disjoint base, so that other disjoint bases cannot be combined with it.
+        """
         return cls
 
 
@@ -19,18 +20,18 @@ _Array: TypeAlias = NDArray[np.float64]
 
 
 class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
-    """Numbers of a model, which are read-only since a model never changes. The error on a write names the method that
-    makes a changed model.
+    """Numbers of a model, which are read-only since a model never changes. An attempt to write raises an error that
+    names the method for making a changed model.
 
-    Results of arithmetic, and copies, are plain arrays.
+    Results of arithmetic and copies are plain NumPy arrays, which can be changed.
     """
 
     _instead: str
 
     @classmethod
     def of(cls, numbers: _Array, instead: str) -> "ReadOnly":
-        """Returns these numbers as a read-only array; `instead` is the method of `Model` that makes a model with other
-        numbers, if there is one.
+        """Returns these numbers as a read-only array. `instead` is the method of `Model` that makes a model with other
+        numbers, if such a method exists.
         """
         array = numbers.view(cls)
         array._instead = instead
@@ -97,43 +98,45 @@ class RneaHessian(NamedTuple):
     """The Hessian of λᵀ rnea(q, v, a), each block (nv, nv)."""
 
     dqdq: _Array
-    """The block for q and q, symmetric."""
+    """The block for the pair (q, q), symmetric."""
     dvdq: _Array
-    """The block for v and q: entry [j, k] is for v_j and q_k."""
+    """The block for v and q: entry [j, k] is the derivative with respect to v_j and q_k."""
     dvdv: _Array
-    """The block for v and v, symmetric."""
+    """The block for the pair (v, v), symmetric."""
     dadq: _Array
-    """The block for a and q: entry [j, k] is for a_j and q_k."""
+    """The block for a and q: entry [j, k] is the derivative with respect to a_j and q_k."""
 
 
 class AbaHessian(NamedTuple):
     """The Hessian of λᵀ aba(q, v, τ), each block (nv, nv)."""
 
     dqdq: _Array
-    """The block for q and q, symmetric."""
+    """The block for the pair (q, q), symmetric."""
     dvdq: _Array
-    """The block for v and q: entry [j, k] is for v_j and q_k."""
+    """The block for v and q: entry [j, k] is the derivative with respect to v_j and q_k."""
     dvdv: _Array
-    """The block for v and v, symmetric."""
+    """The block for the pair (v, v), symmetric."""
     dtaudq: _Array
-    """The block for τ and q: entry [j, k] is for τ_j and q_k."""
+    """The block for τ and q: entry [j, k] is the derivative with respect to τ_j and q_k."""
 
 
 class RneaSecondDerivatives(NamedTuple):
-    """The second derivatives of τ = rnea(q, v, a), each (nv, nv, nv): member[i] is a block of the Hessian of τ_i."""
+    """The second derivatives of τ = rnea(q, v, a), each (nv, nv, nv). In each array, element [i] is a block of the
+    Hessian of τ_i.
+    """
 
     dqdq: _Array
     """The blocks for q and q."""
     dvdq: _Array
-    """The blocks for v and q: entry [i, j, k] is for v_j and q_k."""
+    """The blocks for v and q: entry [i, j, k] is the derivative of τ_i with respect to v_j and q_k."""
     dvdv: _Array
     """The blocks for v and v."""
     dadq: _Array
-    """The blocks for a and q: entry [i, j, k] is for a_j and q_k."""
+    """The blocks for a and q: entry [i, j, k] is the derivative of τ_i with respect to a_j and q_k."""
 
 
 class CentroidalDerivatives(NamedTuple):
-    """The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c; in the world's axes."""
+    """The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c, along the world's axes."""
 
     dh_dq: _Array
     """∂hg/∂q, (6, nv), linear rows first."""
@@ -190,11 +193,13 @@ class Constrained(NamedTuple):
     a: _Array
     """q̈, nv numbers (rad/s², m/s²)."""
     lambda_: _Array
-    """λ, the force of each constraint on the body of its frame, in the axes of its rows (N, N m)."""
+    """λ, the force of each constraint on the body of the constrained frame, along the axes of the constraint's rows (N,
+    N m).
+    """
     residual: float
-    """The largest number in J q̈ + γ (m/s², rad/s²), which measures how well the constraints are satisfied."""
+    """The largest magnitude in J q̈ + γ (m/s², rad/s²), which measures how well the constraints are satisfied."""
     redundant: float
-    """The number of rows of J that depend on earlier rows, up to rounding: they have no force of their own."""
+    """The number of rows of J that depend linearly on earlier rows, up to rounding. These rows have no force."""
 
 
 class ConstrainedDerivatives(NamedTuple):
@@ -220,11 +225,12 @@ class ConstrainedDerivatives(NamedTuple):
     dlambda_dtau: _Array
     """∂λ/∂τ, (rows, nv)."""
     inertia: _Array
-    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along its constraints."""
+    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along the rows of the constraints."""
 
 
 class ConstrainedEquations(NamedTuple):
-    """The result of `constrained_dynamics_equations`: the result of `constrained_dynamics`, and its equations.
+    """The result of `constrained_dynamics_equations`: the result of `constrained_dynamics`, and linear equations for
+    its changes.
 
     ∂/∂q is taken in the tangent space.
     """
@@ -251,11 +257,13 @@ class Impulse(NamedTuple):
     v: _Array
     """v⁺, the velocity after the impact, nv numbers (rad/s, m/s)."""
     lambda_: _Array
-    """Λ, the impulse of each constraint on the body of its frame, in the axes of its rows (N s, N m s)."""
+    """Λ, the impulse of each constraint on the body of the constrained frame, along the axes of the constraint's rows
+    (N s, N m s).
+    """
     residual: float
-    """The largest number in J (v⁺ + ε v) (m/s, rad/s)."""
+    """The largest magnitude in J (v⁺ + ε v) (m/s, rad/s)."""
     redundant: float
-    """The number of rows of J that depend on earlier rows, up to rounding: they have no impulse of their own."""
+    """The number of rows of J that depend linearly on earlier rows, up to rounding. These rows have no impulse."""
 
 
 class ImpulseDerivatives(NamedTuple):
@@ -277,48 +285,53 @@ class ImpulseDerivatives(NamedTuple):
     dlambda_dv: _Array
     """∂Λ/∂v, (rows, nv)."""
     inertia: _Array
-    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along its constraints."""
+    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along the rows of the constraints."""
 
 
 class ContactConstraint(NamedTuple):
-    """A contact of a frame with the world, or a loop that two frames close.
+    """A contact of a frame with the world, or the connection of two frames that closes a loop.
 
-    Let v and a be the velocity and acceleration of the frame relative to the other body, and X its pose in the other
-    frame relative to the target. The constraint is a − a* + kd (v − v*) + kp e = 0. Here e = log X ('rigid'), or the
-    difference of the frames' origins ('point'), in the axes of `reference` at the frame's origin. This is Pinocchio's
-    RigidConstraintModel, and Crocoddyl's contacts. A point has the classical acceleration, a rigid frame the spatial
-    one. A 'line' has a point's row along the third of `axes`, a 'plane' has the rows along the first and the third.
-    These are Crocoddyl's ContactModel1D and ContactModel2D. A ContactModel1D with rotation R and reference x has
-    axes=R.T and a placement at R @ (0, 0, x).
+    Let v and a be the velocity and acceleration of the frame relative to the other body, and X the pose of the frame
+    relative to its target in the other frame. The constraint is a − a* + kd (v − v*) + kp e = 0. Here e is log X
+    ('rigid') or the difference of the frames' origins ('point'), in the axes of `reference` at the frame's origin.
+    Pinocchio's RigidConstraintModel and Crocoddyl's contacts have the same equation. For 'point', a is the classical
+    acceleration; for 'rigid', the spatial acceleration. A 'line' has only the row of a point along the third of `axes`,
+    like Crocoddyl's ContactModel1D. A 'plane' has the rows along the first and the third, like ContactModel2D. A
+    ContactModel1D with rotation R and reference x has axes=R.T and a placement at R @ (0, 0, x).
     """
 
     frame: str | int
     """The constrained frame."""
     kind: Literal["point", "line", "plane", "rigid"]
-    """The constrained part: the frame's origin, 3 rows; its motion along one axis or two; or the whole frame, 6 rows,
-    linear first.
+    """The constrained motion: of the frame's origin, 3 rows ('point'); of the origin along one axis or two ('line',
+    'plane'); or of the whole frame, 6 rows, linear first ('rigid').
     """
     other: str | int | None = None
     """The other frame of the constraint; None is the world."""
     reference: Literal["local", "local_world_aligned"] = "local"
-    """The axes of rows and forces: the frame's or the world's."""
+    """The axes of rows and forces: the axes of the frame or of the world."""
     kp: float = 0.0
     """The gain of the position error (1/s²)."""
     kd: float = 0.0
     """The gain of the velocity error (1/s)."""
     placement: ArrayLike | None = None
-    """The target pose of the frame in the other frame, (4, 4); except for 'rigid', only the translation is used."""
+    """The target pose of the frame in the other frame, (4, 4). For 'rigid' the whole pose is used, else only its
+    translation.
+    """
     velocity: ArrayLike | None = None
     """v*, six numbers in the axes of `reference` (m/s, rad/s)."""
     acceleration: ArrayLike | None = None
     """a*, six numbers in the axes of `reference` (m/s², rad/s²)."""
     axes: ArrayLike | None = None
-    """The axes of a line or a plane as columns in the axes of `reference`, a rotation (3, 3); None is the identity."""
+    """The axes of a line or a plane, in the axes of `reference`: a rotation (3, 3) with an axis in each column. None is
+    the identity.
+    """
 
 
 class Coupling(NamedTuple):
-    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the position of the leader. No
-    function enforces it; if it is linear, the readers' `mimic=True` lets the follower follow in the tree.
+    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, where q is the position of the leader.
+    No function enforces the coupling. A linear coupling becomes a part of the tree if the file is read with
+    `mimic=True`.
     """
 
     follower: str
@@ -330,12 +343,13 @@ class Coupling(NamedTuple):
 
 
 class CentroidalMap(NamedTuple):
-    """The parts of hg = Ag(q) v that depend on the position; the axes are the world's."""
+    """The quantities of the centroidal momentum hg = Ag(q) v that depend on the position, along the axes of the world.
+    """
 
     Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
     Ig: _Array
-    """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
+    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī]."""
     com: _Array
     """c, the centre of mass in the world's frame (m), 3 numbers."""
     Jcom: _Array
@@ -343,20 +357,20 @@ class CentroidalMap(NamedTuple):
 
 
 class CentroidalMapRate(NamedTuple):
-    """The centroidal momentum hg = Ag(q) v and the parts of its rate Ag a + dAg v; the axes are the world's."""
+    """The centroidal momentum hg = Ag(q) v and the matrices of its rate Ag a + dAg v, along the axes of the world."""
 
     Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
     dAg: _Array  # noqa: N815
-    """dAg/dt along the velocity, (6, nv)."""
+    """The rate dAg/dt along the velocity, (6, nv)."""
     hg: _Array
     """The momentum about the centre of mass, in the axes of the world (kg m/s, kg m²/s), 6 numbers."""
     Ig: _Array
-    """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
+    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī]."""
     com: _Array
     """c, the centre of mass in the world's frame (m), 3 numbers."""
     com_velocity: _Array
-    """ċ, its velocity (m/s), 3 numbers."""
+    """ċ, the velocity of the centre of mass (m/s), 3 numbers."""
     Jcom: _Array
     """The Jacobian of c, (3, nv): ċ = Jcom v."""
 
@@ -369,7 +383,9 @@ class AllTerms(NamedTuple):
     h: _Array
     """h(q, v), nv numbers, as returned by `nonlinear_effects`."""
     centroidal: CentroidalMapRate
-    """Momentum, its map and the map's rate, centre of mass, as returned by `centroidal_map_rate`."""
+    """Centroidal momentum, its matrix and the rate of this matrix, and the centre of mass, as returned by
+    `centroidal_map_rate`.
+    """
     kinetic_energy: float
     """T = ½ vᵀ M v (J)."""
     potential_energy: float
@@ -380,30 +396,34 @@ class Frame(NamedTuple):
     """A frame fixed to a body."""
 
     name: str
-    """The name of the link or joint."""
+    """The name of the frame: the name of its link or joint, or the user's name."""
     kind: Literal["link", "joint", "user", "constraint"]
     """The source of the frame."""
     body: int
-    """The body to which it is fixed; 0 is the world."""
+    """The body to which the frame is fixed; 0 is the world."""
     placement: _Array
-    """Its pose in the body's frame, a homogeneous (4, 4) matrix."""
+    """The pose of the frame in the body's frame, a homogeneous (4, 4) matrix."""
 
 
 class AssemblySize(NamedTuple):
-    """The work of the assembly of a `DivideConquer`, as counts of operations."""
+    """The numbers of bodies, pieces, operations and levels in the assembly of a `DivideConquer`, which determine its
+    cost.
+    """
 
     bodies: int
-    """The number of moving bodies: each is eliminated once."""
+    """The number of moving bodies; each body is eliminated once."""
     runs: int
     """The number of runs, within which bodies are eliminated one after the other."""
     longest_run: int
     """The number of bodies in the largest run."""
     joins: int
-    """The number of pairs of pieces that are joined in series, one below the other."""
+    """The number of joins of two pieces of the tree that are in series, one below the other."""
     gathers: int
-    """The number of pairs of pieces on the same body, whose contributions are added."""
+    """The number of additions of the contributions of two pieces of the tree on the same body."""
     depth: int
-    """The length of the longest chain of pieces, from a run to the whole, that must be computed one after the other."""
+    """The number of steps that must be computed one after the other: the longest chain of pieces from a run to the
+    whole robot.
+    """
 
 
 class Limits(NamedTuple):
@@ -429,23 +449,23 @@ class Spring(NamedTuple):
     joint: str
     """The joint's name."""
     stiffness: _Array
-    """k₀, k₁ and k₂ (N m/rad or N/m; k₁ is per rad or m, k₂ per square of it)."""
+    """k₀ (N m/rad or N/m), k₁ (the unit of k₀, per rad or m) and k₂ (the unit of k₀, per rad² or m²)."""
     rest: _Array
-    """The joint's position at which the spring is at rest, as many numbers as the joint has in q."""
+    """The joint's position at which the spring is at rest, with as many numbers as the joint has in q."""
 
 
 class GravityCompensation(NamedTuple):
-    """A supported part of a body's weight: the force −mass g acts at mass_com / mass."""
+    """A supported fraction of a body's weight: the force −mass g acts at the point mass_com / mass."""
 
     body: str
     """The body's name."""
     mass: float
     """The mass whose weight is supported (kg)."""
     mass_com: _Array
-    """This mass times its centre, in the body's frame (kg m), 3 numbers."""
+    """The supported mass times the position of its centre in the body's frame (kg m), 3 numbers."""
     ratio: float
-    """The supported ratio of the body's weight, except for parts with another ratio. The mass follows by this ratio
-    when the inertia of the body changes.
+    """The supported fraction of the body's weight, except for parts of the body with another ratio. If the inertia of
+    the body changes, `mass` changes by this ratio times the change of the body's mass.
     """
 
 
@@ -460,17 +480,18 @@ class Actuator(NamedTuple):
     name: str
     """The name, or an empty string."""
     joint: str | None
-    """The name of the driven joint; None if it does not drive a joint."""
+    """The name of the driven joint; None if the actuator does not drive a joint."""
     tendon: str | None
-    """The name of the driven tendon; None if it does not drive a tendon."""
+    """The name of the driven tendon; None if the actuator does not drive a tendon."""
     frame: str | None
-    """The name of the frame on which it acts; None if it does not act on a frame."""
+    """The name of the frame on which the actuator acts; None if it does not act on a frame."""
     coefficients: dict[str, float]
     """The joints of the tendon by name, each with its coefficient (1, m/rad)."""
     gear: _Array
     """The effort at the joint per unit of force (1, m), 6 numbers. Joints with one degree of freedom and tendons use
-    the first one. A ball joint uses three: an axis in its body. A frame uses six, linear first, in its axes. A free
-    joint uses six too: a force in the world's axes and a torque in the body's.
+    the first number. A ball joint uses three numbers: an axis in the frame of its body. A frame uses six numbers,
+    linear first, in the frame's axes. A free joint also uses six: a force in the world's axes and a torque in the
+    body's axes.
     """
     gain: float
     """The force per unit of control."""
@@ -487,11 +508,11 @@ class Actuator(NamedTuple):
 
 
 class ModelWarning(str):
-    """A warning about a robot or its file: the text, with its parts as attributes."""
+    """A warning about a robot or its file. It is a string, the text of the warning, with the attributes below."""
 
     kind: str
-    """The kind, which a strict reader may be told to allow: 'massless', 'negative', 'triangle', 'singular', 'unlikely',
-    'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
+    """The kind of the warning: 'massless', 'negative', 'triangle', 'singular', 'unlikely', 'limit', 'unknown',
+    'left_out', 'assumed' or 'mimic'. A strict reader accepts the kinds in its argument `allow`.
     """
     subject: str
     """The name of the body or joint, or the element of the file."""
@@ -501,7 +522,7 @@ class ModelWarning(str):
     """The line in the file, counted from 1; None if the warning is not about a file."""
 
     def __new__(cls, text: str, kind: str, subject: str, file: str | None = None, line: int | None = None) -> "Self":
-        """Creates a warning from these parts."""
+        """Creates a warning from its text and its attributes."""
         warning = super().__new__(cls, text)
         warning.kind, warning.subject, warning.file, warning.line = kind, subject, file, line
         return warning
@@ -512,8 +533,8 @@ class ModelWarning(str):
 
 
 class Mimic(NamedTuple):
-    """The rule by which a joint follows another one: its position is ratio * q + offset, with q the other joint's
-    position.
+    """The rule by which a joint follows another joint: its position is ratio * q + offset, where q is the position of
+    the other joint.
     """
 
     ratio: float
@@ -532,15 +553,15 @@ class Iteration(NamedTuple):
     gap: float
     """Largest gap of the iterate before the step."""
     stop: float
-    """The expected decrease of the cost for the full step; compared with the tolerance."""
+    """The expected decrease of the cost for the full step. The solver compares it with the tolerance."""
     step: float
     """The last step length tried, which is the accepted one if a step was accepted."""
     regularisation: float
     """Regularisation after the iteration."""
     d1: float
-    """Slope of the expected change: the cost should fall by α (d1 + ½ α d2) for a step length α."""
+    """Slope of the expected decrease: for a step length α, the cost should decrease by α (d1 + ½ α d2)."""
     d2: float
-    """Curvature of the expected change."""
+    """Curvature of the expected decrease; see `d1`."""
     feasible: bool
     """Whether the iterate after the step satisfies the dynamics."""
     accepted: bool
@@ -548,21 +569,21 @@ class Iteration(NamedTuple):
 
 
 class Timings(NamedTuple):
-    """The duration of the parts of a solve (s)."""
+    """The durations of the phases of a solve (s)."""
 
     calc: float
     """Dynamics and cost of the warm start."""
     calc_diff: float
     """Derivatives."""
     sweep: float
-    """Backward sweeps, repeated ones included."""
+    """Backward sweeps, including repeated sweeps."""
     rollout: float
     """Trial rollouts of the line searches, accepted or not."""
     total: float
     """The whole solve."""
     overrun: float = 0.0
-    """The time in excess of `time_budget`: above zero if the budget is shorter than an iteration, or the solve was
-    delayed. A budget of 0 requests no iteration, and is never overrun.
+    """The time in excess of `time_budget`. It is above zero if the budget is shorter than an iteration, or if the solve
+    was delayed. With a budget of 0 no iteration is made, and this time is 0.
     """
 
 
@@ -576,13 +597,16 @@ class Evaluation(NamedTuple):
     next_states: _Array
     """The next states φ(x, u), (N, nx)."""
     gaps: _Array
-    """x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁, (N + 1, ndx)."""
+    """The gaps: first x̂₀ ⊖ x₀ with the problem's initial state x̂₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁ for each knot t, (N + 1,
+    ndx).
+    """
     accelerations: list[_Array]
     """The accelerations of each knot of a robot, nv numbers; empty for other knots and for impacts."""
     efforts: list[_Array]
     """The efforts of all joints at each knot of a robot, nv numbers; empty for other knots and for impacts."""
     forces: list[dict[str, _Array]]
-    """The forces of each knot's contacts by name, 1 to 6 numbers in the axes of their rows; for impacts the impulses.
+    """For each knot, the contact forces by the contact's name, 1 to 6 numbers along the axes of the contact's rows; for
+    impacts, the impulses.
     """
 
 
@@ -614,20 +638,20 @@ class _Solution(NamedTuple):
     """The reason why the solve ended.
 
     "constraints_violated": the penalty reached its maximum and limits do not hold; this does not prove that no solution
-    exists. "infeasible": the initial state violates a limit of knot 0 that no control can change. `outcome.worst` has
-    that limit, which proves that no solution exists.
+    exists. "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no
+    solution exists. `outcome.worst` contains the limit.
     """
     trace: list[Iteration]
     """One record per iteration."""
     timings: Timings
-    """The duration of the solve's parts."""
+    """The durations of the phases of the solve."""
 
 
 @disjoint_base
 class Solution(_Solution):
-    """The result of a solve: the best iterate, whatever the status says.
+    """The result of a solve: the best iterate, for every status.
 
-    If knots differ in nu, arrays of controls are replaced by lists of N arrays.
+    If knots differ in nu, `us`, `K` and `k` are lists of N arrays.
     """
 
     _source: Any = None
@@ -657,12 +681,14 @@ class Solution(_Solution):
         return self._evaluated().forces
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Returns the parts of a pickle: the numbers, without the problem."""
+        """Returns the parts of a pickle: the numbers of the solution, but not the problem."""
         return type(self), tuple(self)
 
 
 class LqNode(NamedTuple):
-    """A knot's linear-quadratic problem: δx⁺ = A δx + B δu + f, ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu."""
+    """The linear-quadratic problem of a knot: dynamics δx⁺ = A δx + B δu + f, and cost ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu +
+    qᵀδx + rᵀδu.
+    """
 
     A: ArrayLike
     """∂x⁺/∂x, (ndx, ndx)."""
@@ -692,39 +718,41 @@ class SweepResult(NamedTuple):
     Vx: _Array
     """The gradients of the value functions, (N + 1, ndx)."""
     Vxx: _Array
-    """Their Hessians, (N + 1, ndx, ndx)."""
+    """The Hessians of the value functions, (N + 1, ndx, ndx)."""
 
 
 class Violation(NamedTuple):
     """A row of a limit, or of the dynamics, that is violated at the end of a solve."""
 
     kind: Literal["constraint", "gap"]
-    """'constraint', a limit or constraint of a knot, or 'gap', a gap of the dynamics."""
+    """'constraint' for a limit or constraint of a knot, 'gap' for a gap of the dynamics."""
     knot: int
     """The knot, 0 … N."""
     row: int
-    """The index in `multipliers[knot]`; for a gap the entry of the tangent vector."""
+    """The index of the row in `multipliers[knot]`; for a gap, the index in the tangent vector."""
     name: str | None
     """The name of the limit; None for a constraint of a `ConstrainedAction` and for a gap."""
     entry: int
-    """The row within the limit `name`, else `row`."""
+    """The index of the row in the limit `name`; without a name, the same number as `row`."""
     amount: float
-    """The distance from the bound; for a gap its size; infinite instead of NaN."""
+    """The distance from the bound, or the magnitude of the gap; infinite if it is NaN."""
 
 
 class Outcome(NamedTuple):
-    """The state of the limits after a solve of `AugmentedLagrangian`, in addition to its `Solution`."""
+    """The violation of limits and other results of a solve of `AugmentedLagrangian`, in addition to its `Solution`."""
 
     cost: float
-    """The cost without the terms of the limits."""
+    """The cost without the penalties of the limits."""
     primal: float
     """The largest distance of a limited number from its bounds, or the largest gap of the dynamics."""
     dual: float
-    """The largest entry of the Lagrangian's gradient with respect to the controls, projected on their bounds."""
+    """The largest entry of the Lagrangian's gradient with respect to the controls, projected onto the bounds of the
+    controls.
+    """
     multipliers: list[_Array]
-    """The multipliers of each knot, limit by limit: positive at an upper bound, negative at a lower one."""
+    """The multipliers of each knot, limit by limit: positive at an upper bound, negative at a lower bound."""
     penalty: float
-    """1/μ at the end."""
+    """The penalty 1/μ at the end of the solve."""
     solves: int
     """The number of inner solves."""
     iterations: int
@@ -734,7 +762,9 @@ class Outcome(NamedTuple):
 
 
 class Control(NamedTuple):
-    """The state that a control law gets before a step of a `Simulation`, and the efforts and forces that it sets."""
+    """The argument of a control law, before a step of a `Simulation`: the state, and the efforts and forces that the
+    control law sets.
+    """
 
     time: float
     """The time at which the step begins (s)."""
@@ -743,28 +773,31 @@ class Control(NamedTuple):
     v: _Array
     """The velocity, nv numbers."""
     tau: _Array
-    """The joint efforts during the step, nv numbers (N m, N); 0 when the law is called, which sets them in place."""
+    """The joint efforts during the step, nv numbers (N m, N). They are 0 when the control law is called; it sets them
+    in place.
+    """
     f_ext: _Array
-    """The force on each body during the step, (nbodies, 6), at its origin and in its frame; 0 when the law is called,
-    which sets it in place.
+    """The force on each body during the step, (nbodies, 6), at the body's origin and in the body's frame. The forces
+    are 0 when the control law is called; it sets them in place.
     """
 
 
 class Ground(NamedTuple):
-    """A plane on which a simulated robot stands, slides and lands, and the robot's points that may touch it.
+    """A plane on which a simulated robot stands, slides and lands, and the points of the robot that may touch the
+    plane.
 
     Contacts are rigid, with Coulomb friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
     Anitescu and Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ. Each point satisfies 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0
-    and the exact disc ‖λ_t‖ ≤ μ λ_n. Its velocity after the step is u⁺ = J v⁺, and φ is its gap to the plane. Forces of
-    redundant contacts are not unique; their sum is. Errors are O(h). Only the points touch the plane: edges of soles,
-    other bodies and joint limits are ignored. With a restitution above 0 (Newton's law) and friction, an impact of
-    several points may increase the energy. A point below the plane is moved out by a fifth of its depth per step, at
-    most 0.5 m/s.
+    and the exact disc ‖λ_t‖ ≤ μ λ_n. Here u⁺ = J v⁺ is the point's velocity after the step, and φ its distance from the
+    plane. Forces of redundant contacts are not unique, but the sum of these forces is unique. Errors are O(h). Only the
+    points touch the plane: edges of soles, other bodies and joint limits are ignored. With a restitution above 0
+    (Newton's law) and friction, an impact of several points may increase the energy. A point below the plane is moved
+    out by a fifth of its depth per step, at most 0.5 m/s.
     """
 
     points: Sequence[str | int | tuple[str | int, ArrayLike]]
-    """The points that may touch: a list of frames, each for its origin, or of pairs of a frame and the corners of a
-    sole in this frame, (n, 3) (m).
+    """The points that may touch the plane: a list of frames, whose origins are the points, or of pairs (frame, corners)
+    with the corners of a sole in this frame, (n, 3) (m).
     """
     normal: ArrayLike = (0.0, 0.0, 1.0)
     """The direction out of the ground, in the world's frame; it need not be a unit vector."""
@@ -773,7 +806,7 @@ class Ground(NamedTuple):
     friction: float = 0.7
     """The friction coefficient μ."""
     restitution: float = 0.0
-    """The fraction of its normal speed that a point keeps after an impact, from 0 to 1."""
+    """The fraction of the normal speed that a point keeps after an impact, from 0 to 1."""
     tolerance: float = 1e-8
     """The maximum error of the contact laws (m/s)."""
     max_iterations: int = 500
@@ -786,13 +819,15 @@ class GroundContacts(NamedTuple):
     position: _Array
     """The points in the world at the beginning of the step (m), (n, 3)."""
     force: _Array
-    """The forces on the robot in the axes of the world, mean values over the step (N), (n, 3)."""
+    """The mean forces on the robot during the step, along the axes of the world (N), (n, 3)."""
     touches: NDArray[np.bool_]
     """Whether the ground pushed each point, (n,)."""
 
 
 _NUMBERS = 12
-"""Maximum length of a vector or list that a result prints in full; otherwise it prints the shape."""
+"""Maximum length of a vector or list that is printed in full when a result is printed; of a longer one, only the shape
+is printed.
+"""
 
 
 def _shown(value: object) -> str:
@@ -806,11 +841,11 @@ def _shown(value: object) -> str:
 
 
 def _repr(self: Any) -> str:
-    """Returns a short text with the members."""
+    """Returns a short text with the members of a named tuple."""
     return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in self._asdict().items())})"
 
 
-# the modules in which users and pickle find these classes
+# users and pickle find these classes in the following modules
 _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",
@@ -824,6 +859,6 @@ _MODULES = {
     "GroundContacts": "simulation",
 }
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
-    setattr(_class, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced
+    setattr(_class, "__repr__", _repr)  # noqa: B010 - type checkers do not allow a method to be replaced
     _class.__module__ = f"condyle.{_MODULES[_class.__name__]}" if _class.__name__ in _MODULES else "condyle"
 ModelWarning.__module__ = "condyle"

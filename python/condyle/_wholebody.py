@@ -1,4 +1,6 @@
-"""Arguments and results of a whole-body controller: named tuples, and references, which are views of one array."""
+"""Arguments and results of a whole-body controller: named tuples, and `References`, whose members are views of one
+array.
+"""
 
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, TypeAlias, overload
@@ -9,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._condyle import ControllerError, _check_pose, _check_rotations
 
 _Array: TypeAlias = NDArray[np.float64]
-_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # joint, and range in q of the numbers with length 1
+_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # joint, and range in q of its rotation
 
 
 class Gains(NamedTuple):
@@ -31,29 +33,30 @@ class Gains(NamedTuple):
 
 
 class Pyramid(NamedTuple):
-    """A pyramid that approximates the friction cone, for comparison with other controllers."""
+    """A pyramid that approximates the friction cone; it allows a comparison with other controllers."""
 
     sides: int = 4
-    """The number of its faces, at least 3."""
+    """The number of faces of the pyramid, at least 3."""
     inscribed: bool = True
-    """Whether it lies inside the cone and touches it with its edges, or outside the cone and touches it with its faces.
+    """Whether the pyramid lies inside the cone and its edges touch the cone; otherwise it lies outside and its faces
+    touch the cone.
     """
 
 
 class JointLimits(NamedTuple):
-    """Parameters that keep joints within their limits, by bounds on q̈ over a look-ahead time T.
+    """Parameters of the bounds on q̈ that keep joints within their limits over a look-ahead time T.
 
         (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T                        velocity
         (q_min − q) / T² − 2 v / T ≤ q̈ ≤ (q_max − q) / T² − 2 v / T    position
 
-    A lower bound is at most a_max, and an upper bound at least −a_max. So a joint beyond its limit, or too fast towards
-    it, is led back with at most a_max. If velocity and position bounds exclude each other, the position's bound holds.
-    If dynamics, contacts and torques leave no solution within the bounds, the bounds become tasks of large weight at
-    that tick.
+    A lower bound is at most a_max, and an upper bound at least −a_max. So a joint that is beyond its limit, or moves
+    too fast towards it, returns with at most a_max. If the bounds for velocity and position exclude each other, the
+    bound for position is used. If dynamics, contacts and torques leave no solution within the bounds, the bounds become
+    tasks of large weight at this tick.
     """
 
     look_ahead: float = 0.05
-    """T (s); at least some ticks."""
+    """The look-ahead time T (s); it should be at least some ticks."""
     max_acceleration: float = 200.0
     """a_max (rad/s², m/s²)."""
     lower: ArrayLike | None = None
@@ -72,32 +75,38 @@ class Settings(NamedTuple):
     """
 
     acceleration_weight: float = 1e-6
-    """The weight of ½ ‖q̈‖², which determines the freedom that the tasks leave; above 0."""
+    """The weight of ½ ‖q̈‖², above 0. It makes the accelerations unique that the tasks leave free."""
     force_weight: float = 1e-7
-    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench counts
-    as the equivalent forces at the corners, so that the pressure stays away from the edges.
+    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), above 0. It makes the distribution of forces unique. The moment of a
+    sole's wrench counts as equivalent forces at the corners, so that the pressure stays away from the edges.
     """
     contact_gains: Gains = Gains(0.0, 0.0)
     """Gains of the Baumgarte stabilisation: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0."""
     max_correction: float = 50.0
-    """The maximum acceleration of this stabilisation (m/s², rad/s²): a foot that lands fast is stopped over some ticks.
+    """The maximum acceleration of the stabilisation by `contact_gains` (m/s², rad/s²): a foot that lands fast is
+    stopped over some ticks.
     """
     friction: Literal["cone"] | Pyramid = "cone"
     """The form of the friction constraint: the exact cone ‖f_t‖ ≤ μ f_n, or a `Pyramid`."""
     effort: ArrayLike | None = None
-    """Maximum effort of each coordinate (N m, N), nv numbers, infinite for no limit; None for the model's limits. It is
-    above 0 for each actuated coordinate.
+    """Maximum effort of each coordinate (N m, N), nv numbers, infinite for no limit; None for the model's limits. The
+    maximum must be above 0 for each actuated coordinate.
     """
     joint_limits: JointLimits | None = JointLimits()
     """The limits of the joints' position and velocity; None to ignore them."""
     hold_ticks: int = 5
-    """The number of ticks after the last solution during which its torques are the safe command."""
+    """The number of ticks after the last solution during which the safe command repeats the torques of this solution.
+    """
     damping: float = 0.02
-    """The damping of the safe command after that: −D v. D at 1 rad/s is this fraction of the maximum effort (s/rad)."""
+    """The damping of the safe command after `hold_ticks`. Its damping torque −D v at 1 rad/s is this fraction of the
+    maximum effort (s/rad).
+    """
     backend: Literal["interior_point", "clarabel"] = "interior_point"
-    """The solver: our own dense interior point method, warm-started from the last tick, or clarabel."""
+    """The solver: Condyle's dense interior point method, warm-started from the last tick, or the library Clarabel."""
     formulation: Literal["condensed", "full"] = "condensed"
-    """The unknowns: those that remain after elimination of base and contacts, or, for comparison, all of (q̈, f)."""
+    """The unknowns of the program: 'condensed', the unknowns that remain after elimination of base and contacts; or,
+    for comparison, 'full', all of (q̈, f).
+    """
     warm_start: bool = True
     """Whether the solver starts from the last tick's solution if possible."""
     tolerance: float = 1e-9
@@ -105,7 +114,9 @@ class Settings(NamedTuple):
     max_iterations: int = 50
     """The number of iterations after which a step fails."""
     time_limit: float = float("inf")
-    """The time after which a step fails (s). Results that depend on it depend on the machine's load."""
+    """The time after which a step fails (s). If a step reaches this limit, its result depends on the load of the
+    machine.
+    """
 
 
 class KktResiduals(NamedTuple):
@@ -114,15 +125,16 @@ class KktResiduals(NamedTuple):
     stationarity: float
     """The gradient of the Lagrangian, relative to the largest of its terms."""
     primal: float
-    """The violation of the worst equality, bound or cone, relative to its row and the unknowns."""
+    """The largest violation of an equality, bound or cone, relative to the magnitudes of its row and of the unknowns.
+    """
     dual: float
-    """The distance of the multipliers from their cones, relative to their size."""
+    """The distance of the multipliers from their cones, relative to the size of the multipliers."""
     complementarity: float
     """The sum of the products of slack variables and multipliers, relative to 1 and the terms of the objective."""
 
 
 class Command(NamedTuple):
-    """The command for the robot at this tick: finite, and within the torque limits, for every status.
+    """The command for the robot at this tick. It is finite and within the torque limits for every status.
 
     In a safe command, all members from `a` to `violation` are from the last solution.
     """
@@ -132,18 +144,18 @@ class Command(NamedTuple):
     ]
     """The reason why the step ended."""
     reason: str
-    """The reason as a sentence. It gives the index of a number that is not finite, or the joint or the frame whose
-    rotation is invalid.
+    """The reason why the step ended, as a sentence. It contains the index of a number that is not finite, or the joint
+    or the frame whose rotation is invalid.
     """
     source: Literal["solution", "last_solution", "gravity_compensation"]
-    """The origin of the command. A solver that has not finished may still return an iterate that satisfies all
-    constraints: a 'solution'. The other two are safe commands: the last solution's torques for some ticks, then gravity
-    compensation with damping.
+    """The method by which the command was computed. 'solution' also includes an iterate of an unfinished solve that
+    satisfies all constraints. 'last_solution' and 'gravity_compensation' are safe commands: the torques of the last
+    solution for some ticks, then gravity compensation with damping.
     """
     tau: _Array
     """τ, the efforts of the motors (N m, N), nv numbers, 0 at a free-flyer."""
     a: _Array
-    """q̈, the resulting acceleration if the contacts hold (rad/s², m/s²), nv numbers."""
+    """q̈, the acceleration that follows from the command if the contacts hold (rad/s², m/s²), nv numbers."""
     forces: _Array
     """The force of the environment on the robot at each contact, (contacts, 6), linear first, about the origin of the
     contact's frame in the world's axes (N, N m).
@@ -151,13 +163,13 @@ class Command(NamedTuple):
     com_acceleration: _Array
     """c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²), 3 numbers."""
     violation: float
-    """The violation of the worst constraint (N, N m, m/s²)."""
+    """The largest violation of a constraint (N, N m, m/s²)."""
     iterations: int
     """The number of iterations of the solver."""
     reduced_accuracy: bool
-    """Whether the solver missed the tolerance and met only its reduced tolerance."""
+    """Whether the solver met only its reduced tolerance, not the tolerance of the settings."""
     limits_relaxed: bool
-    """Whether joint limits were relaxed in favour of dynamics, contacts and torques."""
+    """Whether joint limits were relaxed because dynamics, contacts and torque limits left no solution within them."""
 
     def solved(self) -> "Command":
         """Returns the command itself if its status is 'solved'.
@@ -170,7 +182,9 @@ class Command(NamedTuple):
 
 
 class Numbers:
-    """A member of a `Target`: a view of some of its numbers, which can be set from anything with their shape."""
+    """A member of a `Target`: a view of a range of the target's numbers. It can be set from any array with the shape of
+    the view.
+    """
 
     def __init__(self, first: int, *shape: int) -> None:
         self.first, self.shape = first, shape
@@ -193,7 +207,7 @@ class Numbers:
         view[...] = given
 
     def check(self, target: "Target", given: _Array) -> None:
-        """Raises `ValueError` for values that are invalid here."""
+        """Raises `ValueError` for values that are invalid for this member."""
 
 
 class Pose(Numbers):
@@ -215,7 +229,7 @@ class Position(Numbers):
 
 
 class Target:
-    """A part of the numbers of `References`, with named members."""
+    """A target: a range of the numbers of `References`, with named members."""
 
     __slots__ = ("_name", "_numbers", "_views")
     SIZE: int
@@ -257,12 +271,13 @@ class MomentumTarget(Target):
     momentum = Numbers(0, 3)
     """k_ref (kg m²/s), 3 numbers."""
     rate = Numbers(3, 3)
-    """Its rate (N m), 3 numbers."""
+    """The rate of k_ref (N m), 3 numbers."""
 
 
 class FrameTarget(Target):
-    """The target of a frame. Velocity and acceleration are of its origin and its rotation, in the world's axes, linear
-    first. They are the first and second time derivative of the position (a classical acceleration).
+    """The target of a frame. Velocity and acceleration belong to the frame's origin and rotation, along the world's
+    axes, linear first. Their linear parts are the first and second time derivatives of the origin's position (so the
+    acceleration is classical).
     """
 
     __slots__ = ()
@@ -276,13 +291,15 @@ class FrameTarget(Target):
 
 
 class ContactTarget(Target):
-    """The target of a contact: whether it touches, where it is held, and the reference of its force; in the world."""
+    """The target of a contact: whether the contact touches, the pose at which it is held, and the reference of its
+    force, in the world's frame.
+    """
 
     __slots__ = ()
     SIZE = 23
     pose = Pose(1)
-    """The pose at which the frame is held, a homogeneous (4, 4) matrix; it acts only if `Settings.contact_gains` have a
-    stiffness. For a point only the translation is used.
+    """The pose at which the frame is held, a homogeneous (4, 4) matrix. It has an effect only if the stiffness of
+    `Settings.contact_gains` is above 0. For a point contact, only the translation is used.
     """
     force = Numbers(17, 6)
     """The reference force of the environment on the robot, linear first, about the frame's origin (N, N m): a planned
@@ -291,7 +308,8 @@ class ContactTarget(Target):
 
     @property
     def activation(self) -> float:
-        """The activation α, from 0 (it does not touch: no force, and the frame may move) to 1 (it touches).
+        """The activation α, from 0 (the contact does not touch: no force, and the frame may move) to 1 (the contact
+        touches).
 
         Between 0 and 1 the frame is held. The normal force is at most α times the contact's `max_force`, or α times the
         robot's weight if `max_force` is infinite. So a ramp over some ticks loads or unloads the contact without a jump
@@ -328,9 +346,9 @@ class PostureTarget(Target):
 class References:
     """The targets of all tasks during one tick. `WholeBodyController.hold` creates the first one.
 
-    Its members are views of one array: they are changed in place, or set. A copy has its own numbers. Values are
-    checked when they are set: rotations must be valid, quaternions and pairs (cos, sin) must have length 1. A step
-    checks all values.
+    The members are views of one array. They can be set, or changed in place. A copy has its own numbers. Values are
+    checked when they are set: rotations must be valid, and quaternions and pairs (cos, sin) must have length 1. Each
+    step of the controller checks all values.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -351,9 +369,9 @@ class References:
     posture: PostureTarget
     """The joints."""
     frames: tuple[FrameTarget, ...]
-    """One for each task that moves a frame, in the same order."""
+    """A target for each task that moves a frame, in the order of the tasks."""
     contacts: tuple[ContactTarget, ...]
-    """One for each `FrictionContact`, in the same order."""
+    """A target for each `FrictionContact`, in the order of the contacts."""
 
     def __init__(self, sizes: tuple[int, int, int, int], numbers: _Array, rotations: _Rotations = ()) -> None:
         nq, nv, frames, contacts = self._sizes = sizes
@@ -396,6 +414,6 @@ class References:
         return f"<condyle.wholebody.References of {len(self.frames)} frames and {len(self.contacts)} contacts>"
 
 
-# the modules in which users and pickle find these classes
+# users and pickle find these classes in the public module
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and _item.__module__ == __name__]:
     _class.__module__ = "condyle.wholebody"

@@ -1,9 +1,9 @@
-"""Poses, motions, forces, inertias, and the exponentials of SO(3) and SE(3), in NumPy and for batches.
+"""Poses, motions, forces, inertias, and the exponentials of SO(3) and SE(3), with NumPy, also for batches.
 
 The layout is the same as in Pinocchio: linear parts first. An `SE3` is the pose aXb of frame b in frame a: it converts
 coordinates in b to coordinates in a. Motions and forces are different types. So a change of frame uses the right rule
-for each, and a motion cannot be added to a force. All of these types and functions take arrays with any number of axes
-in front.
+for each, and a motion cannot be added to a force. All types and functions of this module take arrays with any number of
+additional axes in front, for batches.
 
 >>> import numpy as np
 >>> from condyle.algebra import SE3, Force, Motion, exp6, log6
@@ -45,7 +45,7 @@ _Array = NDArray[np.float64]
 _new = object.__new__
 _S = TypeVar("_S", bound="_Spatial")
 _P = TypeVar("_P", bound="SE3")
-_CLOSE = 1e-12  # tolerance of `==`: some roundings, relative to 1 and to the larger number
+_CLOSE = 1e-12  # tolerance of `==` for rounding errors, relative to 1 and to the larger number
 
 
 def skew(x: ArrayLike) -> _Array:
@@ -69,13 +69,14 @@ class _Spatial:
 
     @classmethod
     def from_vector(cls, vector: ArrayLike) -> Any:
-        """Creates one from six numbers, linear first, (…, 6)."""
+        """Creates a motion or force from six numbers, linear first, (…, 6)."""
         vector = _shaped(vector, "vector", 6)
         return cls(vector[..., :3], vector[..., 3:])
 
     @classmethod
     def _of(cls: type[_S], vector: _Array) -> _S:
-        """Creates one from six numbers without a copy; the caller must not change them afterwards."""
+        """Creates a motion or force from six numbers without a copy; the caller must not change the numbers afterwards.
+        """
         x = _new(cls)
         x.vector = vector
         return x
@@ -122,7 +123,9 @@ class Motion(_Spatial):
     __slots__ = ()
 
     def __rmul__(self, factor: Any) -> Any:
-        """Returns the momentum I v = (m v + ω × m c, Ī ω + m c × v) for an inertia on the left, else a product."""
+        """Returns the momentum I v = (m v + ω × m c, Ī ω + m c × v) if an inertia I is on the left, else the product
+        with a number.
+        """
         if not isinstance(factor, Inertia):
             return self * factor
         h = np.asarray(factor.mass)[..., None] * factor.com
@@ -141,7 +144,7 @@ class Motion(_Spatial):
     @overload
     def cross(self, other: "Force") -> "Force": ...
     def cross(self, other: Union["Motion", "Force"]) -> Union["Motion", "Force"]:
-        """Returns v × m or v ×* f: the rate of a motion or force that moves along with v."""
+        """Returns v × m or v ×* f: the rate of a motion m or a force f that is fixed to a body with velocity v."""
         if isinstance(other, Motion):
             linear = np.cross(self.angular, other.linear) + np.cross(self.linear, other.angular)
             return type(other)(linear, np.cross(self.angular, other.angular))
@@ -190,7 +193,7 @@ class SE3:
 
     @classmethod
     def _of(cls: type[_P], X: _Array) -> _P:
-        """Creates one from a homogeneous matrix without a copy; the caller must not change it afterwards."""
+        """Creates a pose from a homogeneous matrix without a copy; the caller must not change the matrix afterwards."""
         x = _new(cls)
         x.rotation, x.translation = X[..., :3, :3], X[..., :3, 3]
         return x
@@ -202,7 +205,9 @@ class SE3:
 
     @classmethod
     def from_homogeneous(cls, X: ArrayLike) -> "SE3":
-        """Creates one from [R, p; 0, 1], (…, 4, 4), as `forward_kinematics` and `frame_placement` return it."""
+        """Creates a pose from a matrix [R, p; 0, 1], (…, 4, 4), as `forward_kinematics` and `frame_placement` return
+        it.
+        """
         X = np.asarray(X, float)
         if X.shape[-2:] != (4, 4):
             raise ValueError(f"X: expected shape (…, 4, 4), found {X.shape}")
@@ -218,18 +223,18 @@ class SE3:
 
     @property
     def action(self) -> _Array:
-        """The matrix [R, p̂R; 0, R] by which aXb acts on motions, (…, 6, 6)."""
+        """The matrix [R, p̂R; 0, R] that converts motions from frame b to frame a, (…, 6, 6)."""
         R, p = self._broadcast()
         return _blocks(R, skew(p) @ R, np.zeros_like(R), R)
 
     @property
     def dual_action(self) -> _Array:
-        """The matrix [R, 0; p̂R, R] by which aXb acts on forces, (…, 6, 6)."""
+        """The matrix [R, 0; p̂R, R] that converts forces from frame b to frame a, (…, 6, 6)."""
         R, p = self._broadcast()
         return _blocks(R, np.zeros_like(R), skew(p) @ R, R)
 
     def inverse(self) -> "SE3":
-        """Returns bXa."""
+        """Returns bXa, the pose of frame a in frame b."""
         back = self.rotation.swapaxes(-1, -2)
         return type(self)(back, -_times(back, self.translation))
 
@@ -244,7 +249,7 @@ class SE3:
     @overload
     def act(self, x: ArrayLike) -> _Array: ...
     def act(self, x: Any) -> Any:
-        """Converts from frame b to frame a: a pose, a motion, a force, an inertia, or points (…, 3)."""
+        """Converts a pose, a motion, a force, an inertia, or points (…, 3) from frame b to frame a."""
         R, p = self.rotation, self.translation
         if isinstance(x, Inertia):
             com = _times(R, x.com) + p
@@ -263,7 +268,7 @@ class SE3:
     __mul__ = act
 
     def act_inv(self, x: Any) -> Any:
-        """Converts from frame a to frame b; takes the same types as `act`."""
+        """Converts x from frame a to frame b; x has one of the types that `act` converts."""
         return self.inverse().act(x)
 
     def _broadcast(self) -> tuple[_Array, _Array]:
@@ -288,7 +293,9 @@ def exp3(w: ArrayLike) -> _Array:
 
 
 def log3(R: ArrayLike) -> _Array:
-    """Returns the rotation vector w, |w| ≤ π, with exp ŵ = R, by R's quaternion, which is exact near 0 and π."""
+    """Returns the rotation vector w, |w| ≤ π, with exp ŵ = R. It is computed from the quaternion of R, which is
+    accurate near 0 and π.
+    """
     q = quaternion(R)
     xyz, w = q[..., :3], q[..., 3:]
     n = np.linalg.norm(xyz, axis=-1, keepdims=True)
@@ -338,7 +345,7 @@ def Jlog3(w: ArrayLike) -> _Array:
 def Jexp6(m: ArrayLike | Motion) -> _Array:
     """Returns the right Jacobian of `exp6`, Σ (−m×)ᵏ / (k + 1)!, (…, 6, 6): [J, C; 0, J] with J of `Jexp3`.
 
-    C, the coupling of the linear part to the angular one, is summed in the closed form of Barfoot and Furgale (2014).
+    C couples the linear part to the angular part; it is computed by the closed formula of Barfoot and Furgale (2014).
     """
     x = m.vector if isinstance(m, Motion) else _shaped(m, "m", 6)
     A = -Motion.from_vector(x).action
@@ -363,14 +370,16 @@ def Jlog6(X: SE3 | ArrayLike) -> _Array:
 
 
 def quaternion(R: ArrayLike) -> _Array:
-    """Returns the quaternion (x, y, z, w), w ≥ 0, of a rotation, by its largest component (Shepperd 1978)."""
+    """Returns the quaternion (x, y, z, w), w ≥ 0, of a rotation. The largest component is computed first (Shepperd
+    1978).
+    """
     R = np.asarray(R, float)
     if R.shape[-2:] != (3, 3):
         raise ValueError(f"R: expected shape (…, 3, 3), found {R.shape}")
     a, b, c = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    # per row: four times the products of one component with all four
+    # each tuple has four times the products of one component with (x, y, z, w): the quaternion times a factor
     by_x, by_y = (1 + a - b - c, xy, xz, x), (xy, 1 - a + b - c, yz, y)
     by_z, by_w = (xz, yz, 1 - a - b + c, z), (x, y, z, 1 + a + b + c)
     products = np.stack([np.stack(row, -1) for row in (by_x, by_y, by_z, by_w)], -2)

@@ -8,27 +8,27 @@ Function(condyle_0:(q[7],v[7],a[7])->(tau[7]) External)
 >>> q, v = casadi.MX.sym("q", 7), casadi.MX.sym("v", 7)
 >>> damping = casadi.jacobian(rnea(q, v, 0), v)  # ∂τ/∂v, in closed form
 
-Each function computes with the library's own code: values, Jacobians with the zeros of the robot's tree, products with
-them, and the Hessian of λᵀf. The Hessian has a closed form for `rnea` and `aba`, and uses hyper-dual numbers for the
-other functions. Functions may be called from several threads at a time (`Function.map` with "thread").
+Each function computes with Condyle's compiled code: values, Jacobians J with the zeros of the robot's tree, products
+Jᵀλ, and the Hessian of λᵀf. The Hessian is computed by closed formulas for `rnea` and `aba`, and by hyper-dual numbers
+for the other functions. Functions may be called from several threads at a time (`Function.map` with "thread").
 
-With `states=N` a function takes N states, with a column for each, like `f.map(N)`. But it is one call, also for the
-Jacobian and the Hessian, and `rnea` and `aba` compute several states in SIMD lanes. Use it for direct collocation,
-where the number of points is known: it takes two to four times less time.
+With `states=N` a function takes N states, one in each column, like `f.map(N)`. But values, Jacobian and Hessian of all
+states are computed in one call, and `rnea` and `aba` compute several states in SIMD lanes. Use `states` for direct
+collocation, where the number of points is known: it takes two to four times less time.
 
 >>> many = condyle.casadi.rnea(arm, states=50)
 >>> many.size_in("q"), many.size_out("tau")
 ((7, 50), (7, 50))
 
-A position q has nq numbers. Quaternions and the points of a circle of continuous joints are first divided by their
-lengths, so exact derivatives with respect to all nq numbers exist; a length of 0 gives NaN. An optimisation must keep
-these lengths at 1 by a constraint, or integrate in the tangent space.
+A position q has nq numbers. The quaternions in q, and the pairs (cos, sin) of continuous joints, are first divided by
+their lengths. So exact derivatives with respect to all nq numbers exist; a length of 0 gives NaN. An optimisation must
+keep these lengths at 1 by a constraint, or integrate in the tangent space.
 
-A function exists only in the process that made it. A function that was saved or pickled, alone or inside another one,
-and is loaded, raises an error when it is called, with a line on the standard error: create it again. If the original is
-in the same process, it then raises the same error, because CasADi calls both by one name and they cannot be
-distinguished. At most 64 functions exist at a time, each used by any number of expressions; the same function of the
-same robot counts once.
+A function exists only in the process that made it. If a function is saved or pickled, alone or inside another function,
+and then loaded, calls of the loaded function raise an error and print a line to the standard error. Create the function
+again instead. If the original function is in the same process, its calls then raise the same error, because CasADi
+gives both functions one name and they cannot be distinguished. At most 64 functions exist at a time; any number of
+expressions may use each function. The same function of the same robot counts once.
 
 CasADi is an optional dependency: `pip install condyle[casadi]`.
 """
@@ -80,15 +80,15 @@ def _function(model: Model, function: str, states: int, **options: Any) -> "_cas
 
 
 def _external(name: str) -> "_casadi.Function":
-    """Returns the function of a held slot."""
+    """Returns the CasADi function of a slot that is held."""
     try:
         return _casadi.external(name, _condyle.__file__)
     finally:
-        _condyle._casadi_release(name)  # CasADi holds it now
+        _condyle._casadi_release(name)  # CasADi's function now holds the slot
 
 
 def rnea(model: Model, states: int = 1) -> "_casadi.Function":
-    """Returns the efforts τ = M(q) a + h(q, v) that accelerate a robot with a: (q, v, a) -> tau.
+    """Returns the function of inverse dynamics, τ = M(q) a + h(q, v): (q, v, a) -> tau.
 
     >>> tau = condyle.casadi.rnea(condyle.robots.arm7())(0.3, 0, 0)
     >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
@@ -98,7 +98,7 @@ def rnea(model: Model, states: int = 1) -> "_casadi.Function":
 
 
 def aba(model: Model, states: int = 1) -> "_casadi.Function":
-    """Returns the accelerations a of a robot under efforts τ: (q, v, tau) -> a.
+    """Returns the function of forward dynamics, the accelerations a under efforts τ: (q, v, tau) -> a.
 
     Raises `ModelError` if the inertia matrix is singular.
     """
@@ -106,12 +106,12 @@ def aba(model: Model, states: int = 1) -> "_casadi.Function":
 
 
 def crba(model: Model, states: int = 1) -> "_casadi.Function":
-    """Returns the inertia matrix: q -> M, (nv, nv), with the zeros of the robot's tree."""
+    """Returns the function of the inertia matrix: q -> M, (nv, nv), with the zeros of the robot's tree."""
     return _function(model, "crba", states)
 
 
 def forward_kinematics(model: Model, frame: str | int, states: int = 1) -> "_casadi.Function":
-    """Returns the placement of a frame in the world's frame: q -> (position, rotation), 3 numbers (m) and (3, 3).
+    """Returns the function of a frame's pose in the world's frame: q -> (position, rotation), 3 numbers (m) and (3, 3).
 
     >>> tool = condyle.casadi.forward_kinematics(condyle.robots.arm7(), "tool")
     >>> position, rotation = tool(0)
@@ -127,22 +127,25 @@ def frame_velocity(
     reference: Literal["local", "world", "local_world_aligned"] = "local",
     states: int = 1,
 ) -> "_casadi.Function":
-    """Returns the velocity of a frame, linear numbers first: (q, v) -> velocity, 6 numbers (m/s, rad/s)."""
+    """Returns the function of a frame's velocity, linear first: (q, v) -> velocity, 6 numbers (m/s, rad/s)."""
     return _function(model, "frame_velocity", states, frame=frame, reference=reference)
 
 
 def com(model: Model, states: int = 1) -> "_casadi.Function":
-    """Returns the centre of mass of the moving bodies in the world's frame: q -> com, 3 numbers (m)."""
+    """Returns the function of the moving bodies' centre of mass in the world's frame: q -> com, 3 numbers (m)."""
     return _function(model, "com", states)
 
 
 def centroidal_momentum(model: Model, states: int = 1) -> "_casadi.Function":
-    """Returns the momentum about the centre of mass, linear first: (q, v) -> momentum, 6 numbers (kg m/s, kg m²/s)."""
+    """Returns the function of the momentum about the centre of mass, linear first: (q, v) -> momentum, 6 numbers (kg
+    m/s, kg m²/s).
+    """
     return _function(model, "centroidal_momentum", states)
 
 
 def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint], states: int = 1) -> "_casadi.Function":
-    """Returns the accelerations under constraints and the constraint forces: (q, v, tau) -> (a, forces).
+    """Returns the function of the accelerations under constraints and the constraint forces: (q, v, tau) -> (a,
+    forces).
 
     The constraints keep their given targets. Raises `ModelError` as `ConstraintSet` does.
 
@@ -168,24 +171,26 @@ _Knot = (
 
 
 def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
-    """Returns the next state and the cost of a knot of an optimal control problem: (x, u) -> (next, cost).
+    """Returns the function of the next state and the cost at a knot of an optimal control problem: (x, u) -> (next,
+    cost).
 
-    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. Parts written in Python raise `ProblemError`:
-        write them as CasADi expressions instead.
-    t: the index of the knot, from 0 to N for a problem; for an action it selects the `costs_at`. None makes it an
-        argument, (x, u, t) -> (next, cost), so that one function serves all knots of an action: `f.map(N)(xs, us,
-        range(N))`.
+    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. If it contains Python functions, `ProblemError` is
+        raised: write them as CasADi expressions instead.
+    t: the index of the knot, from 0 to N for a problem; for an action, t selects the `costs_at`. With None, t is an
+        argument of the function, (x, u, t) -> (next, cost), so that one function serves all knots of an action:
+        `f.map(N)(xs, us, range(N))`.
 
-    A knot without controls, such as an impact, is x -> (next, cost); the terminal knot is x -> cost. Bounds on
-    controls, limits and the constraints of a `ConstrainedAction` are left to the optimiser. The rotations in x are
-    divided by their lengths, as in q of the other functions, and in `next` they have length 1. So multiple shooting, x⁺
-    = next(x, u), keeps the lengths at 1.
+    For a knot without controls, such as an impact, the function is x -> (next, cost); for the terminal knot it is x ->
+    cost. Bounds on controls, limits and the constraints of a `ConstrainedAction` are not included: give them to the
+    optimiser. Quaternions and pairs (cos, sin) in x are divided by their lengths, as in the other functions; in `next`
+    they have length 1. So multiple shooting, x⁺ = next(x, u), keeps the lengths at 1.
 
-    First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. The Hessian of a robot's cost
-    is Gauss–Newton's, w (∂r)ᵀ a″ ∂r; for an `Lqr` and a `Unicycle` it is exact. The Hessian of the next state is exact
-    for these two, and for `FreeDynamics` and `InverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and
-    Runge–Kutta steps are treated as linear in the tangent space of the state. The optimum is the same; an optimiser may
-    need more iterations.
+    First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. For a robot, the Hessian of the
+    cost is the Gauss–Newton approximation w (∂r)ᵀ a″ ∂r, with residual r and activation a; for an `Lqr` and a
+    `Unicycle` it is exact. The Hessian of the next state is exact for `Lqr` and `Unicycle`, and for `FreeDynamics` and
+    `InverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are treated as linear in the
+    tangent space of the state. An approximate Hessian does not change the optimum, but an optimiser may need more
+    iterations.
 
     >>> import condyle, condyle.casadi
     >>> from condyle.optimal import Cost, FreeDynamics, Residual
@@ -207,7 +212,7 @@ def action(
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
 ) -> Action:
-    """Returns an `Action` of `condyle.optimal` from expressions, with their exact derivatives, computed for all knots
+    """Converts CasADi expressions to an `Action` of `condyle.optimal`, with exact derivatives, computed for all knots
     at once.
 
     x, u: the symbols of the state and of the control; u is None at the terminal knot.
@@ -257,24 +262,24 @@ def action(
 
 
 class _Mapped:
-    """A function whose arguments have a row per call; it returns an array (rows, m, n) for each of its results."""
+    """A CasADi function of arrays with one row for each knot. It returns an array (rows, m, n) for each result."""
 
     def __init__(self, kind: Any, arguments: list[Any], results: list[Any]) -> None:
         results = [_casadi.densify(kind(result)) for result in results]
         self._function = _casadi.Function("knot", arguments, results)
         self._shapes = [result.shape for result in results]
         self._buffers: dict[int, Any] = {}
-        self._lock = threading.Lock()  # a buffer serves one call at a time
+        self._lock = threading.Lock()  # only one call at a time may use a buffer
 
     def __call__(self, *arguments: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         rows = len(arguments[0])
-        # CasADi stores matrices by columns: one row of numbers for each knot
+        # n before m, because CasADi stores matrices by columns
         results = [np.empty((rows, n, m)) for m, n in self._shapes]
         with self._lock:
             if rows not in self._buffers:
                 self._buffers[rows] = self._function.map(rows).buffer()
             buffer, call = self._buffers[rows]
-            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # kept alive until the call
+            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # kept alive until the call has ended
             for k, argument in enumerate(inputs):
                 buffer.set_arg(k, argument.data)
             for k, result in enumerate(results):

@@ -1,4 +1,5 @@
-"""Robots as straight-line code: compiled by the system's C compiler and called with arrays, or as text.
+"""Generates straight-line code for a robot's functions: as text, or compiled by the system's C compiler and called with
+arrays.
 
 >>> import condyle, condyle.codegen
 >>> arm = condyle.robots.arm7()
@@ -8,13 +9,14 @@
 True
 
 The library's algorithms run once on numbers that record how they were computed. Constants of the robot are folded,
-zeros are dropped, and each value is computed once. The result has no loops and no branches. It is a function of one
-robot, and later changes of the model do not affect it.
+zeros are dropped, and each value is computed once. The generated code has no loops and no branches. It computes a
+single robot; a changed copy of the model needs new code.
 
 `functions` lists the available names. Arguments and results are the same as for the functions of `condyle` with these
-names. There are two additional functions. 'frames' takes q and v and returns, for each frame, rotation, translation,
-velocity (of its origin, in the axes of the world), Jacobian J and its rate dJ. 'centroidal' returns com, com_velocity,
-hg, Jcom, Ag and dAg. External forces, if requested, are (nbodies − 1, 6), without the world's row.
+names. There are two additional functions. 'frames' takes q and v and returns for each frame the rotation, the
+translation, the velocity of the origin along the axes of the world, the Jacobian J and its rate dJ. 'centroidal'
+returns com, com_velocity, hg, Jcom, Ag and dAg. External forces, if requested, have the shape (nbodies − 1, 6), without
+a row for the world.
 """
 
 from collections import namedtuple
@@ -70,8 +72,9 @@ def source(
 ) -> dict[str, str]:
     """Generates the code of functions of a robot: a dictionary from file names to texts.
 
-    language: 'c' or 'c-float'; 'c-4', 'c-8', 'c-float-4' or 'c-float-8' for vectors of states; 'c-casadi' for CasADi's
-        `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: the frames of the function 'frames';
+    language: 'c' or 'c-float'; 'c-4', 'c-8', 'c-float-4' or 'c-float-8' for vectors of 4 or 8 states; 'c-casadi' for
+        CasADi's `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: the frames of the function
+        'frames';
         constraints: the constraints of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives;
         external_forces: whether dynamics takes external forces; inputs: which of 'inertia', 'armature' and 'gravity'
         are arguments instead of constants. partitions: the number of threads per state in CUDA, as for
@@ -99,7 +102,7 @@ def source(
 
 
 class Compiled:
-    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of its arrays.
+    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of its arguments and results.
 
     It may be called from several threads at a time.
     """
@@ -120,9 +123,9 @@ class Compiled:
         return f"{self.name}({', '.join(self.inputs)}) -> {', '.join(self.outputs)}"
 
     def __call__(self, *arguments: ArrayLike) -> Any:
-        """Computes the results for one state, or for many if the arguments have one more axis in front.
+        """Computes the results for one state, or for many states if the arguments have one more axis in front.
 
-        One result is an array; several are a named tuple.
+        Returns an array, or a named tuple if there are several results.
         """
         if len(arguments) != len(self.inputs):
             raise TypeError(f"{self!r}: expected {len(self.inputs)} arguments, found {len(arguments)}")
@@ -164,11 +167,11 @@ def compile(  # noqa: A001
 
     name: one of `functions`; frames, constraints, external_forces, inputs: as for `source`. compiler: a command that
         understands the options of GCC and Clang; by default the environment variable CC, else `cc`. cache: a folder; by
-        default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`. The key of an entry consists of the
-        robot, the options, the version of condyle, the compiler and the processor.
+        default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`. A cached function is used only for the
+        same robot, options, version of condyle, compiler and processor.
 
-    Raises `RuntimeError` if the compiler is missing or fails; `ModelError` if the inertia matrix is singular and its
-    inverse is needed, or a frame does not exist.
+    Raises `RuntimeError` if the compiler is missing or fails, and `ModelError` if a frame does not exist or the
+    function needs the inverse of a singular inertia matrix.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> feet = condyle.codegen.compile(quadruped, "frames", frames=["LF_foot"])
@@ -208,7 +211,7 @@ def compile(  # noqa: A001
 
 
 def _processor() -> str:
-    """Returns a text that differs for processors for which the compiler generates different instructions."""
+    """Returns a text that identifies the processor, as far as the compiler's instructions depend on it."""
     import platform
 
     try:
@@ -227,7 +230,7 @@ def _build(
     library: Path,
     about: Path,
 ) -> None:
-    """Compiles the files, with a function that loops over many states, into the cache."""
+    """Compiles the files, and a function that loops over many states, and writes the library to the cache."""
     import json
     import os
     import shlex
@@ -256,4 +259,4 @@ def _build(
         told = Path(folder) / "about.json"
         told.write_text(json.dumps({"inputs": inputs, "outputs": outputs}), encoding="utf-8")
         os.replace(told, about)
-        os.replace(made, library)  # last: if the library exists, the other file exists too
+        os.replace(made, library)  # the library is moved last: if it exists, the other file exists, too

@@ -1,8 +1,8 @@
-"""Numbers of other libraries: orders, frames and signs, in both directions.
+"""Conversion of numbers to the conventions of other libraries and back: orders, frames and signs.
 
-Condyle's own conventions are the same as Pinocchio's. Spatial vectors have their linear part first, quaternions are x,
-y, z, w, and a body's velocity is in its own axes. An external force acts on a body at its origin, in its axes. Each
-function here takes arrays with any number of axes in front, so batches need no loop.
+Condyle has the same conventions as Pinocchio. Spatial vectors have their linear part first, quaternions are x, y, z, w,
+and the velocity of a body is along the body's axes. An external force acts at the body's origin, along the body's axes.
+Each function of this module takes arrays with any number of additional axes in front, so batches need no loop.
 
 >>> import condyle, numpy as np
 >>> from condyle import conventions
@@ -50,7 +50,8 @@ _Array = NDArray[np.float64]
 
 
 def swap_halves(x: ArrayLike, axis: int = -1) -> _Array:
-    """Exchanges the linear and angular halves of spatial vectors along an axis of length 6; it is its own inverse.
+    """Exchanges the linear and angular halves of spatial vectors along an axis of length 6. The function is its own
+    inverse.
 
     A Jacobian of shape (6, nv) is swapped along axis -2. Raises a ValueError if the axis has another length.
     """
@@ -61,7 +62,9 @@ def swap_halves(x: ArrayLike, axis: int = -1) -> _Array:
 
 
 def swap_blocks(X: ArrayLike) -> _Array:
-    """Exchanges the halves on both sides of matrices (…, 6, 6) that map spatial vectors to spatial vectors."""
+    """Exchanges the linear and angular halves of the rows and of the columns of matrices (…, 6, 6), which map spatial
+    vectors to spatial vectors.
+    """
     return swap_halves(swap_halves(X, -1), -2)
 
 
@@ -76,7 +79,9 @@ def xyzw(quaternion: ArrayLike) -> _Array:
 
 
 def rotation(quaternion: ArrayLike) -> _Array:
-    """Returns R (…, 3, 3) of unit quaternions x, y, z, w; it maps coordinates in the body to those in its parent."""
+    """Returns the rotation matrices R, (…, 3, 3), of unit quaternions x, y, z, w. R maps coordinates in the body to
+    coordinates in the parent.
+    """
     Q = _last(quaternion, "quaternion", 4)
     xyz, w = Q[..., :3], Q[..., 3]
     outer = xyz[..., :, None] * xyz[..., None, :]
@@ -89,8 +94,8 @@ def wrench_to_body(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 0
     """Converts forces and moments (linear, angular), in the world's axes about `point`, to the form of `f_ext`.
 
     f = Rᵀ f_w, n = Rᵀ (n_w + (point − p) × f_w), where (R, p) is the body's pose `oXb`, (…, 4, 4), in the world. For a
-    wrench about the world's origin omit `point`. Drake's forces and MuJoCo's `xfrc_applied` are about a point of the
-    body; give its position in the world.
+    wrench about the world's origin, omit `point`. Drake's forces and MuJoCo's `xfrc_applied` act at a point of the
+    body: give the position of this point in the world.
     """
     R, p = _pose(oXb)
     f, n = _halves(wrench, "wrench")
@@ -106,7 +111,8 @@ def wrench_to_world(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 
 
 
 def twist_to_body(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = None) -> _Array:
-    """Converts velocities (linear, angular) of the body's point at `point`, in the world's axes, to the body's frame.
+    """Converts velocities (linear, angular), along the world's axes, to the body's frame. The linear part is the
+    velocity of the body's point at `point`.
 
     v = Rᵀ (v_w + ω_w × (p − point)), ω = Rᵀ ω_w. Without a point the linear part is the velocity of the body's origin
     (Pinocchio's LOCAL_WORLD_ALIGNED); the world's origin as the point gives Pinocchio's WORLD.
@@ -119,7 +125,9 @@ def twist_to_body(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = No
 
 
 def twist_to_world(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = None) -> _Array:
-    """Converts velocities in the body's frame to the world's axes at `point`: the inverse of `twist_to_body`."""
+    """Converts velocities in the body's frame to velocities of the body's point at `point`, along the world's axes: the
+    inverse of `twist_to_body`.
+    """
     R, p = _pose(oXb)
     v, omega = (_turn(R, half) for half in _halves(twist, "twist"))
     if point is not None:
@@ -128,15 +136,17 @@ def twist_to_world(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = N
 
 
 def classical_acceleration(a: ArrayLike, v: ArrayLike) -> _Array:
-    """Returns r̈ = a + ω × v and ω̇ of a body's origin, from its spatial acceleration a and velocity v, in the same
-    axes.
+    """Returns the classical acceleration (r̈, ω̇) of a body's origin, with r̈ = a + ω × v, from the spatial
+    acceleration a and the velocity v along the same axes.
     """
     (linear, angular), (velocity, omega) = _halves(a, "a"), _halves(v, "v")
     return np.concatenate([linear + np.cross(omega, velocity), angular + np.zeros_like(omega)], -1)
 
 
 def spatial_acceleration(a: ArrayLike, v: ArrayLike) -> _Array:
-    """Returns the spatial acceleration from r̈, ω̇ and the velocity v: the inverse of `classical_acceleration`."""
+    """Returns the spatial acceleration from the classical acceleration (r̈, ω̇) and the velocity v: the inverse of
+    `classical_acceleration`.
+    """
     (linear, angular), (velocity, omega) = _halves(a, "a"), _halves(v, "v")
     return np.concatenate([linear - np.cross(omega, velocity), angular + np.zeros_like(omega)], -1)
 
@@ -145,17 +155,17 @@ class FreeJoint(NamedTuple):
     """A library's conventions for the coordinates of a freely moving body."""
 
     position_first: bool
-    """Whether q = [position, quaternion]; else [quaternion, position]."""
+    """Whether q is [position, quaternion]; else it is [quaternion, position]."""
     w_last: bool
-    """Whether quaternions are x, y, z, w; else w, x, y, z."""
+    """Whether quaternions are x, y, z, w; else they are w, x, y, z."""
     linear_first: bool
-    """Whether v = [linear, angular]; else [angular, linear]."""
+    """Whether v is [linear, angular]; else it is [angular, linear]."""
     linear: Literal["body", "world"]
     """The axes of the linear velocity."""
     angular: Literal["body", "world"]
     """The axes of the angular velocity."""
     angle: bool
-    """Whether a revolute joint without limits has its angle as position, instead of cosine and sine."""
+    """Whether the position of a revolute joint without limits is its angle; else it is cosine and sine."""
 
 
 LIBRARIES = {
@@ -170,14 +180,14 @@ LIBRARIES = {
 class Coordinates:
     """Conversion of a robot's q, v, a and τ to another library's coordinates, and back.
 
-    library: a name in `LIBRARIES`, or a `FreeJoint` that describes one. Joints keep Condyle's order; if the other
-        library numbers them differently, permute by names. Spherical joints have their quaternion in the library's
-        order, and angular velocities in the child's axes, as in MuJoCo and RigidBodyDynamics.jl. A joint that the
-        library represents in another form (planar and spherical ones in Drake, planar ones in all except Pinocchio) is
-        refused with a ValueError that names it.
+    library: a name in `LIBRARIES`, or a `FreeJoint` that describes a library. Joints keep Condyle's order; if the other
+        library numbers joints differently, permute them by name. Spherical joints have their quaternion in the
+        library's order, and their angular velocity along the axes of the child body, as in MuJoCo and
+        RigidBodyDynamics.jl. Some libraries represent joints in another form: Drake planar and spherical joints, all
+        except Pinocchio planar joints. For such a joint, a ValueError with its name is raised.
 
-    Efforts follow from power: τᵀ v is the same number in both. Accelerations are time derivatives of velocities; so the
-    derivative of a velocity in the world's axes is a classical acceleration.
+    Efforts follow from power: τᵀ v is the same number in both libraries. Accelerations are time derivatives of
+    velocities. So if a library has velocities along the world's axes, its accelerations are classical.
     """
 
     def __init__(self, model: Model, library: str | FreeJoint) -> None:
@@ -196,7 +206,8 @@ class Coordinates:
         if any(model.mimics):
             raise ValueError("a robot whose joints follow others has fewer coordinates than there")
         self._joints: list[tuple[str, slice, slice, slice]] = []
-        """For each joint: kind, our positions, their positions, and velocities."""
+        """For each joint: its kind, its positions in Condyle and in the library, and its velocities (the same in both).
+        """
         nq = 0
         columns = zip(model.joint_types, model.idx_qs, model.nqs, model.idx_vs, model.nvs, strict=True)
         for kind, at_q, nq_here, at_v, nv_here in columns:
@@ -204,10 +215,10 @@ class Coordinates:
             self._joints.append((kind, _run(at_q, nq_here), _run(nq, there), _run(at_v, nv_here)))
             nq += there
         self.nq = nq
-        """The number of the library's positions."""
+        """The number of positions in the library's coordinates."""
 
     def position(self, q: ArrayLike) -> _Array:
-        """Returns the library's positions, (…, nq there), from ours, (…, nq)."""
+        """Returns the library's positions, (…, `self.nq`), from Condyle's positions, (…, nq)."""
         q = _last(q, "q", self.model.nq)
         theirs = np.empty((*q.shape[:-1], self.nq))
         for kind, mine, its, _ in self._joints:
@@ -224,7 +235,7 @@ class Coordinates:
         return theirs
 
     def position_from(self, q: ArrayLike) -> _Array:
-        """Returns our positions from the library's."""
+        """Returns Condyle's positions from the library's positions."""
         q = _last(q, "q", self.nq)
         ours = np.empty((*q.shape[:-1], self.model.nq))
         for kind, mine, its, _ in self._joints:
@@ -242,30 +253,30 @@ class Coordinates:
         return ours
 
     def velocity(self, q: ArrayLike, v: ArrayLike) -> _Array:
-        """Returns the library's velocities from our q and v."""
+        """Returns the library's velocities from Condyle's q and v."""
         return self._out(_last(q, "q", self.model.nq), _last(v, "v", self.model.nv))
 
     def velocity_from(self, q: ArrayLike, v: ArrayLike) -> _Array:
-        """Returns our velocities from the library's positions and velocities."""
+        """Returns Condyle's velocities from the library's positions and velocities."""
         return self._back(self.position_from(q), _last(v, "v", self.model.nv))
 
     def acceleration(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> _Array:
-        """Returns the library's accelerations from our q, v and a: d(R v)/dt = R (v̇ + ω × v)."""
+        """Returns the library's accelerations from Condyle's q, v and a: d(R v)/dt = R (v̇ + ω × v)."""
         q, v, a = _last(q, "q", self.model.nq), _last(v, "v", self.model.nv), _last(a, "a", self.model.nv)
         return self._out(q, self._shifted(v, a, 1.0))
 
     def acceleration_from(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> _Array:
-        """Returns our accelerations from the library's positions, velocities and accelerations."""
+        """Returns Condyle's accelerations from the library's positions, velocities and accelerations."""
         ours = self.position_from(q)
         v, a = self._back(ours, _last(v, "v", self.model.nv)), self._back(ours, _last(a, "a", self.model.nv))
         return self._shifted(v, a, -1.0)
 
     def effort(self, q: ArrayLike, tau: ArrayLike) -> _Array:
-        """Returns the library's efforts from our q and τ: τᵀ v is the same in both, so only the axes change."""
+        """Returns the library's efforts from Condyle's q and τ: τᵀ v is the same in both, so only the axes change."""
         return self._out(_last(q, "q", self.model.nq), _last(tau, "tau", self.model.nv))
 
     def effort_from(self, q: ArrayLike, tau: ArrayLike) -> _Array:
-        """Returns our efforts from the library's positions and efforts."""
+        """Returns Condyle's efforts from the library's positions and efforts."""
         return self._back(self.position_from(q), _last(tau, "tau", self.model.nv))
 
     def _free(self) -> Iterator[tuple[slice, slice]]:

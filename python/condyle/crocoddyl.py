@@ -1,18 +1,18 @@
-"""Solves Crocoddyl's problems here, and provides our dynamics to Crocoddyl.
+"""Solves Crocoddyl's problems with Condyle's solvers, and provides Condyle's dynamics to Crocoddyl.
 
-An existing `crocoddyl.ShootingProblem` is solved by our solvers in two lines::
+An existing `crocoddyl.ShootingProblem` is solved by Condyle's solvers in two lines::
 
     problem = condyle.crocoddyl.problem(shooting_problem)
     solution = condyle.optimal.Fddp(problem, project_warm_start=False).solve(xs, us)
 
-where xs and us are arrays of Crocoddyl's states and controls. Numbers, their order and the iterates are the same as in
-Crocoddyl; gains have the opposite sign: u = ū + α k + K (x ⊖ x̄). `project_warm_start=False` matters if controls are
-bounded: it keeps a warm start outside the bounds, as Crocoddyl does. In the other direction,
-`differential_action(model)` is a `crocoddyl.DifferentialActionModelAbstract` that computes with our dynamics, for
-Crocoddyl's own solvers.
+where xs and us are arrays of Crocoddyl's states and controls. The numbers of states and controls, their order, and the
+iterates are the same as in Crocoddyl. Gains have the opposite sign: u = ū + α k + K (x ⊖ x̄).
+`project_warm_start=False` matters only if controls are bounded: it keeps a warm start outside the bounds, as Crocoddyl
+does. In the other direction, `differential_action(model)` returns a `crocoddyl.DifferentialActionModelAbstract` for
+Crocoddyl's solvers, which computes with Condyle's dynamics.
 
-The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. This package does not install Crocoddyl:
-it is on PyPI, version 3.2.1 for Pinocchio 4.0.
+The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. Condyle does not install Crocoddyl: PyPI
+has version 3.2.1, for Pinocchio 4.0.
 """
 
 import warnings
@@ -62,17 +62,17 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
     dynamics, forward and inverse; impulses; LQR; the unicycle. They may contain: actuation models τ = S u with constant
     S; contacts of 1, 2, 3 and 6 dimensions; all residuals except ResidualModelContactControlGrav (which ignores the
     forces in version 3.2.1); quadratic, weighted and smooth activations and barriers; and constraints of residuals. A
-    knot with other contents, such as an action or a cost that is written in Python, is computed by Crocoddyl, called by
-    our solver; a warning names these contents.
+    knot with other contents, such as an action or a cost that is written in Python, is computed by Crocoddyl, which
+    Condyle's solver calls; a warning names these contents.
 
-    Constraints become limits, which `AugmentedLagrangian` enforces; so do the equations of inverse dynamics.
+    Constraints and the equations of inverse dynamics become limits, which `AugmentedLagrangian` enforces.
 
-    shooting_problem: the problem; it is read, and kept only for knots that Crocoddyl computes.
-    bounded: whether to use bounds of controls. SolverFDDP and SolverDDP ignore them, SolverBoxFDDP and SolverBoxDDP use
-        them.
-    strict: whether contents without a counterpart here are an error.
+    shooting_problem: the problem; its data are copied, and it is kept only for knots that Crocoddyl computes.
+    bounded: whether to use the bounds of controls. Crocoddyl's SolverFDDP and SolverDDP ignore bounds, SolverBoxFDDP
+        and SolverBoxDDP use them.
+    strict: whether contents without a counterpart in Condyle are an error.
 
-    Raises `ProblemError` for contents without a counterpart, if strict.
+    Raises `ProblemError` for contents without a counterpart in Condyle, if `strict` is set.
     """
     reader = _Reader(bounded, strict)
     running: list[_Made] = []
@@ -82,7 +82,7 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
 
 
 class _Reader:
-    """Converts actions, each robot and each action once."""
+    """Converts actions; each robot and each action is converted once."""
 
     def __init__(self, bounded: bool, strict: bool) -> None:
         self.bounded, self.strict = bounded, strict
@@ -91,7 +91,9 @@ class _Reader:
         self.named: set[str] = set()
 
     def action(self, theirs: Any, end: bool) -> _Made:
-        """Converts an action. Keeps a reference to it, since after its end its id could be reused by another object."""
+        """Converts an action. Keeps a reference to the action, since a deleted action's id could be reused by another
+        object.
+        """
         key = (id(theirs), end)
         if key not in self.actions:
             try:
@@ -151,7 +153,7 @@ class _Reader:
 
     @staticmethod
     def _at_each_node(bound: _Array | None, nu: int) -> _Array | None:
-        """Returns the bounds if they hold at all nodes of a polynomial in time."""
+        """Returns the bounds of one node, if all nodes of a control polynomial have the same bounds."""
         if bound is None or len(bound) == nu:
             return bound
         first: _Array = bound[:nu]
@@ -160,8 +162,8 @@ class _Reader:
         return first
 
     def of_a_robot(self, theirs: Any, dt: float | None, rest: dict[str, Any]) -> _Made:
-        """Converts a differential model of a robot to a knot, with further arguments `rest`; a terminal knot if dt is
-        None.
+        """Converts a differential model of a robot to a knot, or to a terminal knot if dt is None. `rest` are further
+        arguments of the knot.
         """
         name = kind(theirs)
         if name not in _FORWARD + _INVERSE:
@@ -187,7 +189,8 @@ class _Reader:
         return ContactDynamics(robot.model, contacts, dt, costs, theirs.JMinvJt_damping, **rest)
 
     def _limits(self, terms: Terms, theirs: Any, held: list[Any]) -> Any:
-        """Returns the constraints of a model, except its built-in ones: for efforts, contacts and their forces."""
+        """Converts the constraints of a model, except its built-in constraints on efforts, contacts and contact forces.
+        """
         own = {"tau"} | {f"{item.name}_{what}" for item in held for what in ("acc", "force")}
         manager = theirs.constraints
         if manager is None:
@@ -207,7 +210,7 @@ class _Reader:
         return ImpulseDynamics(robot.model, contacts, costs, theirs.r_coeff, theirs.JMinvJt_damping, limits)
 
     def _called(self, theirs: Any, end: bool) -> Action:
-        """Returns an action that Crocoddyl computes."""
+        """Returns an action whose functions call Crocoddyl."""
         data, state = theirs.createData(), theirs.state
         nu = 0 if end else theirs.nu
 
@@ -233,7 +236,7 @@ class _Reader:
         return Action(state.nx, nu, calc, calc_diff, lower, upper, self._space(state))
 
     def _space(self, state: Any) -> Any:
-        """Returns the space of states, for actions that Crocoddyl computes."""
+        """Returns the space of states for actions whose functions call Crocoddyl."""
         if kind(state) == "StateVector":
             return None
         try:
@@ -243,14 +246,15 @@ class _Reader:
 
 
 def differential_action(model: Any) -> Any:
-    """Returns a `crocoddyl.DifferentialActionModelAbstract` equivalent to `model`, with our dynamics and costs.
+    """Returns a `crocoddyl.DifferentialActionModelAbstract` equivalent to `model`, with Condyle's dynamics and costs.
 
-    Use it with the solvers and the integrators of Crocoddyl: `IntegratedActionModelEuler(differential_action(model),
-    dt)`. Later changes of `model` do not affect it. Use one thread: Crocoddyl calls it through Python.
+    Use the result with the solvers and the integrators of Crocoddyl:
+    `IntegratedActionModelEuler(differential_action(model), dt)`. Later changes of `model` do not affect the result. Use
+    one thread, because Crocoddyl calls the result through Python.
 
     model: a `DifferentialActionModelFreeFwdDynamics` or `DifferentialActionModelContactFwdDynamics`.
 
-    Raises `ProblemError` with the names of contents without a counterpart here.
+    Raises `ProblemError` with the names of contents without a counterpart in Condyle.
     """
     if kind(model) not in _FORWARD:
         raise ProblemError(f"model: expected one of {' and '.join(_FORWARD)}, found {kind(model)}")
@@ -258,7 +262,7 @@ def differential_action(model: Any) -> Any:
         raise ProblemError(f"{kind(model)} (with constraints) has no counterpart here")
     reader = _Reader(bounded=False, strict=True)
     try:
-        # in a step of one second the change of v is q̈, and the added cost is the cost rate
+        # in a step of one second, the change of v is q̈, and the cost of the step is the cost per second
         running, end = (reader.of_a_robot(model, dt, {}) for dt in (1.0, None))
     except NoCounterpartError as missing:
         raise ProblemError(f"{missing} has no counterpart here") from None
@@ -281,23 +285,23 @@ class _OnOurs:
             self.u_lb, self.u_ub = theirs.u_lb, theirs.u_ub
 
     def calc(self, data: Any, x: _Array, u: _Array | None = None) -> None:
-        """Computes q̈ and the cost, or the cost of a terminal model."""
+        """Computes q̈ and the cost; for a terminal model (u is None), only the cost."""
         value = self._ours.evaluate(np.array([x, x]), [np.zeros(self.nu) if u is None else u])
         if u is not None:
             data.xout[:] = value.accelerations[0]
         data.cost = value.costs[0 if u is not None else 1]
 
     def calcDiff(self, data: Any, x: _Array, u: _Array | None = None) -> None:
-        """Computes the derivatives of both."""
+        """Computes the derivatives of q̈ and of the cost."""
         nodes = self._ours.derivatives(np.array([x, x]), [np.zeros(self.nu) if u is None else u])
         node: Any = nodes[0 if u is not None else 1]
         data.Lx[:], data.Lxx[:, :] = node.q, node.Q
         if u is None:
             return
         nv = self.state.nv
-        data.Fx[:, :] = node.A[nv:]  # derivative of v⁺ = v + q̈
+        data.Fx[:, :] = node.A[nv:]  # the derivative of v⁺ = v + q̈, minus the derivative of v
         data.Fx[:, nv:] -= np.eye(nv)
-        one = self.nu == 1  # Crocoddyl represents a column as a vector
+        one = self.nu == 1  # Crocoddyl represents a matrix with one column as a vector
         data.Fu[:] = node.B[nv:, 0] if one else node.B[nv:]
         data.Lxu[:] = node.S[:, 0] if one else node.S
         data.Lu[:], data.Luu[:] = node.r, (node.R[0] if one else node.R)

@@ -8,15 +8,17 @@
     d = aba(q, v, tau)           # a named tuple of tensors; d.da_dq has the shape (7, 7, 100_000)
     aba(q, v, tau, out=d)        # into the same memory
 
-A thread computes one state. It computes only a part of its results if all of them need too many registers and there are
-few states. The numbers of all states are contiguous for each entry: an argument of k numbers for n states is an array
-of shape (k, n) in row order. Its transpose, of shape (n, k) and with strides (1, n), is accepted too. If the first
-argument has this form, the results also have the states along the first axis. Nothing is copied: other layouts and
-dtypes are refused. Results are arrays of the library of the first argument.
+A thread computes one state. If the results need too many registers and there are few states, several threads share a
+state, and each of them computes some of the results. An argument of k numbers for n states is an array of shape (k, n)
+in row order: for each of the k numbers, the values of all states are contiguous. The transpose of such an array, with
+shape (n, k) and strides (1, n), is accepted, too. If the first argument has this form, the results also have the states
+along the first axis. No array is copied: other layouts and dtypes are errors. Results are arrays of the library of the
+first argument.
 
-CUDA itself need not be installed, only at run time two parts: the driver, which comes with the GPU, and NVIDIA's
-run-time compiler (`pip install 'condyle[cuda]'`, or the system's). The environment variables `CONDYLE_CUDA_LIBRARY` and
-`CONDYLE_NVRTC_LIBRARY` can name other files. All work uses the device's primary context, which other libraries use too.
+CUDA itself need not be installed. Two libraries are needed at run time: the driver, which is installed with the GPU,
+and NVIDIA's run-time compiler (`pip install 'condyle[cuda]'`, or a compiler of the system). The environment variables
+`CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY` can name other files. All work uses the primary context of the
+device, which other libraries also use.
 """
 
 import os
@@ -39,7 +41,7 @@ __all__ = ["DeviceArray", "Kernel", "array", "compile", "devices", "ptx"]
 
 _LANGUAGES = {"float64": "cuda", "float32": "cuda-float"}
 _PLACES = 2**31 - 1
-"""Maximum number of elements of an array: kernels use indices of 32 bits."""
+"""Maximum number of elements of an array, because kernels use indices of 32 bits."""
 
 
 def devices() -> list[str]:
@@ -51,7 +53,7 @@ def devices() -> list[str]:
 
 
 def array(numbers: ArrayLike, dtype: Literal["float64", "float32"] | None = None, *, device: int = 0) -> DeviceArray:
-    """Copies a NumPy array, or anything that NumPy understands, to the memory of a device, in row order.
+    """Copies a NumPy array, or an object that NumPy can convert to an array, to the memory of a device, in row order.
 
     Raises `RuntimeError` if the driver is missing, or memory is insufficient.
     """
@@ -75,17 +77,21 @@ class _Array:
         self.shape: tuple[int, ...] = (rows,) if columns == 1 else (rows, columns)
 
     def in_memory(self, n: int) -> tuple[int, ...]:
-        """Returns the shape in row order in memory, where matrices are stored by columns."""
+        """Returns the shape of the array as it is stored, in row order: matrices are stored by columns, so their axes
+        are reversed.
+        """
         return (*reversed(self.shape), n)
 
     def turned(self, made: Any, states_first: bool) -> Any:
-        """Returns a view in which matrices have rows first, and states have the same axis as in the arguments."""
+        """Returns a view in which the rows of a matrix are before its columns, and states have the same axis as in the
+        arguments.
+        """
         if self.columns == 1:
             return made.swapaxes(0, 1) if states_first else made
         return made.swapaxes(0, 2) if states_first else made.swapaxes(0, 1)
 
     def states(self, given: View, dtype: str, n: int | None) -> tuple[int, bool]:
-        """Returns the number of states of an array, and whether they are along its first axis."""
+        """Returns the number of states of an array, and whether the states are along its first axis."""
         if given.dtype != dtype:
             raise ValueError(f"{self.name}: expected {dtype}, found {given.dtype}")
         for shape in dict.fromkeys(((self.size,), self.shape)):
@@ -110,8 +116,8 @@ class _Array:
 
 
 class Kernel:
-    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arrays and their shapes for one
-    state.
+    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arguments and results, and their
+    shapes for one state.
 
     It may be called from several threads at a time.
     """
@@ -138,7 +144,7 @@ class Kernel:
 
     @property
     def partitions(self) -> int:
-        """The number of threads that can share a state, each computing some of the results."""
+        """The number of threads that can share a state. Each of them computes some of the results."""
         return self._function.partitions
 
     @property
@@ -155,17 +161,19 @@ class Kernel:
         return f"{self.name}({', '.join(self.inputs)}) -> {', '.join(self.outputs)}"
 
     def __call__(self, *arguments: Any, out: Any = None, stream: Any = None) -> Any:
-        """Computes the results for n states. Returns at once; users of the results wait if necessary.
+        """Computes the results for n states. Returns before the computation has ended; functions that use the results
+        wait if necessary.
 
-        arguments: arrays on the device, of any library that supports DLPack or `__cuda_array_interface__`. One result
-            is an array, several are a named tuple. Their shape is (k, n) or, for matrices, (rows, columns, n); n comes
-            first if it does in the first argument. They are allocated anew, which takes time. In a loop pass `out`, an
-            array, or a sequence of arrays, of the same shapes, which is filled and returned. Matrices in it may also be
-            (rows × columns, n), column by column.
+        arguments: arrays on the device, of any library that supports DLPack or `__cuda_array_interface__`. The result
+            is an array, or a named tuple if there are several results. The shape of a result is (k, n) or, for
+            matrices, (rows, columns, n). If the states are along the first axis of the first argument, they are also
+            along the first axis of the results. New arrays are allocated, which takes time. In a loop, pass `out`
+            instead: one array of the same shape, or a sequence of arrays for several results. It is filled and
+            returned. A matrix in `out` may also have the shape (rows × columns, n), column by column.
 
-        stream: the stream for the work: a stream of PyTorch or CuPy, or its address. The default is the stream that
-            PyTorch or CuPy currently uses if the first argument is theirs, else the legacy default stream. Read `out`
-            on this stream, or on one that waits for it.
+        stream: the stream for the work: a stream of PyTorch or CuPy, or its address. If the first argument is an array
+            of PyTorch or CuPy, the default is the current stream of this library, else the legacy default stream. Read
+            `out` on the same stream, or on a stream that waits for it.
         """
         if len(arguments) != len(self._inputs):
             raise TypeError(f"{self!r}: expected {len(self._inputs)} arguments, found {len(arguments)}")
@@ -195,7 +203,9 @@ class Kernel:
         return results[0] if self._result is None else self._result(*results)
 
     def _room(self, out: list[Any], n: int, stream: int, inputs: list[View]) -> list[View]:
-        """Checks the arrays for the results: they must be writable, and share no memory with others."""
+        """Checks the arrays for the results: they must be writable, and must not share memory with each other or with
+        arguments.
+        """
         if len(out) != len(self._outputs):
             raise TypeError(f"{self!r}: out: expected {len(self._outputs)} arrays, found {len(out)}")
         size = self.dtype.itemsize * n
@@ -215,8 +225,8 @@ class Kernel:
         return views
 
     def _after(self, stream: int, arrays: Sequence[Any], views: list[View]) -> None:
-        """Records when results are ready, and keeps arrays alive until then so that their libraries do not reuse the
-        memory.
+        """Records an event after which the results are ready, and keeps arrays of other libraries alive until then, so
+        that these libraries do not reuse the memory.
         """
         device = self._function.device
         event = Event(device, stream)
@@ -234,7 +244,7 @@ class Kernel:
 def _generated(
     model: Model, name: str, dtype: Literal["float64", "float32"], options: dict[str, Any]
 ) -> tuple[str, str, Any]:
-    """Returns the symbol of a kernel, its text, and its arguments and results."""
+    """Generates a kernel. Returns its symbol, its text, and its arguments and results."""
     if dtype not in _LANGUAGES:
         raise ValueError(f"dtype: expected 'float64' or 'float32', found {dtype!r}")
     code, files, described = _condyle._generate(model, [name], _LANGUAGES[dtype], **options)
@@ -253,7 +263,7 @@ def ptx(
     inputs: Sequence[str] = (),
     partitions: int | None = None,
 ) -> bytes:
-    """Compiles a kernel to NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time
+    """Compiles a kernel to PTX, NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time
     compiler.
 
     capability: the compute capability of the oldest device to support. The other arguments are as for `compile`. No GPU
@@ -299,14 +309,15 @@ def compile(  # noqa: A001
     """Compiles a function of a robot to a kernel with NVIDIA's run-time compiler, or reads it from the cache.
 
     name: one of `condyle.codegen.functions`; frames, constraints, external_forces, inputs: as for these. dtype: the
-        kind of numbers in the computation. partitions: the number of threads per state, each computing some of the
-        results, at most one for each limb and one for the trunk. The default is one, or the fastest number under two
-        conditions: one thread would need more registers than it has, and all threads fit on the device at a time. ptx:
-        the result of `ptx` for the same model, name, dtype and options: the compiler is not needed then. cache: a
-        folder; by default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`.
+        kind of numbers in the computation. partitions: the number of threads per state, each of which computes some of the
+        results; at most one thread for each limb and one for the trunk. The default is one thread. If one thread would
+        need more registers than it has, and several threads for all states fit on the device at the same time, the
+        default is the fastest number. ptx: the result of the function `ptx` for the same model, name, dtype and
+        options; then the compiler is not needed. cache: a folder; by default the environment variable CONDYLE_CACHE,
+        else `~/.cache/condyle`.
 
-    Raises `RuntimeError` if the driver, a device or the compiler is missing, or if it fails; `ValueError` if the device
-    does not exist; and the exceptions of `condyle.codegen.source`.
+    Raises `RuntimeError` if the driver, a device or the compiler is missing, or if the compiler fails; `ValueError` if
+    the device does not exist; and the exceptions of `condyle.codegen.source`.
     """
     options = _options(frames, constraints, external_forces, inputs, partitions)
     symbol, text, (_, given, made, _, rows) = _generated(model, name, dtype, options)
@@ -316,7 +327,9 @@ def compile(  # noqa: A001
 
 
 def _image(symbol: str, text: str, device: Device, cache: "str | os.PathLike[str] | None") -> bytes:
-    """Returns the compiled image of a text, cached by the text, the compiler's version and the kind of device."""
+    """Compiles a text, or reads the result from the cache, where the key consists of the text, the compiler's version
+    and the kind of device.
+    """
     import hashlib
     import tempfile
 

@@ -1,7 +1,8 @@
-"""The ten inertial parameters of a body: a check that they are physical, and a parametrisation in which all values are.
+"""The ten inertial parameters of a body: a check that they are physical, and a parametrisation in which all values are
+physical.
 
-π = (m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), in the body's frame, about its origin. Pinocchio and
-`Model.inertial_parameters` have the same order.
+π = (m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), in the body's frame, about the origin of this frame.
+Pinocchio and `Model.inertial_parameters` have the same order.
 
 >>> import condyle, numpy as np
 >>> from condyle import inertial_parameters

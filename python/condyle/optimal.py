@@ -13,16 +13,17 @@
 >>> solution.status, solution.xs.shape
 ('converged', (21, 14))
 
-Hard constraints are `Limit`s, for `AugmentedLagrangian`: see there. An action for each knot is as fast as one for all:
-`Problem(x0, [action_0, action_1, ...], None, terminal)` groups the actions that differ only in costs.
+Hard constraints are `Limit`s, which `AugmentedLagrangian` enforces. A separate action for each knot is as fast as one
+action for all knots: `Problem(x0, [action_0, action_1, ...], None, terminal)` groups the actions that differ only in
+costs.
 
-You can define your own: an `Action` (the next state and the cost), a `DifferentialAction` (accelerations) or an
-`ode_action` (ẋ), residuals of a robot (`Residual.own`), constraints (`ConstrainedAction`), or CasADi expressions
-(`condyle.casadi.action`). Derivatives that you do not provide are still exact if your functions accept numbers that
-carry their derivatives.
+You can define your own actions by the next state and the cost (`Action`), by accelerations (`DifferentialAction`), by ẋ
+(`ode_action`), or by CasADi expressions (`condyle.casadi.action`). You can also define residuals of a robot
+(`Residual.own`) and constraints (`ConstrainedAction`). Derivatives that you do not provide are still exact if your
+functions accept numbers that carry their derivatives.
 
-The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are the same as
-Crocoddyl's.
+The feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. The iterates are the same as in
+Crocoddyl.
 """
 
 from ._actions import ode_action, thrusters

@@ -1,4 +1,4 @@
-"""Pinocchio's API names: a thin layer, so that a script for Pinocchio runs with only its import changed.
+"""Pinocchio's API names: a thin layer, so that a script for Pinocchio runs if only its import is changed.
 
 >>> import condyle, numpy as np
 >>> import condyle.pinocchio as pin
@@ -8,12 +8,12 @@
 >>> pin.computeABADerivatives(model, data, q, v, tau)[0].shape, data.ddq[2].round(2).item()
 ((18, 18), -9.81)
 
-Functions return the same results as Pinocchio's in Python, and store them in `data` under the same names, as arrays
-that no later call changes. `model.ours` is the `condyle.Model`, whose functions also take batches. The differences are:
-both triangles of M are filled, as in Pinocchio's Python; armature counts in the kinetic energy of all joints; `frames`
-are `universe` and then ours, so use `getFrameId` for frames, not indices from elsewhere. Geometry, collisions,
-visualisers and other missing parts raise an AttributeError that explains it. For new code use `condyle` itself: its
-page has a table of both sets of names.
+Functions return the same results as Pinocchio's functions in Python, and store them in `data` under the same names, as
+arrays that no later call changes. `model.ours` is the `condyle.Model`, whose functions also take batches. Three details
+should be known: both triangles of M are filled, as in Pinocchio's Python; armature counts in the kinetic energy of all
+joints; and `frames` are `universe`, followed by the frames of the `condyle.Model`. So find frames with `getFrameId`,
+and do not use frame indices from Pinocchio. Geometry, collisions, visualisers and other missing features raise an
+AttributeError with an explanation. For new code use `condyle` itself: its page has a table of both sets of names.
 """
 
 from collections.abc import Sequence
@@ -90,7 +90,9 @@ def neutral(model: Model) -> _Array:
 
 
 def randomConfiguration(model: Model, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> _Array:
-    """Returns a random position within the limits of the model, or within given ones, and within ±3 without limits."""
+    """Returns a random position within the limits of the model, or within the given limits; coordinates without limits
+    are within ±3.
+    """
     q = ours.random_configuration(model.ours)
     low = np.ravel(model.lowerPositionLimit if lower is None else lower)
     high = np.ravel(model.upperPositionLimit if upper is None else upper)
@@ -100,7 +102,7 @@ def randomConfiguration(model: Model, lower: ArrayLike | None = None, upper: Arr
 
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float) -> _Array:
-    """Returns q₀ ⊕ t (q₁ ⊖ q₀)."""
+    """Returns the position q₀ ⊕ t (q₁ ⊖ q₀)."""
     return ours.interpolate(model.ours, q0, q1, t)
 
 
@@ -114,7 +116,9 @@ def _forces(fext: Sequence[algebra.Force]) -> _Array:
 
 
 def _flat(*states: ArrayLike) -> tuple[_Array, _Array, _Array]:
-    """Returns states, some of which are columns, as vectors; raises the current exception again if none is a column."""
+    """Returns states as vectors, although some of them are given as columns. If no state is a column, raises the
+    current exception again.
+    """
     q, v, x = (np.asarray(state, float) for state in states)
     if not any(array.ndim == 2 and array.shape[1] == 1 for array in (q, v, x)):
         raise
@@ -124,7 +128,7 @@ def _flat(*states: ArrayLike) -> tuple[_Array, _Array, _Array]:
 def rnea(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> _Array:
-    """Computes τ, also stored as data.tau."""
+    """Computes inverse dynamics τ, also stored as data.tau."""
     try:
         data.tau = out = ours.rnea(model.ours, data._ours, q, v, a, None if fext is None else _forces(fext))
     except ValueError:
@@ -135,7 +139,7 @@ def rnea(
 def aba(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> _Array:
-    """Computes q̈, also stored as data.ddq."""
+    """Computes forward dynamics q̈, also stored as data.ddq."""
     try:
         data.ddq = out = ours.aba(model.ours, data._ours, q, v, tau, None if fext is None else _forces(fext))
     except ValueError:
@@ -146,7 +150,7 @@ def aba(
 def computeRNEADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
-    """Computes ∂τ/∂q, ∂τ/∂v, M; also stored as data.dtau_dq, dtau_dv, M."""
+    """Computes ∂τ/∂q, ∂τ/∂v and M, also stored as data.dtau_dq, data.dtau_dv and data.M."""
     given = None if fext is None else _forces(fext)
     try:
         data.dtau_dq, data.dtau_dv, data.M = d = ours.rnea_derivatives(model.ours, data._ours, q, v, a, given)
@@ -158,7 +162,8 @@ def computeRNEADerivatives(
 def computeABADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
-    """Computes ∂q̈/∂q, ∂q̈/∂v, M⁻¹; also stored as data.ddq_dq, ddq_dv, Minv, ddq."""
+    """Computes ∂q̈/∂q, ∂q̈/∂v and M⁻¹, also stored as data.ddq_dq, data.ddq_dv and data.Minv; q̈ is stored as data.ddq.
+    """
     given = None if fext is None else _forces(fext)
     try:
         d = ours.aba_derivatives(model.ours, data._ours, q, v, tau, given)
@@ -174,7 +179,9 @@ def computeForwardKinematicsDerivatives(model: Model, data: Data, q: ArrayLike, 
 
 
 def getJointVelocityDerivatives(model: Model, data: Data, joint: int, frame: ReferenceFrame) -> tuple[_Array, _Array]:
-    """Computes ∂v/∂q and ∂v/∂q̇ of a joint's body, (6, nv); for LOCAL_WORLD_ALIGNED at a fixed point."""
+    """Computes the derivatives ∂v/∂q and ∂v/∂q̇ of the velocity v of a joint's body, (6, nv). For LOCAL_WORLD_ALIGNED,
+    v is the velocity at a fixed point.
+    """
     q, v, _ = data._state
     dv_dq = ours.body_velocity_derivative(model.ours, data._ours, q, v, joint, frame._value_)
     J = getJointJacobian(model, data, joint, frame)
@@ -182,7 +189,9 @@ def getJointVelocityDerivatives(model: Model, data: Data, joint: int, frame: Ref
 
 
 def _at_rest(by_q: _Array, motion: Motion, J: _Array, frame: ReferenceFrame) -> _Array:
-    """Converts ∂/∂q of a motion to a fixed point: removes ω × J, which is due to the motion of the frame's origin."""
+    """Converts the derivative ∂/∂q of a motion to the derivative at a fixed point: removes ω × J, which is due to the
+    motion of the frame's origin.
+    """
     if frame is LOCAL_WORLD_ALIGNED:
         by_q[:3] -= np.cross(motion.angular, J[:3], axisb=0).T
     return by_q
@@ -191,7 +200,9 @@ def _at_rest(by_q: _Array, motion: Motion, J: _Array, frame: ReferenceFrame) -> 
 def getJointAccelerationDerivatives(
     model: Model, data: Data, joint: int, frame: ReferenceFrame
 ) -> tuple[_Array, _Array, _Array, _Array]:
-    """Computes ∂v/∂q, and ∂a/∂q, ∂a/∂q̇, ∂a/∂q̈ of a joint's body, (6, nv)."""
+    """Computes the derivatives ∂v/∂q, ∂a/∂q, ∂a/∂q̇ and ∂a/∂q̈ of the velocity v and the acceleration a of a joint's
+    body, each (6, nv).
+    """
     dv_dq, da_da = getJointVelocityDerivatives(model, data, joint, frame)
     da_dq, da_dv = ours.body_acceleration_derivatives(model.ours, data._ours, *data._state, joint, frame._value_)
     return dv_dq, _at_rest(da_dq, getAcceleration(model, data, joint, frame), da_da, frame), da_dv, da_da
@@ -203,12 +214,13 @@ def computeJointJacobians(model: Model, data: Data, q: ArrayLike) -> None:
 
 
 def computeJointJacobian(model: Model, data: Data, q: ArrayLike, joint: int) -> _Array:
-    """Computes the Jacobian of a joint's body in its own frame, (6, nv)."""
+    """Computes the Jacobian of a joint's body in the frame of this body, (6, nv)."""
     return ours.body_jacobian(model.ours, data._ours, q, joint, "local")
 
 
 def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes Ag, (6, nv), also stored as data.Ag; and data.hg and data.com."""
+    """Computes the centroidal momentum matrix Ag, (6, nv), also stored as data.Ag. Also computes data.hg and data.com.
+    """
     Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
     data.Ag = Ag
     data._leave(com, Force._of(Ag @ np.asarray(v, float)))
@@ -216,13 +228,13 @@ def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
 
 
 def computeKineticEnergy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """Computes ½ vᵀ M v, also stored as data.kinetic_energy."""
+    """Computes the kinetic energy ½ vᵀ M v, also stored as data.kinetic_energy."""
     data.kinetic_energy = energy = ours.kinetic_energy(model.ours, data._ours, q, v)
     return energy
 
 
 def computePotentialEnergy(model: Model, data: Data, q: ArrayLike) -> float:
-    """Computes −Σ m g·c, also stored as data.potential_energy."""
+    """Computes the potential energy −Σ m g·c, also stored as data.potential_energy."""
     data.potential_energy = energy = ours.potential_energy(model.ours, data._ours, q)
     return energy
 

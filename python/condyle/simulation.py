@@ -1,4 +1,4 @@
-"""Simulation of robots: advances (q, v) in time, on the groups of the joints.
+"""Simulation of robots: advances (q, v) in time; rotations stay valid in every step.
 
 >>> import condyle, numpy as np
 >>> from condyle.simulation import Simulation

@@ -1,4 +1,5 @@
-"""Pictures: plots of a solution and of a matrix's zeros with matplotlib, playback in the browser with viser.
+"""Pictures: plots of a solution and of the zeros of a matrix with matplotlib, and playback of a motion in the browser
+with viser.
 
     pip install condyle[viz]
 
@@ -30,21 +31,21 @@ if TYPE_CHECKING:
 __all__ = ["Player", "pattern", "play", "plot", "spy"]
 
 _Array = NDArray[np.float64]
-_NAMES = 14  # maximum number of lines that can be distinguished in a plot
+_NAMES = 14  # maximum number of labels: more lines cannot be distinguished in a plot
 
 
 def pattern(model: Model) -> NDArray[np.bool_]:
-    """Returns which entries of M(q) may differ from zero by the structure of the tree, (nv, nv).
+    """Returns for each entry of M(q) whether the structure of the tree allows it to differ from zero, (nv, nv).
 
     M_ij = 0 unless one of the joints i and j carries the other (Featherstone 2008, section 8.5). With mimic joints, M =
-    Gᵀ M' G with the inertia matrix M' of the tree with all joints free.
+    Gᵀ M' G, where M' is the inertia matrix of the tree with all joints free.
     """
     widths = [joint.nv if joint else 0 for joint in model.joints]
     related = np.eye(model.nbodies, dtype=bool)
     for body, parent in enumerate(model.parents[1:], start=1):
-        related[body] |= related[parent]  # a body and all its ancestors
+        related[body] |= related[parent]  # the row of a body contains the body and all its ancestors
     related |= related.T
-    G = np.zeros((model.nv, model.nbodies), bool)  # the bodies that each coordinate moves
+    G = np.zeros((model.nv, model.nbodies), bool)  # G[k, b]: whether coordinate k moves the joint of body b
     for body in range(1, model.nbodies):
         G[model.idx_vs[body] : model.idx_vs[body] + widths[body], body] = True
     out: NDArray[np.bool_] = G @ related @ G.T
@@ -54,8 +55,8 @@ def pattern(model: Model) -> NDArray[np.bool_]:
 def spy(M: ArrayLike, model: Model, tolerance: float = 1e-12) -> "Figure":
     """Plots the entries of M that are not zero, together with the entries that the tree allows to be nonzero.
 
-    M: (nv, nv), as returned by `crba`, `minv` or a derivative; an inverse has fewer zeros if joints share a moving
-        base.
+    M: a matrix (nv, nv), as returned by `crba`, `minv` or a derivative. An inverse has fewer zeros than M if joints
+        share a moving base.
     tolerance: magnitude up to which an entry counts as zero, relative to the largest entry.
     """
     M = np.asarray(M, float)
@@ -120,7 +121,8 @@ def _lines(axes: Any, time: Any, values: _Array, labels: list[str], name: str, s
 
 
 def _labels(model: Model, first: list[int], count: list[int]) -> list[str]:
-    """Returns a label for each coordinate: its joint, with a number if the joint has several coordinates."""
+    """Returns a label for each coordinate: the name of its joint, with a number if the joint has several coordinates.
+    """
     labels = [""] * sum(count)
     for name, at, n in zip(model.names, first, count, strict=True):
         for k in range(n):
@@ -129,7 +131,7 @@ def _labels(model: Model, first: list[int], count: list[int]) -> list[str]:
 
 
 def _positive(numbers: list[float]) -> _Array:
-    """Returns the numbers that a logarithmic axis can show."""
+    """Replaces numbers that a logarithmic axis cannot show by NaN."""
     x = np.array(numbers, float)
     return np.where(x > 0.0, x, np.nan)
 

@@ -65,11 +65,12 @@ def plan_of(model: Model, solution: Solution, times: ArrayLike, touches: ArrayLi
     """Converts a solution of `condyle.optimal` to a plan.
 
     model: the robot.
-    times: the times of the N + 1 knots (s); an impact's two knots have the same time.
-    touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
-    fade: the time over which contacts are loaded and unloaded (s).
+    times: the times of the N + 1 knots (s). The two knots of an impact have the same time.
+    touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
+    fade: the time (s) during which contacts are loaded and unloaded.
 
-    Controls and gains are taken from knots that have one control for each actuated coordinate; impacts do not have any.
+    Controls and gains are taken from knots that have one control for each actuated coordinate. Impacts have no
+    controls.
 
     >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
     >>> from condyle.wholebody import plan_of

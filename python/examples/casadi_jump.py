@@ -1,4 +1,4 @@
-"""CasADi: a quadruped jumps, with given phases of contact: four feet on the ground, none, and four again.
+"""CasADi: a quadruped jumps. The phases of contact are given: four feet on the ground, no feet, and four feet again.
 
     python python/examples/casadi_jump.py        needs CasADi: pip install 'condyle[casadi]'
 
@@ -19,12 +19,12 @@ HEIGHT, FORWARD, FRICTION = 0.1, 0.2, 0.6  # m, m
 
 
 def contacts() -> list[condyle.ContactConstraint]:
-    """Returns contacts of the feet along the world's axes; velocities from rounding errors decay."""
+    """Returns contacts that hold the feet, along the world's axes; velocities caused by rounding errors decay."""
     return [condyle.ContactConstraint(foot, "point", reference="local_world_aligned", kd=20.0) for foot in FEET]
 
 
 def integrate(q: casadi.MX, v: casadi.MX) -> casadi.MX:
-    """Returns q ⊕ v for a small v: a base (position, quaternion x, y, z, w) and joints."""
+    """Returns q ⊕ v for a small v, where q is the base's position and quaternion x, y, z, w, then the joints."""
     u, w, turn = q[3:6], q[6], v[3:6] / 2
     forward = v[:3] + 2 * casadi.cross(u, casadi.cross(u, v[:3]) + w * v[:3])  # the base's velocity in the world
     quaternion = q[3:7] + casadi.vertcat(w * turn + casadi.cross(u, turn), -casadi.dot(u, turn))
@@ -50,8 +50,8 @@ def transcribe(
 ) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
     """Builds the optimisation of the jump: semi-implicit Euler on knots of 20 ms.
 
-    stance: (q, v, τ) -> (a, forces of the feet). flight: (q, v, τ) -> a. feet: for each
-    q -> (position, …) and (q, v) -> velocity, linear numbers first.
+    stance: a function (q, v, τ) -> (a, forces of the feet). flight: a function (q, v, τ) -> a. feet: for each foot, a
+    function of q whose first result is the position, and a function (q, v) -> velocity, linear numbers first.
     """
     knots, nq, nv = PUSH + FLIGHT + LAND, model.nq, model.nv
     opti = casadi.Opti()
@@ -78,7 +78,7 @@ def transcribe(
             opti.subject_to(opti.bounded(-np.inf, -tangent - FRICTION / np.sqrt(2) * normal, 0))
     opti.subject_to(q[:, 0] == standing)
     opti.subject_to(v[:, 0] == 0)
-    opti.subject_to(v[:6, -1] == 0)  # the base is at rest; as the feet do not move, the joints do not either
+    opti.subject_to(v[:6, -1] == 0)  # the base is at rest; since the feet do not move, the joints do not move either
     touchdown = PUSH + FLIGHT
     for place, velocity in feet:
         there = np.array(place(standing)[0]).ravel() + np.array([FORWARD, 0.0, 0.0])
@@ -89,7 +89,7 @@ def transcribe(
     opti.subject_to(q[2, PUSH + FLIGHT // 2] >= standing[2] + HEIGHT)
     opti.subject_to(opti.bounded(-150, casadi.vec(u), 150))
     opti.minimize(DT * (1e-3 * casadi.sumsqr(u) + casadi.sumsqr(v)))
-    # the guess: the base moves ahead and rises in the air; on the ground, each foot carries a quarter of the weight
+    # initial guess: the base moves ahead, and rises in the air; each foot on the ground carries a quarter of the weight
     path = np.tile(standing[:, None], knots + 1)
     path[0] += np.linspace(0, FORWARD, knots + 1)
     path[2, PUSH : PUSH + FLIGHT + 1] += HEIGHT * np.sin(np.linspace(0, np.pi, FLIGHT + 1))

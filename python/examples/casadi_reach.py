@@ -2,8 +2,8 @@
 
     python python/examples/casadi_reach.py        needs CasADi: pip install 'condyle[casadi]'
 
-The duration is a variable too. Accelerations are the controls, and inverse dynamics computes the efforts. This is
-cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on `rnea`.
+The duration is also a variable. Accelerations are the controls, and inverse dynamics computes the efforts. This is
+cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on the result of `rnea`.
 """
 
 import casadi
@@ -22,9 +22,10 @@ def transcribe(
     start: np.ndarray,
     target: np.ndarray,
 ) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
-    """Builds the optimisation of a motion from `start`, at rest, to rest with a frame at `target`.
+    """Builds the optimisation of a motion that starts at rest at `start` and ends at rest with a frame at `target`.
 
-    inverse_dynamics: (q, v, a) -> τ of all knots. placement: q -> (position of the frame, …).
+    inverse_dynamics: a function (q, v, a) -> τ of all knots. placement: a function of q whose first result is the
+    position of the frame.
     """
     n, limits, opti = model.nv, model.limits, casadi.Opti()
     q, v, a = opti.variable(n, KNOTS), opti.variable(n, KNOTS), opti.variable(n, KNOTS)
@@ -45,7 +46,7 @@ def transcribe(
     opti.subject_to(casadi.horzcat(v[:, 0], v[:, -1]) == 0)
     opti.subject_to(placement(q[:, -1])[0] == target)
     opti.subject_to(opti.bounded(0.1, duration, 5.0))
-    # the fastest motion, and among fast motions a smooth one
+    # minimise the duration; the small second term prefers smooth motions
     opti.minimize(duration + 1e-4 * h * casadi.sumsqr(a))
     opti.set_initial(q, np.tile(start[:, None], KNOTS))
     opti.set_initial(duration, 1.0)

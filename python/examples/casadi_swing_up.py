@@ -1,10 +1,11 @@
-"""CasADi: an arm with weak motors swings up. Direct collocation, solved by IPOPT with exact second derivatives.
+"""CasADi: an arm with weak motors swings up. IPOPT solves this problem of direct collocation with exact second
+derivatives.
 
     python python/examples/casadi_swing_up.py        needs CasADi: pip install 'condyle[casadi]'
 
 The shoulder cannot lift the arm, so the arm has to swing. Between two knots the motion is a cubic polynomial that
 satisfies the equation of motion at both ends and in the middle (Hermite and Simpson). Variables are the position,
-velocity and effort at each of these points. The conditions of the polynomial are constraints.
+velocity and effort at each of these points. The equations of the polynomial are constraints.
 """
 
 import casadi
@@ -30,7 +31,9 @@ def two_links() -> condyle.Model:
 
 
 def transcribe(dynamics: casadi.Function) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
-    """Builds the optimisation of the motion from dynamics (q, v, τ) -> a; variables have a column for each point."""
+    """Builds the optimisation of the motion. dynamics: a function (q, v, τ) -> a. Variables have a column for each
+    point.
+    """
     opti, h = casadi.Opti(), DURATION / INTERVALS
     q, v, tau = (opti.variable(2, POINTS) for _ in range(3))
     a = dynamics(q, v, tau)
@@ -59,7 +62,7 @@ def main() -> None:
     solution = opti.solve()
     q, v, tau = (solution.value(motion[name]) for name in ("q", "v", "tau"))
 
-    # condyle's own functions confirm the result: inverse dynamics of its accelerations gives its efforts
+    # Condyle's functions confirm the result: inverse dynamics of the accelerations gives the efforts of the solution
     data = condyle.Data(arm)
     lift = np.abs(condyle.gravity(arm, data, [np.pi / 2, 0.0]))
     print(f"the shoulder has {EFFORT[0]:.0f} N m, and {lift[0]:.1f} N m would hold the arm level")

@@ -1,9 +1,10 @@
-"""Coming from Crocoddyl: an existing problem is solved here; then the same problem is written here.
+"""Coming from Crocoddyl: solves an existing problem of Crocoddyl with Condyle, and then writes the same problem in
+Condyle.
 
     python python/examples/coming_from_crocoddyl.py
 
-It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names of Crocoddyl, and names here
-(in `condyle.optimal` unless another module is given):
+The example needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names of Crocoddyl, and names of Condyle (in
+`condyle.optimal` unless another module is given):
 
     StateMultibody(model)                           the model: a state is x = (q, v), in the same order
     ActuationModelFull, FloatingBase                actuation=None: τ = S u, all joints except a free base
@@ -33,11 +34,11 @@ It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names of Crocoddyl, and name
     th_stop, maxiter, regInit                       tolerance=, max_iterations=, regularisation_start=
     setCallbacks([CallbackVerbose()])               solve(xs, us, verbose=True), solve(xs, us, callback=f)
 
-Signs and axes: the feedback here is u = ū + α k + K (x ⊖ x̄); Crocoddyl's k and K have the opposite sign. In both
-libraries, forces act on the robot, along the axes of the contact. Contacts in the frame WORLD are
-"local_world_aligned" here. Fddp enforces the bounds of a knot; SolverFDDP ignores them. Fddp projects a warm start onto
-the bounds, unless project_warm_start=False, as SolverBoxFDDP does. Costs of controls in the terminal knot, which are
-zero there, are refused here. Everything else has the same sign, order and unit.
+Signs and axes: in Condyle, the feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. In
+both libraries, forces act on the robot, along the axes of the contact. Contacts in Crocoddyl's frame WORLD are
+"local_world_aligned" in Condyle. Fddp enforces the bounds of a knot; SolverFDDP ignores them. Fddp moves a warm start
+into the bounds unless project_warm_start=False; SolverBoxFDDP does not move it. In the terminal knot, costs of controls
+are zero in Crocoddyl and an error in Condyle. All other numbers have the same sign, order and unit.
 """
 
 import time
@@ -55,7 +56,7 @@ DT, HORIZON = 0.05, 40
 GOAL, REST = np.array([0.35, 0.2, 0.6]), np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0])
 x0 = np.r_[REST, np.zeros(7)]
 
-# 1. An arm reaches for a point, written for Crocoddyl.
+# 1. Problem in Crocoddyl: an arm reaches for a point.
 robot = pinocchio.buildModelFromXML(condyle.robots.ARM7)
 state = crocoddyl.StateMultibody(robot)
 drives = crocoddyl.ActuationModelFull(state)
@@ -76,7 +77,7 @@ xs, us = [x0] * (HORIZON + 1), list(shooting_problem.quasiStatic([x0] * HORIZON)
 
 
 def quickest(solve: Callable[[], object]) -> float:
-    """Returns the time of the quickest of several solves (ms)."""
+    """Returns the shortest duration of several solves (ms)."""
     times = []
     for _ in range(5):
         begin = time.perf_counter()
@@ -89,7 +90,7 @@ theirs = crocoddyl.SolverFDDP(shooting_problem)
 took = quickest(lambda: theirs.solve(xs, us))
 print(f"Crocoddyl: cost {theirs.cost:.9f} after {theirs.iter + 1} iterations, {took:.2f} ms")
 
-# 2. The same problem here, in two lines. SolverFDDP ignores bounds; the bounds of this arm are its effort limits.
+# 2. The same problem is solved by Condyle in two lines. `bounded=False` ignores the effort limits, as SolverFDDP does.
 problem = condyle.crocoddyl.problem(shooting_problem, bounded=False)
 ours = Fddp(problem, tolerance=theirs.th_stop, project_warm_start=False).solve(np.array(xs), np.array(us))
 
@@ -103,7 +104,7 @@ there = np.array([np.array(K) for K in theirs.K])
 print(f"largest difference of states {np.abs(ours.xs - np.array(theirs.xs)).max():.0e},", end=" ")
 print(f"of K and −K {np.abs(ours.K + there).max() / np.abs(there).max():.0e} of the largest gain")
 
-# 3. The same problem, written here.
+# 3. The same problem, written in Condyle.
 arm = condyle.robots.arm7()
 settle = Cost("rest", 1e-2, Residual.state(x0))
 running_knot = FreeDynamics(arm, DT, [settle, Cost("effort", 1e-4, Residual.control(np.zeros(7)))])
@@ -113,7 +114,7 @@ again = Fddp(written, tolerance=theirs.th_stop).solve(np.array(xs), np.array(us)
 print(f"written here: cost {again.cost:.9f} after {len(again.trace)} iterations")
 assert np.allclose(again.xs, ours.xs, rtol=0.0, atol=1e-9)
 
-# 4. Our dynamics in Crocoddyl's solver, for scripts that keep Crocoddyl's solver or integrators.
+# 4. Condyle's dynamics in Crocoddyl's solver, for scripts that keep Crocoddyl's solver or integrators.
 dynamics = condyle.crocoddyl.differential_action(knot.differential)
 mixed = crocoddyl.ShootingProblem(x0, [crocoddyl.IntegratedActionModelEuler(dynamics, DT)] * HORIZON, end)
 on_ours = crocoddyl.SolverFDDP(mixed)

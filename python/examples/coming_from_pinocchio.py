@@ -1,8 +1,9 @@
-"""Coming from Pinocchio: a script runs with another import; then the same script is written here.
+"""Coming from Pinocchio: runs a script for Pinocchio with another import, and then writes the same script with Condyle.
 
     python python/examples/coming_from_pinocchio.py
 
-It needs only condyle. If Pinocchio is installed, the numbers of both are compared. Names of Pinocchio, and names here:
+The example needs only Condyle. If Pinocchio is installed, the numbers of both are compared. Names of Pinocchio, and
+names of Condyle:
 
     buildModelFromUrdf(path, JointModelFreeFlyer())     Model.from_urdf(path, root_joint="free_flyer")
     buildModelFromMJCF(path)                            Model.from_mjcf(path)
@@ -36,9 +37,10 @@ It needs only condyle. If Pinocchio is installed, the numbers of both are compar
     rneaInParallel(n, pool, q, v, a), columns           rnea with q (N, nq), v and a (N, nv), rows
     MeshcatVisualizer                                   condyle.viz.play(model, q, dt, urdf=path)
 
-Equal are units, signs, the order of q, v and spatial vectors (linear first), quaternions (x, y, z, w), and the numbers
-of joints. Different: results are returned as arrays that no later call changes. Frames are given by name, and there is
-no frame `universe` before them. Both triangles of M are filled. `with_gravity` and `with_limits` return new models.
+Both libraries have the same units, signs, order of q, v and spatial vectors (linear first), quaternions (x, y, z, w),
+and numbering of joints. There are differences: results are returned as arrays that no later call changes. Frames are
+given by name, and the list of frames does not begin with `universe`. Both triangles of M are filled. `with_gravity` and
+`with_limits` return new models.
 """
 
 from importlib.util import find_spec
@@ -53,7 +55,9 @@ GOAL, PRECISION, STEP, DAMPING = np.array([0.35, 0.2, 0.6]), 1e-10, 0.5, 1e-9
 
 
 def reach(pin: Any) -> tuple[np.ndarray, int]:
-    """Solves inverse kinematics by Newton's method with damping, written for Pinocchio."""
+    """Solves inverse kinematics by Newton's method with damping. This function is written for Pinocchio, the module
+    `pin`.
+    """
     model = pin.buildModelFromXML(condyle.robots.ARM7)
     data = model.createData()
     tool = model.getFrameId("tool")
@@ -68,11 +72,11 @@ def reach(pin: Any) -> tuple[np.ndarray, int]:
     raise RuntimeError("the arm cannot reach the point")
 
 
-# 1. The script runs with the import changed: `import condyle.pinocchio as pin`.
+# 1. The script runs after a change of its import to `import condyle.pinocchio as pin`.
 q, steps = reach(condyle.pinocchio)
 print(f"reached after {steps} steps at q = {q.round(3)}")
 
-# 2. The same script, written here.
+# 2. The same script, written with Condyle.
 arm = condyle.robots.arm7()
 data = condyle.Data(arm)
 q_here = np.full(arm.nq, 0.4)
@@ -88,14 +92,14 @@ v, tau = np.linspace(-1.0, 1.0, 7), np.ones(7)
 d = condyle.aba_derivatives(arm, data, q, v, tau)
 print(f"the first joint accelerates by {d.a[0]:.4f} rad/s², and by {d.da_dtau[0, 0]:.4f} more for each N m")
 
-# 4. Many states at once, in rows: without a loop, and without threads to manage.
+# 4. Many states in one call, one in each row: no loop and no management of threads is necessary.
 many = np.tile(q, (1000, 1))
 many[:, 0] += np.linspace(-1.0, 1.0, 1000)
 efforts = condyle.gravity(arm, condyle.Data(arm, threads=2), many)
 assert efforts.shape == (1000, 7)
 print(f"holding the arm still takes at most {np.abs(efforts).max():.2f} N m, all around")
 
-# 5. Comparison with Pinocchio, if it is installed: the same numbers; one call converts its models.
+# 5. If Pinocchio is installed, its numbers are compared: they are the same. One call converts models of Pinocchio.
 if find_spec("pinocchio"):
     import pinocchio
 

@@ -2,7 +2,7 @@
 
     python python/examples/derivatives.py
 
-A derivative with respect to q is taken in the tangent space, along velocities. It has nv columns, also if q has more
+A derivative with respect to q is taken in the tangent space, along velocities. It has nv columns, even if q has more
 numbers than v.
 """
 
@@ -20,17 +20,17 @@ v, tau = rng.standard_normal((2, robot.nv))
 d = condyle.aba_derivatives(robot, data, q, v, tau)
 print("∂q̈/∂q, ∂q̈/∂v, ∂q̈/∂τ:", d.da_dq.shape, d.da_dv.shape, d.da_dtau.shape)
 
-# They are exact: finite differences agree within their own error. `integrate` moves q.
+# The derivatives are exact: finite differences agree within the errors of differences. `integrate` moves q.
 step, direction = 1e-6, rng.standard_normal(robot.nv)
 ahead = condyle.aba(robot, data, condyle.integrate(robot, q, step * direction), v, tau)
 behind = condyle.aba(robot, data, condyle.integrate(robot, q, -step * direction), v, tau)
 print("differences are off by", abs((ahead - behind) / (2 * step) - d.da_dq @ direction).max())
 
-# Second derivatives of a number λᵀ q̈, as solvers for optimal control need: four blocks.
+# Second derivatives of a number λᵀ q̈, which solvers for optimal control need, in four blocks.
 hessian = condyle.aba_hessian(robot, data, q, v, tau, np.ones(robot.nv))
 assert np.allclose(hessian.dqdq, hessian.dqdq.T)
 
-# Derivatives of your own function: it is called with hyper-dual numbers, which all functions of condyle accept.
+# Derivatives of your own function: it is called with hyper-dual numbers, which all functions of Condyle accept.
 arm = condyle.robots.arm7()
 arm_data, at = condyle.Data(arm), np.full(7, 0.3)
 
@@ -41,7 +41,7 @@ def reach_and_effort(q: np.ndarray) -> np.ndarray:
     return 100.0 * ((tool - [0.4, 0.2, 0.5]) ** 2).sum() + 0.01 * (condyle.gravity(arm, arm_data, q) ** 2).sum()
 
 
-# The Gauss-Newton matrix would work too; with the exact Hessian, Newton's method needs only a few steps.
+# With the exact Hessian, Newton's method needs few steps. The Gauss-Newton matrix would also work, in more steps.
 steps = 0
 while True:
     value, gradient = condyle.gradient(arm, at, reach_and_effort)
@@ -50,7 +50,7 @@ while True:
     curvature, vectors = np.linalg.eigh(condyle.hessian(arm, at, reach_and_effort)[2])
     step = vectors @ (
         (vectors.T @ gradient) / np.maximum(np.abs(curvature), 1e-3)
-    )  # a descent direction also if the function is not convex
+    )  # a descent direction, even if the function is not convex
     length = 1.0
     while reach_and_effort(at - length * step) > value:
         length *= 0.5

@@ -21,7 +21,9 @@ HOLD = 40.0  # decay rate of a foot's slip (1/s)
 
 
 class Gait:
-    """Gait under construction: its knots so far, and the positions of feet and centre of mass after the last knot."""
+    """Gait under construction: the knots that were added so far, and the positions of feet and centre of mass after the
+    last knot.
+    """
 
     def __init__(self, model, q, feet, dt):
         data = condyle.Data(model)
@@ -38,7 +40,9 @@ class Gait:
         return {name: ContactConstraint(name, "point", None, "local_world_aligned", kd=kd) for name in names}
 
     def _rest(self, *weights):
-        """Returns a cost towards the posture, with weights of the trunk's position and rotation and of the joints."""
+        """Returns a cost of deviations from the posture, with weights for the trunk's position, the trunk's rotation,
+        and the joints.
+        """
         w = np.repeat(weights, [3, 3, self.model.nv - 6] * 2)
         return Cost("rest", 1e1, Residual.state(self.x0), Activation.weighted(w))
 
@@ -70,7 +74,7 @@ class Gait:
     def step(self, swinging, length, height, knots):
         """Moves the given feet ahead by `length` in an arc of the given height, and sets them down.
 
-        They leave the ground and meet it nearly at rest, so that a robot can follow.
+        The feet leave the ground and touch it again nearly at rest, so that a robot can follow the motion.
         """
         support = [k for k in range(len(self.feet)) if k not in swinging]
         com, places, ahead = self.com.copy(), self.places.copy(), np.array([length, 0.0, 0.0])

@@ -1,7 +1,8 @@
 """Simulation of a robot on level ground by constrained dynamics.
 
-A foot that touches is held as long as the ground pushes; a foot that comes down is stopped by an impact. Friction is
-unlimited here: users check the forces."""
+A foot that touches the ground is held as long as the ground pushes; a foot that comes down is stopped by an impact.
+Friction is unlimited, so programs that use this module should check the forces.
+"""
 
 import numpy as np
 
@@ -12,7 +13,7 @@ HOLD = 50.0  # decay rate of a held foot's drift (1/s)
 
 
 class Ground:
-    """State of the robot, and the set of standing feet. At first all feet stand at their present positions."""
+    """The state of the robot, and the set of standing feet. At first all feet stand at their initial positions."""
 
     def __init__(self, model, q, feet, kind="point"):
         self.model, self.data, self.kind = model, condyle.Data(model), kind
@@ -21,7 +22,9 @@ class Ground:
         self.sets = {}
 
     def step(self, tau, dt, f_ext=None):
-        """Makes a step of dt under efforts τ and forces on bodies; returns the force on each foot in the world (N)."""
+        """Makes a step of dt with efforts τ and external forces on bodies. Returns the force on each foot along the
+        world's axes (N).
+        """
         forces = np.zeros((len(self.feet), 3))
         while True:
             held, contacts = self._contacts()
@@ -30,7 +33,7 @@ class Ground:
             pulled = min(range(len(held)), key=lambda i: here[i][2], default=None)
             if pulled is None or here[pulled][2] >= 0.0:
                 break
-            self.standing[held[pulled]] = False  # the ground does not pull
+            self.standing[held[pulled]] = False  # release feet that the ground would have to pull
         for k, force in zip(held, here, strict=True):
             forces[k] = force
         self.v = self.v + dt * found.a  # v⁺ = v + Δt q̈

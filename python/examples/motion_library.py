@@ -1,10 +1,12 @@
-"""A library of motions: an arm's reach from thousands of perturbed starts, in one process or on the workers of Ray.
+"""A library of motions: an arm reaches for a point from thousands of perturbed starts. The solves run in one process or
+on the workers of Ray.
 
     python python/examples/motion_library.py [COUNT]
 
-Each start has its own plan with its own feedback, computed from the nominal plan. With Ray (`pip install condyle[ray]`)
-the processors of this machine share the work, or of a cluster whose address is the argument `cluster` of `sweep`.
-The problem is sent to each worker once, and the share of a lost worker is computed again. The bits are the same.
+Each start has its own plan with feedback; the nominal plan is the first guess of each solve. With Ray (`pip install
+condyle[ray]`) the processors of this machine share the work, or the processors of a cluster whose address is the
+argument `cluster` of `sweep`. The problem is sent to each worker once. If a worker is lost, another worker computes its
+variations. All these ways give bit-identical results.
 """
 
 import importlib.util
@@ -29,10 +31,10 @@ problem = Problem(
     rest, [FreeDynamics(arm, 0.02, [stay, effort])] * HORIZON, None, FreeDynamics(arm, None, [stay, reach])
 )
 
-# Starts around the nominal one: standard deviations of 0.1 rad and 0.1 rad/s.
+# Random starts around the nominal start, with standard deviations of 0.1 rad and 0.1 rad/s.
 starts = np.random.default_rng(1).normal(rest, 0.1, (COUNT, 14))
 
-# For comparison, the same by hand: one solver in a loop.
+# For comparison, a loop solves all variations with one solver.
 xs = np.tile(rest, (HORIZON + 1, 1))
 nominal = Fddp(problem).solve(xs, problem.quasi_static(xs))
 solver, by_hand = Fddp(problem), []
@@ -43,7 +45,7 @@ for x0 in starts:
 loop = COUNT / (time.perf_counter() - begin)
 print(f"a plain loop: {loop:.0f} plans a second")
 
-# The same as a sweep, whose results are written to disk as they are found.
+# A sweep solves the same variations, and writes each finished chunk to disk.
 problem.set_x0(rest)
 with tempfile.TemporaryDirectory() as folder:
     begin = time.perf_counter()
@@ -58,7 +60,7 @@ assert np.array_equal(library.cost, by_hand)
 near = int(np.argmin(np.linalg.norm(starts - rest, axis=1)))
 print(f"start {near} is nearest to rest; its plan costs {library.cost[near]:.3f}, that from rest {nominal.cost:.3f}")
 
-# The same on all processors, if there are enough plans to justify the start of the workers.
+# The same sweep on all processors, if there are enough variations to justify the start of the workers.
 if importlib.util.find_spec("ray") and COUNT >= 1000:
     import ray
 

@@ -3,7 +3,8 @@
     python python/examples/mpc.py
 
 Every 10 ms the controller applies the first control of its plan, moves the horizon by one knot, and improves the last
-plan by one iteration of FDDP. Between plans it corrects with the solver's gains: u = ū + K (x ⊖ x̄).
+plan by one iteration of FDDP. Between plans the controller corrects the controls with the solver's gains: u = ū + K (x
+⊖ x̄).
 """
 
 import numpy as np
@@ -25,7 +26,7 @@ def target(step: int) -> np.ndarray:
 
 
 def costs(step: int, controls: int) -> list[Cost]:
-    """Returns the costs of a knot, a given number of steps after the beginning."""
+    """Returns the costs of the knot that is `step` steps after the beginning."""
     return [
         Cost("follow", 1e3, Residual.frame_translation(arm, "tool", target(step))),
         Cost("rest", 1e-1, Residual.state(rest)),
@@ -33,7 +34,7 @@ def costs(step: int, controls: int) -> list[Cost]:
     ]
 
 
-# One action serves all knots. Each knot has its own costs and keeps them while it moves to the front.
+# One action serves all knots. Each knot has its own costs; when the horizon is shifted, they move with the knot.
 knot = FreeDynamics(arm, DT, [], costs_at={t: costs(t, 7) for t in range(HORIZON)})
 end = FreeDynamics(arm, None, costs(HORIZON, 0))
 problem = Problem(rest, [knot], [0] * HORIZON, end)
@@ -46,17 +47,17 @@ plan = solver.solve(plan.xs, plan.us)
 
 x, errors, milliseconds = rest.copy(), [], []
 for step in range(STEPS):
-    # the controller: feed-forward and feedback of the plan
+    # the controller applies the plan's feed-forward and feedback
     off_plan = np.r_[condyle.difference(arm, plan.xs[0, :7], x[:7]), x[7:] - plan.xs[0, 7:]]
     u = plan.us[0] + plan.K[0] @ off_plan
 
-    # the simulation: the arm moves; once, something hits its elbow
+    # the simulated arm moves; in one step, something hits its elbow
     v = x[7:] + DT * condyle.aba(arm, data, x[:7], x[7:], u)
     if step == STEPS // 2:
         v[3] += 1.0
     x = np.r_[condyle.integrate(arm, x[:7], DT * v), v]
 
-    # the plan: the horizon moves on, its last knot and its terminal knot get new targets, and one iteration improves it
+    # the horizon moves by one knot, the last and the terminal knot get new targets, and one iteration improves the plan
     solver.shift(0)
     problem.set_costs(HORIZON - 1, costs(step + HORIZON, 7))
     problem.set_costs(HORIZON, costs(step + 1 + HORIZON, 0))

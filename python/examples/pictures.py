@@ -2,8 +2,8 @@
 
     python python/examples/pictures.py [--stay]
 
-Needs `pip install condyle[viz]`. It writes plot.png and spy.png to the current folder. With --stay, the page stays open
-until Enter is pressed.
+The example needs `pip install condyle[viz]`. It writes plot.png and spy.png to the current folder. With --stay, the
+page stays open until Enter is pressed.
 """
 
 import sys
@@ -28,13 +28,13 @@ q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
 
 gait = Gait(robot, q, FEET, DT)
 gait.stand(10)
-gait.step([1, 2], 0.08, 0.06, 20)  # right front and left hind
+gait.step([1, 2], 0.08, 0.06, 20)  # moves the right front and the left hind foot
 gait.step([0, 3], 0.08, 0.06, 20)
 gait.stand(20)
 solution = gait.solve()
 print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.stages)} knots")
 
-# Positions, velocities, controls, and the iterations of the solver.
+# Plots of positions, velocities and controls, and of the solver's iterations.
 viz.plot(solution, robot, DT).savefig("plot.png", dpi=110)
 
 # The inertia matrix has zeros between different legs. Its inverse does not have zeros, because the trunk moves.
@@ -42,7 +42,7 @@ M, Minv = (f(robot, condyle.Data(robot), q) for f in (condyle.crba, condyle.minv
 viz.spy(M, robot).savefig("spy.png", dpi=110)
 print(f"zeros: {(M == 0.0).sum()} of M, {(abs(Minv) < 1e-12).sum()} of its inverse, {M.size} entries each")
 
-# The page: the robot's own shapes, an arrow for each contact force, a slider.
+# The page shows the shapes of the robot's URDF, an arrow for each contact force, and a slider.
 Path("quadruped.urdf").write_text(condyle.robots.QUADRUPED)
 player = viz.play(robot, solution.xs[:, : robot.nq], DT, solution.forces, "quadruped.urdf")
 print(player)

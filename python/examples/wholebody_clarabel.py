@@ -1,4 +1,4 @@
-"""Whole-body control on clarabel alone: the program of `condyle.wholebody` in a hundred lines.
+"""Whole-body control with the solver Clarabel: the cone program of `condyle.wholebody`, written in a hundred lines.
 
 A quadruped stands on four point feet and is pushed. Each millisecond the program
 
@@ -7,7 +7,7 @@ A quadruped stands on four point feet and is pushed. Each millisecond the progra
     J_c q̈ + J̇_c v = 0                              the feet stay
     ‖f_t‖ ≤ μ f_n                                  each foot in its cone
 
-is written for clarabel and solved by it. `WholeBodyController` computes the same tick for comparison.
+is written in Clarabel's form and solved by Clarabel. For comparison, `WholeBodyController` computes the same tick.
 
     pip install clarabel
     python python/examples/wholebody_clarabel.py
@@ -28,7 +28,7 @@ EFFORT = 60.0  # N m
 STIFFNESS, DAMPING = 60.0, 15.5  # 1/s², 1/s
 TRUNK, POSTURE, SMALL_A, SMALL_F = 10.0, 0.1, 1e-6, 1e-4  # w, w_p, ε_a, ε_f
 TOLERANCE = (
-    1e-11  # of both solvers: if a foot just reaches its cone, torques depend on the square root of the tolerance
+    1e-11  # of both solvers; if a foot just reaches its cone, errors of torques are the square root of the tolerance
 )
 DT = 1e-3  # s
 PUSH = 60.0  # N, to the left, from 0.1 s to 0.3 s
@@ -36,7 +36,7 @@ ALIGNED = "local_world_aligned"
 
 
 class Standing:
-    """Posture to hold, as a cone program at each state."""
+    """A posture to hold, and the cone program that holds it at a given state."""
 
     def __init__(self, model, q_ref, trunk):
         self.model, self.data, self.q_ref, self.trunk = model, condyle.Data(model), q_ref, trunk
@@ -50,7 +50,7 @@ class Standing:
         M, h, rest = condyle.crba(model, data, q), condyle.nonlinear_effects(model, data, q, v), np.zeros(model.nv)
         J = condyle.frame_jacobian(model, data, q, "trunk", ALIGNED)
         J_c = np.vstack([condyle.frame_jacobian(model, data, q, foot, ALIGNED)[:3] for foot in FEET])
-        drift, *held = (  # J̇ v: accelerations at q̈ = 0
+        drift, *held = (  # J̇ v: the accelerations of the frames for q̈ = 0
             condyle.frame_classical_acceleration(model, data, q, v, rest, frame, ALIGNED) for frame in ("trunk", *FEET)
         )
         held = np.concatenate([a[:3] for a in held])
@@ -85,7 +85,7 @@ class Standing:
 
 def main():
     model = condyle.robots.quadruped()
-    knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # inwards, feet on the ground
+    knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # knees bent inwards; the feet are on the ground
     q = np.r_[0.0, 0.0, 0.7 * np.cos(0.7), 0.0, 0.0, 0.0, 1.0, knees]
 
     gains = Gains(STIFFNESS, DAMPING)

@@ -1,6 +1,6 @@
 """A humanoid stands on two soles, shifts its weight to one of them, lifts the other foot, and sets it down.
 
-The contact of the lifted foot fades: its force limit is ramped down before lift-off, and up after touch-down.
+The contact of the lifted foot fades: its force limit decreases before lift-off, and increases after touch-down.
 
     python python/examples/wholebody_humanoid.py
 """
@@ -17,7 +17,7 @@ LIFT = 0.1  # m
 
 
 def ramp(t: float, begin: float, end: float) -> np.ndarray:
-    """Returns a smooth step from 0 at one time to 1 at another time: value, rate and acceleration."""
+    """Returns value, rate and acceleration of a smooth function of time that is 0 until `begin` and 1 after `end`."""
     s, w = np.clip((t - begin) / (end - begin), 0.0, 1.0), 1.0 / (end - begin)
     value = s**3 * (10.0 + s * (6.0 * s - 15.0))
     return np.array([value, 30.0 * w * (s * (1.0 - s)) ** 2, 60.0 * w**2 * s * (1.0 - s) * (1.0 - 2.0 * s)])

@@ -1,8 +1,9 @@
-"""A quadruped stands on four point feet, is pushed, sways and comes back.
+"""A quadruped stands on four point feet. A push makes it sway, and it returns to its posture.
 
-Each millisecond one cone program gives the torques: whole-body control with true friction cones. The controller does
-not know the push; it measures only the state. The ground holds each touching foot as long as the force pushes. Its
-friction is unlimited, so the example checks each force and reports how close the worst one came to its cone.
+Each millisecond one cone program gives the torques: whole-body control with exact friction cones. The controller does
+not know the push; it measures only the state. The ground holds each touching foot as long as the ground pushes it. The
+ground's friction is unlimited, so the example checks each force, and reports the largest fraction of the friction limit
+that was used.
 
     python python/examples/wholebody_stand.py
 """
@@ -23,7 +24,7 @@ PUSH = 50.0  # N, to the left, from 0.2 s to 0.6 s
 
 def main() -> None:
     model = condyle.robots.quadruped()
-    knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # inwards, feet on the ground
+    knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # knees bent inwards; the feet are on the ground
     q = np.r_[0.0, 0.0, 0.7 * np.cos(0.7), 0.0, 0.0, 0.0, 1.0, knees]
 
     gains = Gains.critical(60.0)
@@ -42,7 +43,7 @@ def main() -> None:
         times.append(1e6 * (time.perf_counter() - clock))
         error = max(error, *controller.kkt_residuals(world.q, world.v, references))
 
-        f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes, which rotate only little
+        f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes; the trunk turns only a little
         forces = world.step(command.tau, DT, f_ext)
         used = np.max(np.hypot(forces[:, 0], forces[:, 1]) / (FRICTION * forces[:, 2]))
         assert used < 1.0 and forces[:, 2].min() > 0.0, f"a foot slips or lifts at tick {tick}"

@@ -22,7 +22,7 @@ def main() -> None:
 
     gait = Gait(robot, q, FEET, 0.01)
     gait.stand(10)
-    gait.step([1, 2], 0.08, 0.06, 20)  # right front and left hind
+    gait.step([1, 2], 0.08, 0.06, 20)  # moves the right front and the left hind foot
     gait.stand(5)
     gait.step([0, 3], 0.16, 0.06, 20)
     gait.stand(5)

@@ -45,8 +45,9 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 ///
-/// Raises `ModelError` if M is singular at every position. If M is singular only at this position, as for a point mass
-/// on its own axis of rotation, the result is not finite, or is a large number made of rounding errors.
+/// Raises `ModelError` if M is singular at every position. M may also be singular only at this position, as for a point
+/// mass on the axis about which it turns. Then the result is not finite, or is a large number caused by rounding
+/// errors.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -59,11 +60,13 @@ fn aba(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None;
 }
 batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> One { b.aba(model, q, v, tau, f_ext) }
 
-/// Computes the acceleration of `aba` by a chosen method (forward dynamics), nv numbers (rad/s², m/s²).
+/// Computes forward dynamics, like `aba`, by the method that `method` names: the acceleration q̈, nv numbers (rad/s²,
+/// m/s²).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', a
 /// dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros of the tree, O(n d²) for depth d; None, the
-/// fastest: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to rounding.
+/// fastest of these: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to
+/// rounding.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -93,7 +96,8 @@ fn crba(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.crba(model, q) }
 
-/// Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
+/// Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled. M itself is not
+/// computed.
 ///
 /// q: nq numbers.
 ///

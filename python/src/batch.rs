@@ -1,9 +1,9 @@
-//! Many states in one call: arguments and results with one more axis, for the states.
+//! Calls for many states: arguments and results have one more axis, along which the states are stored.
 //!
-//! An argument without that axis is shared by all states. Functions that the library computes in SIMD lanes run in
-//! parts of some milliseconds, with the interpreter's lock released, and write to the arrays that the caller gets.
-//! Functions without `Data` are computed state by state, also without the lock. All other functions are called once for
-//! each state. Signals are checked between parts and states.
+//! An argument without this axis is shared by all states. Functions that the library computes in SIMD lanes release the
+//! interpreter's lock. They compute groups of states, each for some milliseconds, and write directly to the returned
+//! arrays. Functions without `Data` are computed state by state, also without the lock. All other functions are called
+//! once for each state. Signals are checked between groups and between states.
 
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
@@ -21,9 +21,10 @@ use std::ops::{Deref, Range};
 /// Properties of an argument that a call needs before it reads the argument.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Look {
-    /// Whether it contains hyper-dual numbers.
+    /// Whether the argument contains hyper-dual numbers.
     pub(crate) dual: bool,
-    /// Number of states that it is given for. `None` if it is given for a single state, or does not belong to a state.
+    /// Number of states for which the argument is given. `None` if it is given for a single state, or does not depend
+    /// on the state.
     pub(crate) states: Option<usize>,
 }
 
@@ -44,22 +45,22 @@ pub(crate) fn look(name: &str, given: &Bound<'_, PyAny>, shape: &[usize]) -> PyR
     Ok(Look { dual, states: Some(found[0]) })
 }
 
-/// Returns the number of states of an argument that has `axes` axes for a single state; `None` if it is given for a
-/// single one.
+/// Returns the number of states for which an argument is given; `None` for a single state, where the argument has
+/// `axes` axes.
 fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<usize>> {
     if let Ok(array) = given.cast::<PyUntypedArray>() {
         return Ok((array.ndim() == axes + 1).then(|| array.shape()[0]));
     }
     if given.get_item(0).and_then(|first| first.len()).is_err() {
-        return Ok(None); // its elements are numbers
+        return Ok(None); // a vector of numbers belongs to one state
     }
     let shape = given.py().import("numpy")?.call_method1("shape", (given,)).and_then(|shape| shape.extract::<Vec<_>>());
-    // a later reader reports the error
+    // if NumPy found no shape, the function that reads the argument reports the error later
     Ok(shape.ok().filter(|shape| shape.len() == axes + 1).map(|shape| shape[0]))
 }
 
-/// Returns the number of states of a call, on which all arguments must agree; `None` if all are given for a single
-/// state.
+/// Returns the number of states of a call; `None` if all arguments are given for a single state. Arguments with
+/// different numbers of states are an error.
 pub(crate) fn agreed(arguments: &[(&str, Look)]) -> PyResult<Option<usize>> {
     let mut all = arguments.iter().filter_map(|(name, look)| Some((name, look.states?)));
     let Some((first, n)) = all.next() else { return Ok(None) };
@@ -74,7 +75,7 @@ pub(crate) fn agreed(arguments: &[(&str, Look)]) -> PyResult<Option<usize>> {
     }
 }
 
-/// Returns an argument for one state.
+/// Returns the part of an argument that belongs to one state; arguments without an axis for states are returned whole.
 pub(crate) fn at<'py>(given: &Bound<'py, PyAny>, axes: usize, state: Option<usize>) -> PyResult<Bound<'py, PyAny>> {
     match state {
         Some(k) if states(given, axes)?.is_some() => given.get_item(k),
@@ -82,7 +83,7 @@ pub(crate) fn at<'py>(given: &Bound<'py, PyAny>, axes: usize, state: Option<usiz
     }
 }
 
-/// Reads an argument for each of some states, `length` numbers per state.
+/// Reads an argument for all states, `length` numbers per state; an argument for a single state is repeated.
 pub(crate) fn all<'py>(
     name: &str,
     given: &Bound<'py, PyAny>,
@@ -103,12 +104,12 @@ pub(crate) fn all<'py>(
     matrix(name, &numpy.call_method1("broadcast_to", (flat, (states, length)))?, [states, length])
 }
 
-/// Converts numbers, six per body and state, to forces.
+/// Converts numbers to forces, six numbers for each body and state.
 pub(crate) fn forces<S: Scalar>(numbers: &[S]) -> Vec<Force<S>> {
     numbers.as_chunks::<6>().0.iter().map(|&six| six.into()).collect()
 }
 
-/// Stacks the results of the states to one array or tuple.
+/// Stacks the results of all states into one array, or into one tuple of arrays.
 pub(crate) fn stack<'py>(
     py: Python<'py>,
     results: Vec<Bound<'py, PyAny>>,
@@ -155,7 +156,7 @@ impl Deref for Rows<'_> {
     }
 }
 
-/// The kind of result of a function that is computed in SIMD lanes.
+/// The form in which a function computed in SIMD lanes returns its results.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
     /// One array.
@@ -169,7 +170,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Makes the result of these arrays.
+    /// Makes the function's result from its arrays.
     fn assembled<'py>(self, py: Python<'py>, mut arrays: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         match self {
             Self::One => Ok(arrays.remove(0)),
@@ -183,7 +184,7 @@ impl Kind {
         }
     }
 
-    /// Returns the arrays that the caller gives for the results.
+    /// Returns the arrays in `out` in which the caller wants the results, if `out` is given.
     fn places<'py>(self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
         match self {
             Self::One => Ok(vec![out.cloned()]),
@@ -198,24 +199,25 @@ impl Kind {
     }
 }
 
-/// Returns a class of named tuples.
+/// Returns the class of named tuples with this name in `condyle._types`.
 fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
     static TYPES: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
     let types = TYPES.get_or_try_init(py, || PyResult::Ok(py.import("condyle._types")?.unbind()))?;
     Ok(types.bind(py).getattr(class)?.cast_into()?)
 }
 
-/// Maximum number of states of a part, for each thread.
+/// Maximum number of states that each thread computes between two checks for signals.
 pub(crate) const MOST_STATES: usize = 2048;
 
-/// Returns the number of states of a part whose results have `numbers` numbers per state. A thread takes up to a
-/// millisecond for a part, so its start, a third of a microsecond, is negligible. A part fills at least two registers.
+/// Returns the number of states that a thread computes as one part, if the results have `numbers` numbers per state. A
+/// part takes up to a millisecond, so the third of a microsecond to start it is negligible. A part fills at least two
+/// registers.
 fn part_size(numbers: usize) -> usize {
     const NUMBERS: usize = 1 << 18;
     (NUMBERS / numbers.max(1)).next_multiple_of(16).clamp(16, MOST_STATES)
 }
 
-/// Returns an argument's numbers for some of the states.
+/// Returns an argument's numbers for the states in the range `some`.
 pub(crate) fn part<'a, T>(of: &'a [T], some: &Range<usize>, states: usize) -> &'a [T] {
     let each = of.len() / states;
     &of[some.start * each..some.end * each]
@@ -231,7 +233,7 @@ pub(crate) fn run<'py>(
     out: Option<&Bound<'py, PyAny>>,
     mut compute: impl FnMut(&mut BatchWriter<'_, '_, f64>, Range<usize>) + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
-    compute(&mut batch.writer(&mut []), 0..0); // no states: only the shapes of the results are needed
+    compute(&mut batch.writer(&mut []), 0..0); // a call without states, which only finds the shapes of the results
     let shapes: Vec<Vec<usize>> = batch.last_shapes().map(<[_]>::to_vec).collect();
     let mut given = kind.places(py, out)?.into_iter().chain(iter::repeat(None));
     let sizes: Vec<usize> = shapes.iter().map(|shape| shape.iter().product()).collect();

@@ -14,11 +14,12 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The identity of a body in a builder, as `ModelBuilder.body` and other methods return it. `WORLD` always exists.
+/// The identity of a body in a builder, returned by `ModelBuilder.body` and other methods. `WORLD` is valid in every
+/// builder.
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct BodyId {
     inner: condyle::tree::BodyId,
-    /// Number of its builder; `None` for the world.
+    /// Number of the builder that made the body; `None` for the world.
     builder: Option<u64>,
 }
 
@@ -38,10 +39,10 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 
 /// A builder that makes a `Model` body by body, parents first.
 ///
-/// Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass. A joint
-/// that is composed of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of
-/// bodies here. Its q and v have the same layout, but each joint except the last adds a body without mass. `nbodies`,
-/// `names` and the rows of f_ext count these bodies.
+/// Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass.
+/// Pinocchio's composite, universal and spherical ZYX joints are a `chain` of bodies here. The chain has the same q and
+/// v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext include these
+/// bodies.
 ///
 /// name: the name of the robot.
 ///
@@ -107,14 +108,14 @@ impl ModelBuilder {
 
     /// Adds a body and its joint.
     ///
-    /// name: the body's name, and the joint's unless `joint_name` is given.
+    /// name: the name of the body, and also of the joint unless `joint_name` is given.
     /// parent: the body to which the joint is attached.
     /// placement: the joint's frame at position zero, in the parent's frame.
     /// inertia: in the body's frame, which is the joint's frame at position zero.
     /// position: (minimum, maximum) position (rad, m), for joints with one coordinate; None for no limits.
     /// velocity: maximum speed (rad/s, m/s); None for no limit.
     /// effort: maximum effort (N m, N), or (minimum, maximum); None for no limits.
-    /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb friction (N m, N).
+    /// damping: viscous friction (N m s/rad, N s/m). friction: Coulomb friction (N m, N).
     /// damping_polynomial: (d₁, d₂) of the damping coefficient d₀ + d₁|v| + d₂v², with d₀ = damping.
     /// armature: rotor inertia as seen at the joint (kg m², kg).
     #[pyo3(signature = (
@@ -148,12 +149,12 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds a body after several joints in a row: a composite joint. Each joint is placed in the frame of the joint
-    /// before.
+    /// Adds a body at the end of a chain of joints: a composite joint. The placement of each joint is relative to the
+    /// frame of the joint before.
     ///
-    /// Its coordinates are the coordinates of the joints, one joint after the other. Between the joints are bodies
-    /// without mass, `name#1`, `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about
-    /// unit vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+    /// The coordinates of the joints follow one another in q and v. Bodies without mass, named `name#1`, `name#2`, and
+    /// so on, connect the joints. Returns the last body, which has `inertia`. A universal joint about unit vectors a
+    /// and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
     ///
     /// joints: a list of (joint, placement).
     #[pyo3(signature = (name, parent, joints, inertia=None))]
@@ -195,7 +196,8 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds an inertia, given in a frame at `placement` in the body's frame, to a body.
+    /// Adds an inertia to a body. The inertia is given in its own frame, which has the pose `placement` in the body's
+    /// frame.
     fn merge(
         &mut self,
         body: &Bound<'_, BodyId>,
@@ -208,8 +210,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user'. Frames of different kinds may
-    /// have the same name.
+    /// Adds a frame with the pose `placement` in the body's frame. kind: 'link', 'joint' or 'user'. Frames of different
+    /// kinds may have the same name.
     #[pyo3(signature = (name, body, placement=None, kind="user"))]
     fn frame(
         &mut self,
@@ -229,7 +231,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Makes a joint follow another one: its position is ratio q + offset, and it has no coordinate of its own.
+    /// Makes a joint follow another one: the follower's position is ratio q + offset, where q is the leader's position.
+    /// The follower has no coordinate in q.
     ///
     /// follower, leader: the bodies that the joints carry.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
@@ -245,8 +248,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a whole robot, with its world at `placement` in the frame of `parent`; `prefix` is added before all its
-    /// names.
+    /// Adds a whole robot. The pose of its world in the frame of `parent` is `placement`. `prefix` is added before all
+    /// its names.
     ///
     /// >>> from condyle import ModelBuilder, WORLD
     /// >>> two = ModelBuilder("two arms")
@@ -272,7 +275,7 @@ impl ModelBuilder {
     /// Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
     ///
     /// body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
-    /// spring is at rest, as many numbers as the joint has in q.
+    /// spring is at rest, with as many numbers as the joint has in q.
     ///
     /// >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
     /// >>> robot = ModelBuilder("door")
@@ -299,12 +302,12 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Supports a ratio of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
-    /// mass. The supported weight follows when the inertia of the body changes.
+    /// Supports a fraction of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
+    /// mass. If the inertia of the body changes later, the force changes with it.
     ///
-    /// ratio: the supported ratio of the weight; 1 supports all of it.
-    /// part: None for the whole body, or the inertia of a part of the body that has this ratio instead. It is included
-    ///     in the inertia of the body, and is in a frame at `placement` in the body's frame.
+    /// ratio: the supported fraction of the weight; 1 supports the whole weight.
+    /// part: None for the whole body, or the inertia of the part of the body to which `ratio` applies. The inertia of
+    ///     the body must include this inertia, which is given in a frame with the pose `placement` in the body's frame.
     #[pyo3(signature = (body, ratio=1.0, part=None, placement=None))]
     fn compensate_gravity(
         &mut self,
@@ -324,13 +327,13 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change
-    /// limits, armature and damping, which belong to the joints.
+    /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. Limits, armature and
+    /// damping belong to the joints; an actuator does not change them.
     ///
     /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
     /// tendon: the tendon's name, if the actuator drives a tendon.
-    /// gear: a number, or up to six; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1
-    /// for a motor, which has neither. control, force: (minimum, maximum); None for no limits.
+    /// gear: one to six numbers; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1 if
+    /// both are 0, as for a motor. control, force: (minimum, maximum); None for no limits.
     #[pyo3(signature = (
         name, joint, *, tendon=None, gear=None, gain=None, bias=0.0, kp=0.0, kv=0.0, control=None, force=None
     ))]
@@ -383,8 +386,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
-    /// added. The builder cannot be used afterwards.
+    /// Builds the model: checks all data and numbers the bodies depth first, and siblings in the order of the calls
+    /// that added them. The builder cannot be used afterwards.
     ///
     /// Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
     /// joint with an invalid leader.

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyList, PyTuple};
 
-/// Attributes that are made once.
+/// Attributes of a model whose Python objects are made once.
 #[derive(Clone, Copy)]
 pub(crate) enum Attribute {
     Names,
@@ -33,7 +33,7 @@ pub(crate) enum Attribute {
     Frames,
 }
 
-/// The attributes that were accessed so far.
+/// The Python objects of the attributes that were accessed so far.
 pub(crate) struct Cached([PyOnceLock<Py<PyAny>>; Attribute::Frames as usize + 1]);
 
 impl Cached {

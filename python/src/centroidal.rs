@@ -32,8 +32,8 @@ fn com_velocity(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.com_velocity(model, q, v) }
 
-/// Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3
-/// numbers (m/s²); O(n).
+/// Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s²);
+/// O(n). Gravity is not subtracted.
 ///
 /// q: nq numbers; v, a: nv.
 fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
@@ -43,14 +43,14 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.com_acceleration(mo
 
 /// Computes the Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 ///
-/// q: nq numbers. It is a part of `centroidal_map`.
+/// q: nq numbers. The result is also a member of `centroidal_map`.
 fn com_jacobian(model, data; q: Position; out) {
     condyle::centroidal::centroidal_map(model, data, &q).Jcom
 }
 batch b: any(q: Position) -> One { b.com_jacobian(model, q) }
 
-/// Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the quantities from which it is made, in O(n), as
-/// `CentroidalMap(Ag, Ig, com, Jcom)`.
+/// Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the centroidal inertia, the centre of mass and
+/// its Jacobian, in O(n), as `CentroidalMap(Ag, Ig, com, Jcom)`.
 ///
 /// q: nq numbers. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass. out:
 /// four arrays, such as an earlier result.
@@ -84,7 +84,7 @@ fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
 batch b: any(q: Position, v: Tangent) -> One { b.centroidal_momentum(model, q, v) }
 
 /// Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). It equals
-/// the weight and the external forces, taken about the centre of mass.
+/// the sum of the weight and of the external forces about the centre of mass.
 ///
 /// q: nq numbers; v, a: nv.
 fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; out) {

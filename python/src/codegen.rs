@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZero;
 
-/// Names and shapes of arrays.
+/// Arrays of a function: their names, numbers of rows and numbers of columns.
 type Arrays = Vec<(String, usize, usize)>;
 
 /// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations,

@@ -1,4 +1,4 @@
-//! The space of positions, and its tangent vectors.
+//! Functions of positions and of tangent vectors between them.
 
 use crate::arrays::{Computed, Give};
 use crate::exceptions::wrong_word;
@@ -23,7 +23,7 @@ use rand::rngs::{StdRng, SysRng};
 pub(crate) fn random_configuration<'py>(model: &Bound<'py, Model>, seed: Option<u64>) -> PyResult<Bound<'py, PyAny>> {
     let mut rng = match seed {
         Some(seed) => StdRng::seed_from_u64(seed),
-        // seeded by the system: otherwise forked processes would continue with the numbers of their parent
+        // each call takes a new seed from the system: otherwise forked processes would draw equal numbers
         None => StdRng::try_from_rng(&mut SysRng).map_err(|error| PyOSError::new_err(error.to_string()))?,
     };
     condyle::random_configuration(&model.get().inner, &mut rng).give(model.py(), None)
@@ -107,7 +107,7 @@ each(q: Scalable) -> [nq] |to| {
     condyle::normalize(model, to)
 }
 
-/// Moves the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+/// Transports the columns of X, which are tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 ///
 /// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
 /// equals `transport` with −v.

@@ -68,7 +68,7 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
 pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult<Bound<'py, PyDict>> {
     let constraints = PyDict::new(py);
     let joint = |body: usize| &*model.bodies()[body].joint_name;
-    // by index if another frame has the same name
+    // give the frame's index instead of its name if another frame has the same name
     let frame = |index: usize| -> PyResult<Bound<'py, PyAny>> {
         let name = &*model.frames()[index].name;
         if model.frame(name) == Ok(index) { name.into_bound_py_any(py) } else { index.into_bound_py_any(py) }
@@ -90,7 +90,7 @@ pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult
     Ok(constraints)
 }
 
-/// Changes the given parts of a target.
+/// Changes those members of a target that are given.
 fn aim(
     target: &mut Target<f64>,
     placement: Option<&Bound<'_, PyAny>>,
@@ -113,20 +113,20 @@ fn aim(
 /// Constraints of one model, contacts and loops, and the scratch memory of `constrained_dynamics` and similar
 /// functions.
 ///
-/// Make one set for each combination of contacts; all sets may share one `Data`. Like a `Data`, a set may be used by
-/// one thread at a time.
+/// Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
+/// set.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found.
-/// Redundant constraints then share the smallest forces. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ =
-/// 0 one iteration is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard,
-/// Proximal and sparse resolution of constrained dynamic equations (2021).
+/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. In the first iteration λ' is 0, in each later one it is
+/// the previous λ. Redundant constraints then share the forces so that the forces are smallest. Choose μ small compared
+/// with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
+/// Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
 ///
 /// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
-/// to 10000, which is always reached.
+/// to 10000; none of them is skipped.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
-/// the same. Also raises it if a reference frame is 'world', a gain is negative or not finite, a target is not finite,
-/// or its placement is not a homogeneous matrix.
+/// the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is
+/// not finite, or the placement of a target is not a homogeneous matrix.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> feet = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
@@ -138,7 +138,7 @@ pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
     /// The set for hyper-dual numbers, made when it is first needed after a change of the targets.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
-    /// The sets for the SIMD lanes of a batch, made when they are first needed.
+    /// The constraints for many states in SIMD lanes, made when they are first needed.
     lanes: Option<Box<condyle::batch::BatchConstraints>>,
     /// The constraints with their current targets.
     constraints: Vec<ContactConstraint>,
@@ -160,7 +160,7 @@ impl ConstraintSet {
         Ok(Self { inner, dual: None, lanes: None, constraints, nv: robot.nv(), made_for, robot })
     }
 
-    /// Returns the same constraints for a batch.
+    /// Returns the same constraints for many states, as scratch memory that fits the batch.
     pub(crate) fn side_by_side(
         &mut self,
         batch: &condyle::Batch,
@@ -262,10 +262,10 @@ impl ConstraintSet {
         Ok(PySlice::new(py, range.start as isize, range.end as isize, 1))
     }
 
-    /// Changes the target of constraint k: the placement of its frame and its motion there. Parts that are not given do
-    /// not change.
+    /// Changes the target of constraint k: placement, velocity and acceleration of its frame. Members that are not
+    /// given do not change.
     ///
-    /// Raises `ModelError` for numbers that are not finite and for an invalid placement; the old target is kept then.
+    /// Raises `ModelError` for numbers that are not finite and for an invalid placement; then the old target is kept.
     #[pyo3(signature = (k, placement=None, velocity=None, acceleration=None))]
     fn set_target(
         &mut self,
@@ -299,8 +299,9 @@ functions! {
 /// Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
 /// dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
-/// other, or one that cannot be satisfied at a singular posture, give finite numbers and a residual.
+/// constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. If constraints contradict each
+/// other, or a constraint cannot be satisfied at a singular posture, the results are finite and `residual` is above
+/// zero.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -343,9 +344,10 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 ///
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
-/// `constrained_dynamics_derivatives` solves these equations; nothing is inverted here. constraints: a `ConstraintSet`,
-/// whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move
-/// with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
+/// `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
+/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`;
+/// the forces move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an
+/// earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -364,8 +366,8 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 /// Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
 /// lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`, whose gains, velocities and accelerations are ignored; q: nq numbers; v: nv;
-/// restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+/// constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q: nq
+/// numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])

@@ -13,9 +13,9 @@ use std::sync::Arc;
 
 /// Scratch memory of the algorithms for one model: made once, and used by one thread at a time.
 ///
-/// It serves all models with the same bodies and joints, whatever their gravity, armature or inertias. No algorithm
-/// reads results of an earlier one, so calls may come in any order. Use from two threads at once is a `RuntimeError`;
-/// use with another robot's model is a `ValueError`.
+/// It can be used with all models that have the same bodies and joints, even with other gravity, armature or inertias.
+/// No algorithm reads results of an earlier call, so the order of calls does not matter. Use from two threads at once
+/// is a `RuntimeError`; use with another robot's model is a `ValueError`.
 ///
 /// model: the robot; threads: the number of threads for calls with many states (q of shape (N, nq)), at most 1024. Such
 /// calls also compute several states at once in SIMD lanes, and release the interpreter's lock.
@@ -27,12 +27,12 @@ use std::sync::Arc;
 pub(crate) struct Data {
     inner: condyle::Data<f64>,
     made_for: MadeFor,
-    /// The model for which it was made.
+    /// The model for which this `Data` was made.
     robot: Arc<condyle::Model>,
     threads: usize,
     /// The scratch for hyper-dual numbers, made when it is first needed.
     dual: Option<Box<condyle::Data<Hyper>>>,
-    /// The batch, with a capacity for the largest part of a call so far.
+    /// The scratch for many states, large enough for all calls so far.
     batch: Option<Box<condyle::Batch>>,
 }
 
@@ -61,7 +61,7 @@ impl Data {
 }
 
 impl Data {
-    /// Returns a batch with a capacity of `states` states, or of the maximum for a part of a call.
+    /// Returns a batch for `states` states, or for the largest number of states that is computed at once.
     pub(crate) fn batch(&mut self, model: &condyle::Model, states: usize) -> &mut condyle::Batch {
         let states = states.min(batch::MOST_STATES * self.threads);
         let enough = self.batch.take().filter(|batch| batch.capacity() >= states);
@@ -95,19 +95,20 @@ impl Holds<Hyper> for Data {
 pub(crate) trait Scratch: PyClass<Frozen = False> {
     /// Name of the argument.
     const ARGUMENT: &'static str;
-    /// Returns the models that it serves.
+    /// Returns the models with which this object may be used.
     fn made_for(&self) -> &MadeFor;
 }
 
 /// Scratch memory for one type of number.
 pub(crate) trait Holds<S>: Scratch {
-    /// The library's type of this scratch memory.
+    /// The library's type for this scratch memory.
     type Held;
     /// Returns the library's scratch memory, made now if it does not exist yet.
     fn held(&mut self, model: &condyle::Model) -> PyResult<&mut Self::Held>;
 }
 
-/// Borrows scratch memory for a call, if it is free and serves this model.
+/// Borrows scratch memory for a call. Raises an error if another call uses the memory, or if it belongs to another
+/// robot.
 pub(crate) fn take<'py, T: Scratch>(model: &Model, scratch: &Bound<'py, T>) -> PyResult<PyRefMut<'py, T>> {
     let scratch = scratch.try_borrow_mut().map_err(|_| {
         let (argument, class) = (T::ARGUMENT, T::NAME);

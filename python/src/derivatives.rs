@@ -1,4 +1,5 @@
-//! Derivatives besides the first ones of `rnea` and `aba`: one Python function for each function of the library.
+//! Derivatives other than the first derivatives of `rnea` and `aba`: one Python function for each function of the
+//! library.
 
 use crate::arrays::{Array, Number, named_tuples};
 use crate::functions::{any, functions, regular};
@@ -18,7 +19,7 @@ named_tuples! {
     RneaSecondDerivatives { dqdq, dvdq, dvdv, dadq }
 }
 
-/// Matrices of one shape as one array, with one more axis in front.
+/// Matrices of equal shape as one array, whose first axis numbers the matrices.
 impl<S: Number> Array for [DMatrix<S>] {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -36,9 +37,9 @@ functions! {
 /// most O(n) per column.
 ///
 /// q: nq numbers; v, a: nv; wrt: the input; f_ext: as for `rnea`. Values of wrt: 'gravity', the acceleration of free
-/// fall, 3 numbers; 'armature', 'damping', nv each (damping counts as if `passive_torque` is added to τ); ('force',
-/// body), the external force on a body, 6, in its frame; ('inertia', body), its 10 inertial parameters; or ('friction',
-/// smoothing), nv, for the smoothing of `passive_torque`.
+/// fall, 3 numbers; 'armature', nv numbers; 'damping', nv numbers, as if `passive_torque` were added to τ; ('force',
+/// body), the external force on a body in the body's frame, 6 numbers; ('inertia', body), the 10 inertial parameters of
+/// a body; or ('friction', smoothing), nv numbers, with the smoothing of `passive_torque`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
@@ -78,8 +79,8 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; wrt: Inpu
 /// dadq)`, each (nv, nv); the other blocks are zero.
 ///
 /// q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is the
-/// derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. It is the Hessian with
-/// respect to δ at `integrate(q, δ)`.
+/// derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. Derivatives with respect
+/// to q are derivatives with respect to δ at `integrate(q, δ)`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -97,8 +98,8 @@ batch b: any(q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Force
 /// nv); the other blocks are zero.
 ///
 /// q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is
-/// the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. It is the Hessian
-/// with respect to δ at `integrate(q, δ)`.
+/// the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. Derivatives with
+/// respect to q are derivatives with respect to δ at `integrate(q, δ)`.
 fn aba_hessian(model, data; q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
     condyle::derivatives::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
@@ -110,8 +111,8 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext:
 /// Computes the exact second derivatives of `rnea` as full tensors in O(n² depth), as `RneaSecondDerivatives(dqdq,
 /// dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 ///
-/// q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. That function
-/// returns the tensors contracted with a vector, and is many times faster.
+/// q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. If the product of
+/// the tensors with a vector is enough, `rnea_hessian` is many times faster.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)

@@ -1,7 +1,7 @@
-//! DLPack, with which libraries lend each other arrays on devices: reads and makes its capsules for the module
-//! `condyle.cuda`.
+//! Reads and makes DLPack capsules for the module `condyle.cuda`. With these capsules, libraries lend each other arrays
+//! on devices.
 //!
-//! A lent array may be returned by any thread, and after the interpreter has ended.
+//! The borrower may return a lent array from any thread, also after the interpreter has ended.
 #![allow(unsafe_code)]
 
 use core::ffi::{CStr, c_void};
@@ -48,11 +48,12 @@ const VERSIONED: &CStr = c"dltensor_versioned";
 /// (kind of device, device index), flags.
 type Description = (usize, (u8, u8, u16), Vec<i64>, Option<Vec<i64>>, (i32, i32), u64);
 
-/// Describes the array that a DLPack capsule lends. It is valid as long as the capsule exists; ownership is not taken.
+/// Describes the array that a DLPack capsule lends. The caller keeps the capsule as long as it uses the array;
+/// ownership is not taken.
 #[pyfunction]
 #[pyo3(name = "_borrowed")]
 pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
-    // SAFETY: a capsule of that name has that structure; later major versions may differ only after the field `flags`.
+    // SAFETY: the capsule's name determines its structure. In other major versions, fields up to `flags` are the same.
     let (tensor, flags) = unsafe {
         if ffi::PyCapsule_IsValid(capsule.as_ptr(), VERSIONED.as_ptr()) != 0 {
             let managed = ffi::PyCapsule_GetPointer(capsule.as_ptr(), VERSIONED.as_ptr()).cast::<Versioned>();
@@ -68,7 +69,7 @@ pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
             return Err(PyTypeError::new_err("DLPack: expected a capsule that nobody has taken over"));
         }
     };
-    // SAFETY: as above; there are `ndim` sizes and strides, or the strides are null.
+    // SAFETY: the capsule's name determines its structure. It has `ndim` sizes and as many strides, or null strides.
     unsafe {
         let tensor = &*tensor;
         let numbers = |from: *mut i64| match usize::try_from(tensor.ndim) {
@@ -81,7 +82,7 @@ pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
     }
 }
 
-/// A lent array as `M` describes it, with all data to which the description points.
+/// A lent array: its description of type `M`, and all data to which the description points.
 struct Lent<M> {
     managed: M,
     _numbers: [Vec<i64>; 2],
@@ -91,9 +92,9 @@ struct Lent<M> {
 /// Takes back a lent array.
 ///
 /// # Safety
-/// `context` is a `Lent<M>` from a box, and it is not used afterwards.
+/// `context` comes from a `Box<Lent<M>>`, and the caller does not use it afterwards.
 unsafe fn take_back<M>(context: *mut c_void) {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller promises that `context` comes from a `Box<Lent<M>>`.
     let mut lent = unsafe { Box::from_raw(context.cast::<Lent<M>>()) };
     let mut owner = lent.owner.take();
     if Python::try_attach(|_| drop(owner.take())).is_none() {
@@ -102,7 +103,7 @@ unsafe fn take_back<M>(context: *mut c_void) {
 }
 
 unsafe extern "C" fn delete_plain(managed: *mut Managed) {
-    // SAFETY: the borrower calls this once.
+    // SAFETY: the borrower calls this function once.
     unsafe { take_back::<Managed>((*managed).context) }
 }
 
@@ -111,10 +112,10 @@ unsafe extern "C" fn delete_versioned(managed: *mut Versioned) {
     unsafe { take_back::<Versioned>((*managed).context) }
 }
 
-/// Destroys a capsule. A consumer that takes ownership renames the capsule; if the name is unchanged, the lent array is
-/// taken back.
+/// Destroys a capsule. A library that takes over the array renames the capsule. If the name is unchanged, no library
+/// did so, and the lent array is taken back.
 unsafe extern "C" fn end(capsule: *mut ffi::PyObject) {
-    // SAFETY: a capsule of that name was made here.
+    // SAFETY: capsules with this destructor and an unchanged name hold the structure that `lend` stored.
     unsafe {
         if ffi::PyCapsule_IsValid(capsule, VERSIONED.as_ptr()) != 0 {
             delete_versioned(ffi::PyCapsule_GetPointer(capsule, VERSIONED.as_ptr()).cast());
@@ -124,8 +125,8 @@ unsafe extern "C" fn end(capsule: *mut ffi::PyObject) {
     }
 }
 
-/// Makes a DLPack capsule that lends floating-point numbers on a CUDA device; their owner is kept alive until they are
-/// returned.
+/// Makes a DLPack capsule that lends floating-point numbers on a CUDA device. The owner of the numbers is kept alive
+/// until the borrower returns them.
 #[pyfunction]
 #[pyo3(name = "_lend")]
 pub(crate) fn lend(

@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 
-/// Defines a class for a factor of a matrix: the methods that both kinds have, besides their constructors and own
-/// methods.
+/// Defines a class for a factor of a matrix. Both kinds of factor get the same methods, besides a constructor and
+/// methods that only one of them has.
 macro_rules! factor {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -40,11 +40,11 @@ macro_rules! factor {
                 format!("<condyle.{} of a matrix ({n}, {n})>", stringify!($class), n = self.size)
             }
 
-            /// Computes the factor of M, a symmetric positive definite matrix; the docstring of the class has the cost.
+            /// Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
+            /// cost.
             ///
-            /// M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception raised
-            /// by a signal handler, such as KeyboardInterrupt, stops the computation between rows; no factor exists
-            /// then.
+            /// M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
+            /// signal handler, such as KeyboardInterrupt, stops the computation between rows. Then no factor exists.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
                 let (py, M) = (M.py(), matrix("M", M, [self.size, self.size])?.to_matrix());
                 self.done = false;
@@ -114,11 +114,11 @@ factor! {
 /// A factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
 /// diagonal.
 ///
-/// With depth d of the tree (columns on the path to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
-/// `inverse` O(n² d); for a chain d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
-/// matrix for branched kinematic trees (2005).
+/// With n = nv and the depth d of the tree (the largest number of columns on a path to the root), `factorize` costs O(n
+/// d²), `solve` O(n d), `inverse` O(n² d). For a chain, d = n. Source: Featherstone, Efficient factorization of the
+/// joint-space inertia matrix for branched kinematic trees (2005).
 ///
-/// model: the robot, which defines the zeros of M.
+/// model: the robot whose tree defines the zeros of M.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -135,22 +135,22 @@ Ltdl {
         Self { inner: condyle::factors::Ltdl::new(model), size: model.nv(), done: false }
     }
 
-    /// The number of entries of L and D that may differ from zero, without the ones on L's diagonal.
+    /// The number of entries of L and D that may differ from zero. The diagonal of L, which is one, is not counted.
     #[getter]
     fn nonzeros(&self) -> usize {
         self.inner.nonzeros()
     }
 
-    /// The coordinates in their order from the root to the tips; they are eliminated in reverse order.
+    /// The coordinates in order from the root to the tips; the factorisation eliminates them in reverse order.
     ///
-    /// It is 0, 1, 2, … unless joints share coordinates.
+    /// The order is 0, 1, 2, and so on, unless joints share coordinates.
     #[getter]
     fn order(&self) -> Vec<usize> {
         self.inner.order().to_vec()
     }
 
-    /// Returns the off-diagonal entries of row k of L, from the diagonal to the root, as (index, value). Both indices
-    /// count in `order`.
+    /// Returns the off-diagonal entries of row k of L, from the diagonal to the root, as (index, value). Rows and
+    /// columns are numbered as in `order`.
     fn row(&self, k: usize) -> PyResult<Vec<(usize, f64)>> {
         if k >= self.size {
             return Err(PyIndexError::new_err(format!("k: expected less than {}, found {k}", self.size)));
@@ -169,8 +169,9 @@ Ltdl {
 factor! {
 /// The factor M = L Lᵀ of any symmetric positive definite matrix.
 ///
-/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same methods
-/// and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
+/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`: it has the same
+/// methods, and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm
+/// 4.2.1.
 ///
 /// n: the number of rows of M, at most 4096.
 ///
@@ -193,14 +194,14 @@ Cholesky {
 }
 }
 
-/// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
+/// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and scratch memory.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
-/// joining two pieces costs about six times as much as eliminating a body. With two threads, and as many runs as
-/// threads, it is faster than `aba` from about 200 bodies on; with one thread it is always slower. With joints that
-/// share coordinates (mimic), the passes run once for the robot with all joints free, and once more for each of these
-/// joints. The results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer
-/// articulated-body algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+/// joining two pieces costs about six times as much as eliminating a body. With two threads and two runs, the algorithm
+/// is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with mimic joints,
+/// the passes run once with all joints free, and once more for each joint that shares a coordinate. The results are
+/// bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for
+/// parallel O(log(n)) calculation of rigid-body dynamics (1999).
 ///
 /// model: the robot; grain: the maximum number of bodies in a run.
 ///
@@ -234,7 +235,8 @@ impl DivideConquer {
         format!("<condyle.DivideConquer of '{}': {} bodies in {} runs>", self.made_for.name, size.bodies, size.runs)
     }
 
-    /// The work of the assembly, and the depth of its pieces, which run one after the other, as `AssemblySize`.
+    /// The numbers of operations of the assembly, and the depth of its pieces, which run one after the other, as
+    /// `AssemblySize`.
     #[getter]
     fn size<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let s = self.inner.size();
@@ -242,7 +244,8 @@ impl DivideConquer {
         class!(py, "AssemblySize")?.call1(numbers)
     }
 
-    /// Computes the acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
+    /// Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
+    /// + grain) steps.
     ///
     /// model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
     /// f_ext: as for `rnea`.

@@ -1,4 +1,4 @@
-//! Calls of the library's functions from Python: kinds of arguments, and the parts that all calls have in common.
+//! Calls of the library's functions from Python: kinds of arguments, and the code that all calls have in common.
 //!
 //! `functions!` makes a Python function from a declaration such as
 //!
@@ -9,21 +9,21 @@
 //! }
 //! ```
 //!
-//! Each argument has a kind, a type below that defines how it is read. The last expression is the result for Python: an
-//! array or a tuple of arrays, or `out` if it is given. Scratch memory other than `data` is declared after it, with its
-//! type. The call borrows its scratch memory before it inspects any other argument, so that nested use of the same
-//! memory is an error. It reads all inputs before it writes to `out`, which may be one of them. Positions, tangent
-//! vectors and forces may be given for many states, with one more axis; the results then have it too, see `batch.rs`. A
-//! line
+//! Each argument has a kind, which is a type below; the type defines how the argument is read. The last expression is
+//! the result for Python: an array or a tuple of arrays, or `out` if it is given. Scratch memory other than `data` is
+//! declared after `data`, with its type. The call borrows its scratch memory before it inspects any other argument, so
+//! that nested use of the same memory is an error. It reads all inputs before it writes to `out`, so `out` may be one
+//! of the inputs. Positions, tangent vectors and forces may be given for many states, with one more axis. The results
+//! then have this axis, too; see `batch.rs`. A line
 //!
 //! ```text
 //! batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
 //! ```
 //!
-//! defines the computation for many states: the check that the robot must pass; the arguments, with those shared by all
-//! states after a semicolon; the kind of result; and the call of the library's `Batch`. `batch b, constraints: …` adds
-//! constraints. A function without `Data` has a line `each` instead, with the shape of its result; it is called state
-//! by state.
+//! defines the computation for many states. It contains the check that the robot must pass, the arguments, the kind of
+//! result, and the call of the library's `Batch`. Arguments that all states share follow after a semicolon. `batch b,
+//! constraints` instead of `batch b` adds a set of constraints. A function without `Data` has a line that begins with
+//! `each` instead, with the shape of its result; it is called state by state.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
@@ -46,8 +46,8 @@ pub(crate) trait Argument<'a, 'py> {
     type Read<S: Number>;
     /// The value that the library takes for many states.
     type All;
-    /// Reads the argument if it has the simplest form for a single state: a double array in C order, or a word. Then no
-    /// Python code runs. Returns `None` if it has another form or is invalid.
+    /// Reads the argument without running Python code, if it has the simplest form for a single state: a double array
+    /// in C order, or a word. Returns `None` if the argument has another form or is invalid.
     fn at_once(_given: &Self::Given, _model: &Model) -> Option<Self::Read<f64>> {
         None
     }
@@ -55,20 +55,21 @@ pub(crate) trait Argument<'a, 'py> {
     fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
     }
-    /// Reads the argument for a single state, or for state `state` if it is given for many states; for any type of
-    /// number.
+    /// Reads the argument as numbers of any type: for a single state, or for state `state` if it is given for many
+    /// states.
     fn read_at<S: Number>(
         name: &str,
         given: &Self::Given,
         model: &Model,
         state: Option<usize>,
     ) -> PyResult<Self::Read<S>>;
-    /// Inspects the argument before anything is read.
+    /// Finds the number of states of an argument, and whether it contains hyper-dual numbers, before any argument is
+    /// read.
     fn look(_name: &str, _given: &Self::Given, _model: &Model) -> PyResult<Look> {
         Ok(Look::default())
     }
-    /// Reads the argument for all states. Copies it if results are written to its memory before all states are
-    /// computed.
+    /// Reads the argument for all states. Copies the argument if results are written to its memory before all states
+    /// are computed.
     fn read_all(
         name: &str,
         given: &Self::Given,
@@ -91,14 +92,14 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
         Self { given, read }
     }
 
-    /// Returns whether `at_once` read it.
+    /// Returns whether `at_once` has read the argument.
     #[inline(always)]
     pub(crate) fn is_read(&self) -> bool {
         self.read.is_some()
     }
 
-    /// Returns the doubles (S) for one of many states, or for the only one; `at_once` is true if all arguments were
-    /// read at once.
+    /// Returns the argument's doubles for one of many states, or for the single state. `at_once` is true if
+    /// `Argument::at_once` read all arguments of the call.
     #[inline(always)]
     #[allow(clippy::extra_unused_type_parameters)] // has the type parameter of `duals`
     pub(crate) fn numbers<S>(
@@ -126,7 +127,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
     }
 }
 
-/// Defines kinds of argument that are one vector per state, with the length of the vector.
+/// Defines kinds of argument that are one vector for each state, with the length of this vector.
 macro_rules! vectors {
     ($($(#[$doc:meta])* $kind:ident: $length:ident),*) => {$(
         $(#[$doc])*
@@ -248,7 +249,7 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     }
 }
 
-/// Defines kinds of argument that all states share, with the function that reads one.
+/// Defines kinds of argument that all states share, with the function that reads an argument of this kind.
 macro_rules! shared {
     ($(
         $(#[$doc:meta])*
@@ -317,7 +318,7 @@ shared! {
         Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
     }, at once if |_| true }
 
-    /// An input of the dynamics other than q, v, a and τ: a word, or a word with a body or a number.
+    /// An input of the dynamics other than q, v, a and τ: a word, or a tuple of a word and a body or number.
     InputOf<S>: &'a Bound<'py, PyAny> => condyle::derivatives::Input { |name, given, model| {
         use condyle::derivatives::Input;
         if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
@@ -357,7 +358,7 @@ shared! {
     Word<S>: &'a str => &'a str { |_, given, _| Ok(*given), at once if |_| true }
 }
 
-/// Returns whether a name or an index has exactly Python's own type, so that no Python code runs when it is read.
+/// Returns whether a name or an index is exactly a `str` or an `int`, so that reading it runs no Python code.
 fn is_plain(given: &&Bound<'_, PyAny>) -> bool {
     given.is_exact_instance_of::<PyString>() || given.is_exact_instance_of::<PyInt>()
 }
@@ -390,7 +391,8 @@ pub(crate) fn regular(model: &Model) -> PyResult<()> {
     }
 }
 
-/// Declares functions of a model, of a `Data` if `data` follows it, and of other scratch memory after that; see above.
+/// Declares Python functions of a model, and of a `Data` and other scratch memory if these are given. The module's text
+/// explains the declarations.
 macro_rules! functions {
     ($(
         $(#[$doc:meta])*
@@ -410,7 +412,7 @@ macro_rules! functions {
             $($arg: <$crate::functions::$kind as $crate::functions::Argument<'a, 'py>>::Given,)*
             $($out: Option<&'a Bound<'py, PyAny>>,)?
         ) -> PyResult<Bound<'py, PyAny>> {
-            #[allow(unused_imports)] // by functions without a `Data` or without arguments
+            #[allow(unused_imports)] // unused in functions without a `Data` or without arguments
             use $crate::{arrays::Give as _, batch, data::Holds, functions as kinds, functions::Argument};
             let (py, robot) = ($model.py(), $model.get());
             $(
@@ -420,8 +422,8 @@ macro_rules! functions {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            // fast path: most calls are for one state in arrays of doubles; all other arguments are inspected before
-            // they are read
+            // Fast path: most calls have one state in arrays of doubles, which are read here. If one argument has
+            // another form, all arguments are inspected first.
             $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
             let at_once = true $(&& $arg.is_read())*;
             let (dual, states) = if at_once { (false, None) } else {
@@ -460,7 +462,7 @@ macro_rules! functions {
                     $one
                 });
             })?
-            // one body of code for doubles and for hyper-dual numbers
+            // the same code is compiled for doubles and for hyper-dual numbers
             macro_rules! call {
                 ($S:ty, $read:ident, $state:expr, $to:expr) => {{
                     $(
@@ -472,7 +474,7 @@ macro_rules! functions {
                     result.give(py, $to)
                 }};
             }
-            #[allow(unused_mut, unused_variables)] // by functions without a `Data` or without arguments
+            #[allow(unused_mut, unused_variables)] // unused in functions without a `Data` or without arguments
             let mut call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| {
                 if dual { call!($crate::hyper_dual::Hyper, duals, state, out) } else { call!(f64, numbers, state, out) }
             };

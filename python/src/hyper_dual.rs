@@ -1,4 +1,4 @@
-//! Hyper-dual numbers as Python objects, which NumPy stores in arrays of objects.
+//! The class `HyperDual`: hyper-dual numbers as Python objects. NumPy stores them in arrays of objects.
 
 use crate::arrays::{Give, Number, check_shape};
 use condyle::Scalar;
@@ -10,8 +10,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// A hyper-dual number for the library's computations. Its operations are function calls, not inlined: a model's
-/// functions contain thousands of them, and the time goes into creating and reading the Python objects.
+/// A hyper-dual number for the library's computations. Its operations are not inlined, because a model's functions
+/// contain thousands of operations. Most of the time is spent on creating and reading the Python objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hyper(HyperDual64);
 
@@ -113,9 +113,9 @@ impl Scalar for Hyper {
 /// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
 /// directions, and the mixed second derivative.
 ///
-/// Store them in NumPy arrays of objects. Arithmetic and NumPy's elementary functions work on these, and so do all
-/// functions of a model and a state, which then return such arrays. Comparisons use `re`. `condyle.jacobian`,
-/// `gradient` and `hessian` create these numbers and read the derivatives.
+/// Store these numbers in NumPy arrays of objects. Arithmetic and NumPy's elementary functions accept such arrays. All
+/// functions of a model and a state accept them, too, and then return such arrays. Comparisons use `re`.
+/// `condyle.jacobian`, `gradient` and `hessian` create these numbers and read the derivatives.
 ///
 /// Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 ///
@@ -227,7 +227,7 @@ impl HyperDual {
         Self(Scalar::abs(self.0))
     }
     fn __richcmp__(&self, other: Operand, by: CompareOp) -> bool {
-        let order = self.0.re.partial_cmp(&other.0.re); // `None` if one is NaN
+        let order = self.0.re.partial_cmp(&other.0.re); // `None` if one of the numbers is NaN
         order.map_or(matches!(by, CompareOp::Ne), |order| by.matches(order))
     }
     fn __bool__(&self) -> bool {
@@ -247,7 +247,7 @@ impl HyperDual {
         self.__abs__()
     }
 
-    // elementary functions, by NumPy's names
+    // NumPy calls the methods with these names for its elementary functions of objects
 
     /// Returns the square root of self.
     fn sqrt(&self) -> Self {

@@ -83,7 +83,7 @@ pub(crate) fn pseudo_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound
 
 /// Checks that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
 ///
-/// Point masses, rods and plates have no volume; they lie on the boundary, and are refused.
+/// Point masses, rods and plates have no volume: their J is singular, and they are refused.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
@@ -98,8 +98,9 @@ pub(crate) fn check(inertia: &Bound<'_, PyAny>) -> PyResult<()> {
 /// Returns the log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Every
 /// vector of ten numbers belongs to exactly one physical inertia.
 ///
-/// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). They make identification an unconstrained
-/// problem. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+/// α = ½ ln m with the mass m; dᵢ: logarithms of lengths in metres; s: lengths (m); t: the centre of mass (m). With
+/// these parameters, identification is an unconstrained problem. Source: Rucker and Wensing, Smooth parameterization of
+/// rigid-body inertia (2022).
 ///
 /// Raises `NotPhysicalError` for an inertia that is not physical.
 ///
@@ -125,7 +126,7 @@ pub(crate) fn from_log_cholesky<'py>(theta: &Bound<'py, PyAny>) -> PyResult<Boun
 /// Returns the Jacobian ∂π/∂θ of the ten parameters with respect to the log-Cholesky parameters, (10, 10), never
 /// singular.
 ///
-/// theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the derivative of the efforts with respect to θ.
+/// theta: 10 numbers. If Y is a regressor, Y ∂π/∂θ is the derivative of the efforts with respect to θ.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ

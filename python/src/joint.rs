@@ -1,4 +1,4 @@
-//! Joints in Python, and the words for their kinds.
+//! The class `Joint`, and the words for the kinds of joints.
 
 use crate::arrays::{Give, three};
 use crate::exceptions::wrong_word;
@@ -75,13 +75,13 @@ impl Joint {
         Self(condyle::Joint::FreeFlyer)
     }
 
-    /// The number of coordinates of its position.
+    /// The number of coordinates of the joint in q.
     #[getter]
     fn nq(&self) -> usize {
         self.0.nq()
     }
 
-    /// The number of its degrees of freedom, which is the number of its coordinates in v.
+    /// The number of degrees of freedom of the joint, which is the number of its coordinates in v.
     #[getter]
     fn nv(&self) -> usize {
         self.0.nv()
@@ -133,7 +133,7 @@ pub(crate) fn kind(joint: condyle::Joint) -> &'static str {
     }
 }
 
-/// Returns the joint between the world and a root link.
+/// Returns the joint between the world and a root link, given by its word; `None` for a fixed root link.
 pub(crate) fn root(root_joint: Option<&str>) -> PyResult<Option<condyle::Joint>> {
     match root_joint {
         None => Ok(None),

@@ -4,8 +4,9 @@ use crate::arrays::Computed;
 use crate::functions::{any, functions};
 use pyo3::prelude::*;
 
-/// Declares functions of a frame or of a body. Each calls the method of the same name on the result of a pass. The
-/// method returns a motion, or fills matrices of shape (6, nv), which the function returns.
+/// Declares functions of a frame or of a body. Each function makes a pass over the bodies and calls the method with the
+/// function's name on the result. The method returns a motion, or fills matrices of shape (6, nv), which the function
+/// returns.
 macro_rules! motions {
     (@call $model:ident, $motion:expr, $name:ident($of:ident, $reference:ident)) => { $motion.$name($of, $reference) };
     (@call $model:ident, $motion:expr, $name:ident($of:ident, $reference:ident) $($matrix:ident)+) => {{
@@ -35,8 +36,9 @@ pub(crate) use motions;
 functions! {
 /// Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 ///
-/// q: nq numbers. Joint i carries body i, whose frame is the one in the URDF; body 0 is the world. The pose of a frame
-/// f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also `frame_placement`.
+/// q: nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is the
+/// world. The pose of a frame f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also
+/// `frame_placement`.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data = condyle.Data(quadruped)
@@ -108,8 +110,8 @@ functions! {
 /// Computes the Jacobian J of a point of a frame, (3, nv): the point's velocity along the axes of the world is J v
 /// (m/s).
 ///
-/// q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
-/// the world and S the columns of the joints between the world and the frame.
+/// q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, where p is the point
+/// in the world's frame and S has a column (S_v, S_ω) for each joint between the world and the frame.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
@@ -131,7 +133,7 @@ fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out
     J
 }
 
-/// Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+/// Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s).
 ///
 /// q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
 fn frame_point_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, point: Point; out) {
@@ -160,15 +162,15 @@ motions! {
 /// True
 fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its
-/// spatial velocity as seen from the world, expressed in the reference; O(n).
+/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). It is the rate of the frame's
+/// spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// Computes the classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the
-/// reference (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the
-/// frame's origin; O(n).
+/// Computes the classical acceleration of a frame, 6 numbers; O(n). The linear part v̇ + ω × v (m/s²) belongs to the
+/// body's point at the origin of the reference; the angular acceleration follows (rad/s²). In 'local_world_aligned' the
+/// linear part is p̈ of the frame's origin p.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 ///
@@ -184,28 +186,28 @@ fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: P
 /// Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
 /// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-/// acceleration for 'local' and 'world', and the classical one for 'local_world_aligned', whose origin moves with the
-/// frame.
+/// acceleration for 'local' and 'world'. For 'local_world_aligned', whose origin moves with the frame, it is the
+/// classical acceleration.
 fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 
-/// Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+/// Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of the body's own frame; O(n).
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of
-/// its own frame; O(n).
+/// Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_acceleration` of the body's own
+/// frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its
-/// own frame; O(n).
+/// Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of the
+/// body's own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+/// Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of the body's own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;

@@ -3,10 +3,10 @@
 //! Each module uses only modules that are listed before it:
 //! - `exceptions`, `signals` and `arrays`: exceptions of the package, interruption of long calls by signals, and NumPy
 //!   arrays as arguments and results; `hyper_dual` numbers;
-//! - `cached`, `joint`, `tree`, `inertial_parameters`, `model`, `robots`, `builder`: robots, their attributes, and how
-//!   they are made;
-//! - `data` and `batch`: scratch memory of calls, and calls for many states; `functions`: the parts that all calls have
-//!   in common;
+//! - `cached`, `joint`, `tree`, `inertial_parameters`, `model`, `robots`, `builder`: robots, their attributes, and the
+//!   functions that make robots;
+//! - `data` and `batch`: scratch memory of calls, and calls for many states; `functions`: code that all calls have in
+//!   common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
 //!   `regressors`, `simulation`: one Python function or type for each function or type of the library;
 //! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;

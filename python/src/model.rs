@@ -1,4 +1,4 @@
-//! A robot in Python: tree, names and frames. The submodules have its other methods.
+//! The class `Model`, a robot in Python: its tree, names and frames. The submodules have its other methods.
 
 mod files;
 mod numbers;
@@ -21,8 +21,8 @@ use std::sync::Arc;
 
 /// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 ///
-/// Body 0 is the world. The other bodies are numbered depth first, parents before children, siblings in the order of
-/// their joints' names, as in Pinocchio. A model is read from a file, built by a `ModelBuilder`, or taken from
+/// Body 0 is the world. The other bodies are numbered as in Pinocchio: depth first, parents before children, and
+/// siblings by the names of their joints. A model is read from a file, built by a `ModelBuilder`, or taken from
 /// `condyle.robots`; it can be pickled.
 ///
 /// >>> arm = condyle.robots.arm7()
@@ -67,14 +67,14 @@ pub(crate) fn body_index(
     numbered(expected, body, least, model.bodies().len())
 }
 
-/// Returns the items of an argument that is a list; `what` names the items in the error.
+/// Returns the items of an argument that is a list; an error message calls the items `what`.
 pub(crate) fn members_of<'py>(
     argument: &str,
     what: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let wrong = |found: String| PyTypeError::new_err(format!("{argument}: expected a list of {what}, found {found}"));
-    // text is iterable, and so is a named tuple such as a single constraint
+    // refuse text and named tuples, such as a single constraint: they are iterable, but they are no lists of items
     if given.is_instance_of::<PyString>() || given.is_instance_of::<PyBytes>() || given.hasattr("_fields")? {
         let found = given.repr()?;
         return Err(wrong(format!("{found}; write [{found}]")));
@@ -83,7 +83,7 @@ pub(crate) fn members_of<'py>(
     members.collect()
 }
 
-/// Reads an index from `least` to `count` − 1.
+/// Reads an index that is at least `least` and below `count`.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
     let wrong = |found: String| match count {
         _ if least < count => format!("{expected} or {least} to {}, found {found}", count - 1),
@@ -98,7 +98,7 @@ fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize
 }
 
 impl Model {
-    /// Returns a number for each joint that has coordinates of its own, and 0 for the others.
+    /// Returns one number for each joint: the result of `get`, or 0 for the world and for mimic joints.
     fn of_joints(&self, get: impl Fn(&condyle::tree::Body) -> usize) -> Vec<usize> {
         let count = |(i, b): (usize, &condyle::tree::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
         self.inner.bodies().iter().enumerate().map(count).collect()
@@ -114,8 +114,8 @@ impl Model {
     /// The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
     /// `line`.
     ///
-    /// They report implausible inertias and limits, joints along which the inertia matrix is singular, unknown names in
-    /// the file, and contents that a model cannot represent.
+    /// They report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in the
+    /// file, and contents that a model cannot represent.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Warnings, || {
@@ -198,26 +198,27 @@ impl Model {
         self.cached.list(py, Attribute::Parents, || Ok(self.of_bodies(|b| b.parent)))
     }
 
-    /// The index in q at which each joint's position begins; for a mimic joint, the index of the joint that it follows.
+    /// The index in q at which each joint's position begins; for a mimic joint, the index for the joint that it
+    /// follows.
     #[getter]
     fn idx_qs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxQs, || Ok(self.of_bodies(|b| b.idx_q)))
     }
 
-    /// The index in v at which each joint's velocity begins; for a mimic joint, the index of the joint that it follows.
+    /// The index in v at which each joint's velocity begins; for a mimic joint, the index for the joint that it
+    /// follows.
     #[getter]
     fn idx_vs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxVs, || Ok(self.of_bodies(|b| b.idx_v)))
     }
 
-    /// The number of coordinates that each joint has of its own: 0 if it mimics another joint, and 0 for the world.
+    /// The number of coordinates that each joint has in q: 0 if it mimics another joint, and 0 for the world.
     #[getter]
     fn nqs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Nqs, || Ok(self.of_joints(|b| b.joint.nq())))
     }
 
-    /// The number of degrees of freedom that each joint has of its own: 0 if it mimics another joint, and 0 for the
-    /// world.
+    /// The number of coordinates that each joint has in v: 0 if it mimics another joint, and 0 for the world.
     #[getter]
     fn nvs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Nvs, || Ok(self.of_joints(|b| b.joint.nv())))
@@ -233,8 +234,8 @@ impl Model {
         })
     }
 
-    /// The frames, as `Frame(name, kind, body, placement)`. Each joint of the URDF, also a fixed one, has two: the
-    /// joint's and the link's.
+    /// The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed one, there are two
+    /// frames: one of the joint and one of its link.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Frames, || {
@@ -253,23 +254,23 @@ impl Model {
         })
     }
 
-    /// Returns the index of the frame with this name. If frames of several kinds have it, a link's comes first, then
-    /// the user's, then a joint's.
+    /// Returns the index of the frame with this name. If frames of several kinds have the name, a link's frame is
+    /// preferred, then a user's frame, then a joint's frame.
     ///
-    /// Raises `ModelError`, with the most similar name.
+    /// Raises `ModelError` if the name does not exist; the message suggests the most similar name.
     fn frame(&self, name: &str) -> PyResult<usize> {
         self.inner.frame(name).map_err(exception)
     }
 
     /// Returns the index of the body that the joint with this name carries.
     ///
-    /// Raises `ModelError`, with the most similar name.
+    /// Raises `ModelError` if the name does not exist; the message suggests the most similar name.
     fn joint(&self, name: &str) -> PyResult<usize> {
         self.inner.joint(name).map_err(exception)
     }
 
     /// Returns the tree of bodies as text: each joint with its kind, its indices in q and v, and the body that it
-    /// carries; frames: whether to add the names of other frames to their bodies.
+    /// carries. frames: whether to list the other frames of each body, too.
     ///
     /// >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
     /// universe

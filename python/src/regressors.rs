@@ -11,8 +11,8 @@ functions! {
 /// Computes the joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
 /// `Model.inertial_parameters`; O(n depth).
 ///
-/// q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors τ = Y π + armature a; for the
-/// linear coordinates of a free joint, armature (a + ω × v) replaces armature a.
+/// q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors, τ = Y π + armature · a. For the
+/// linear coordinates of a free joint, armature · (a + ω × v) replaces armature · a.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -24,8 +24,8 @@ fn joint_torque_regressor(model, data; q: Position, v: Tangent, a: Tangent; out)
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.joint_torque_regressor(model, q, v, a) }
 
-/// Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without
-/// the rotors, as a linear function of `Model.inertial_parameters`; O(n).
+/// Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers; O(n). T = y · π is `kinetic_energy` without
+/// the rotors, as a linear function of π, the `Model.inertial_parameters`.
 ///
 /// q: nq numbers; v: nv.
 fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
@@ -33,8 +33,8 @@ fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy_regressor(model, q, v) }
 
-/// Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a
-/// linear function of `Model.inertial_parameters`; O(n).
+/// Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers; O(n). V = y · π is `potential_energy` as a
+/// linear function of π, the `Model.inertial_parameters`.
 ///
 /// q: nq numbers.
 fn potential_energy_regressor(model, data; q: Position; out) {
@@ -43,13 +43,13 @@ fn potential_energy_regressor(model, data; q: Position; out) {
 batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 
 /// Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
-/// damping d may be d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
+/// damping coefficient is d = d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
-/// −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest position; for joints with several degrees of freedom
-/// the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`, except for joints with
-/// `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of actuators. No other function
-/// includes these efforts: add them to τ where needed.
+/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. The effort of a
+/// spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for joints with several
+/// degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. The only
+/// exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of
+/// actuators. No other function of a model includes passive torques: add them to τ where needed.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> q, v = np.zeros(7), np.ones(7)

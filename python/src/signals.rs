@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 /// Time between checks for signals, for batches and for calls that keep the interpreter's lock.
 pub(crate) const SHORT: Duration = Duration::from_millis(10);
 
-/// Time between checks for signals, for solves and simulations. A check must wait for the interpreter's lock, which
-/// another thread that runs Python code releases after 5 ms.
+/// Time between checks for signals, for solves and simulations. A check must wait for the interpreter's lock. Another
+/// thread that runs Python code releases the lock after 5 ms.
 pub(crate) const LONG: Duration = Duration::from_millis(25);
 
-/// Checks for signals during a call.
+/// Regular checks for signals during a call.
 pub(crate) struct Signals {
     period: Duration,
     looked: Instant,
@@ -25,7 +25,7 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// Begins a call that checks for signals at this period.
+    /// Creates the checks of a call, one after each period.
     pub(crate) fn new(period: Duration) -> Self {
         Self { period, looked: Instant::now(), main: None, raised: None }
     }

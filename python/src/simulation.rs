@@ -15,25 +15,25 @@ use std::sync::Arc;
 
 /// A simulation of a robot: its state, and the scratch memory to advance it.
 ///
-/// Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
-/// external forces are constant during a step.
+/// A motion is q(t) = q₀ ⊕ ξ(t), with a tangent vector ξ(t). The equations of motion are q̇ = v, with the velocity v in
+/// the body's frame, and v̇ = aba(q, v, τ). τ and the external forces are constant during a step.
 ///
 /// model: the robot; it starts at rest at `neutral`, at time 0.
 /// integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
-///     momentum is conserved to rounding.
+///     momentum is conserved up to rounding.
 /// dt: h, the length of a step (s), above 0.
-/// passive: the smoothing ε of `passive_torque` (rad/s, m/s), which adds damping, friction, springs and gravity
-///     compensation; None leaves them out.
-/// tolerance: Newton's method ('variational') ends when the imbalance of the momenta is at most this fraction of their
-///     sum.
+/// passive: the smoothing ε (rad/s, m/s) of `passive_torque`, which is then added to τ: damping, friction, springs and
+///     gravity compensation. None leaves it out.
+/// tolerance: for 'variational', Newton's method ends when the imbalance of the momenta is at most this fraction of the
+///     sum of the momenta.
 /// max_iterations: the maximum number of iterations of Newton's method.
 /// ground: a `Ground` on which the robot stands, slides and lands; None for no ground. Requires 'semi_implicit_euler'.
 ///
 /// A simulation can be copied and pickled; the copy continues with bit-identical results.
 ///
-/// Raises `ModelError` if M is singular or the ground is invalid, `ValueError` if dt is not above 0 or not finite, or
-/// tolerance is negative.
+/// Raises `ModelError` if M is singular or the ground is invalid, and `ValueError` if dt is not positive and finite, or
+/// the tolerance is negative.
 ///
 /// >>> from condyle.simulation import Simulation
 /// >>> quadruped = condyle.robots.quadruped()
@@ -188,7 +188,7 @@ impl Simulation {
         self.inner.ground().map(|ground| give_ground(py, ground)).transpose()
     }
 
-    /// The contacts of the ground's points in the last step, as `GroundContacts`.
+    /// The contacts between the ground and the points of the robot in the last step, as `GroundContacts`.
     #[getter]
     fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let contacts = self.inner.contacts();
@@ -218,8 +218,8 @@ impl Simulation {
 
     /// Makes a step with constant efforts and forces, and returns its status: 'done'; 'not_converged' if Newton's
     /// method did not reach the tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses
-    /// violate the laws of contact by more than the ground's tolerance; or 'not_finite'. The step is made for 'done'
-    /// and 'contacts_not_converged'.
+    /// violate the laws of contact by more than the ground's tolerance; or 'not_finite'. The state advances only for
+    /// 'done' and 'contacts_not_converged'.
     ///
     /// tau: nv numbers (N m, N); f_ext: as for `rnea`.
     #[pyo3(signature = (tau, f_ext=None))]
@@ -251,11 +251,11 @@ impl Simulation {
         self.inner.restore(&State { time, q, v, impulses }).map_err(exception)
     }
 
-    /// Makes a number of steps, and calls a control law before each of them. Ends early if a step is not made, and
-    /// returns its status. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
+    /// Makes a number of steps, and calls a control law before each step. If a step fails, ends early and returns the
+    /// status of this step. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
     ///
     /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
-    ///     efforts; other threads can then run meanwhile.
+    ///     efforts; then other Python threads can run meanwhile.
     ///
     /// An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
     /// step is kept.

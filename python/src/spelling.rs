@@ -1,8 +1,8 @@
-//! The functions of `condyle.pinocchio` that are called most: they use results that an earlier call stored in `data`,
-//! as in Pinocchio.
+//! The most frequently called functions of `condyle.pinocchio`. As in Pinocchio, they use results that an earlier call
+//! stored in `data`.
 //!
 //! They are written in Rust, because for a small robot a Python wrapper would take longer than the computation. The
-//! classes of that module derive from the classes here.
+//! classes of `condyle.pinocchio` derive from the classes here.
 
 use crate::algorithms;
 use crate::arrays::{Computed, Give, Number, at_once, class};
@@ -36,7 +36,7 @@ impl SpelledModel {
     }
 }
 
-/// The `condyle.Data` with Pinocchio's interface, and the stored state for functions of a joint or a frame.
+/// A `condyle.Data` with Pinocchio's interface, and the stored state for functions of a joint or a frame.
 #[pyclass(name = "_SpelledData", module = "condyle.pinocchio", subclass)]
 pub(crate) struct SpelledData {
     ours: Py<Data>,
@@ -69,7 +69,7 @@ impl SpelledData {
         self.ours.bind(py).clone()
     }
 
-    /// q, v and a of the last `forwardKinematics`, zeros for those that were not given.
+    /// q, v and a of the last `forwardKinematics`. Vectors that were not given are zeros.
     #[getter]
     fn _state<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         Ok((self.q.give(py, None)?, self.v.give(py, None)?, self.a.give(py, None)?))
@@ -87,7 +87,7 @@ impl SpelledData {
         made(py, &self.poses)
     }
 
-    /// The poses of the bodies for frames, from the last `updateFramePlacements`, (njoints, 4, 4).
+    /// The poses of the bodies from which frames are computed, from the last `updateFramePlacements`, (njoints, 4, 4).
     #[getter]
     fn _frame_poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         made(py, &self.frame_poses)
@@ -111,12 +111,12 @@ impl SpelledData {
     }
 }
 
-/// Returns a stored result, or raises an `AttributeError`.
+/// Returns a stored result; raises an `AttributeError` if it was not computed yet.
 fn made<'py>(py: Python<'py>, what: &Option<Py<PyAny>>) -> PyResult<Bound<'py, PyAny>> {
     what.as_ref().map(|what| what.bind(py).clone()).ok_or_else(|| PyAttributeError::new_err(()))
 }
 
-/// Copies a vector, or a column, of numbers.
+/// Copies the numbers of an argument, which is a vector or a matrix with one column.
 fn copy(name: &str, given: &Bound<'_, PyAny>, to: &mut [f64]) -> PyResult<()> {
     if let Some(numbers) = at_once::<Ix1>(given, &[to.len()]) {
         to.copy_from_slice(&numbers);
@@ -161,7 +161,7 @@ fn joint_number(model: &condyle::Model, joint: &Bound<'_, PyAny>) -> PyResult<us
 #[allow(unsafe_code)]
 fn spatial<'py>(class: &Bound<'py, PyType>, numbers: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let (py, none) = (class.py(), std::ptr::null_mut());
-    // SAFETY: the class is defined in Python and derives from `object`, whose `__new__` this function is.
+    // SAFETY: the class is defined in Python and derives from `object`; this function is the `__new__` of `object`.
     let six = unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyType_GenericNew(class.as_type_ptr(), none, none)) }?;
     six.setattr(intern!(py, "vector"), numbers)?;
     Ok(six)
@@ -179,7 +179,7 @@ pub(crate) fn forwardKinematics(
 ) -> PyResult<()> {
     let (py, mut data) = (model.py(), data.try_borrow_mut()?);
     let poses = forward_kinematics(model.get().ours.bind(py), data.ours.bind(py), q, None)?;
-    (data.given, data.poses) = (0, None); // reset until all results are stored
+    (data.given, data.poses) = (0, None); // invalid until all results are stored
     let SpelledData { q: kept_q, v: kept_v, a: kept_a, .. } = &mut *data;
     copy("q", q, kept_q)?;
     for (name, given, kept) in [("v", v, kept_v), ("a", a, kept_a)] {
@@ -193,7 +193,7 @@ pub(crate) fn forwardKinematics(
     Ok(())
 }
 
-/// Computes data.oMf of the last forwardKinematics.
+/// Computes data.oMf from the positions of the last forwardKinematics.
 #[pyfunction]
 pub(crate) fn updateFramePlacements(model: &Bound<'_, SpelledModel>, data: &Bound<'_, SpelledData>) -> PyResult<()> {
     let mut data = data.try_borrow_mut()?;
@@ -212,7 +212,7 @@ pub(crate) fn framesForwardKinematics(
     updateFramePlacements(model, data)
 }
 
-/// Returns the data with the state stored by the last forwardKinematics.
+/// Returns the data; raises an error if no forwardKinematics has stored a state.
 fn kept<'py>(data: &Bound<'py, SpelledData>) -> PyResult<PyRef<'py, SpelledData>> {
     let data = data.try_borrow()?;
     match data.given {
@@ -262,8 +262,8 @@ motions! {
         frame_classical_acceleration of forward_accelerations(q, v, a);
 }
 
-/// Type of `condyle::dynamics::body_jacobian_strided` and its variant for frames: model, q, body or frame, reference
-/// frame, J and its strides.
+/// Type of `condyle::dynamics::body_jacobian_strided` and its variant for frames: its arguments are the model, q, the
+/// body or frame, the reference frame, J, and the strides of J.
 type FillJacobian = fn(&condyle::Model, &[f64], usize, ReferenceFrame, &mut [f64], [usize; 2]);
 
 /// Returns the Jacobian of a joint's body or of a frame at the last computeJointJacobians.
@@ -324,7 +324,8 @@ pub(crate) fn computeFrameJacobian<'py>(
     frame_jacobian(ours.bind(py), data.try_borrow()?.ours.bind(py), q, &number, word, None)
 }
 
-/// Computes c, also stored as data.com[0]; with v and a also data.vcom[0] and data.acom[0].
+/// Computes the centre of mass, also stored as data.com[0]. With v, also computes data.vcom[0]; with v and a, also
+/// data.acom[0].
 #[pyfunction]
 #[pyo3(signature = (model, data, q, v=None, a=None))]
 pub(crate) fn centerOfMass<'py>(
@@ -347,7 +348,7 @@ pub(crate) fn centerOfMass<'py>(
     Ok(center)
 }
 
-/// Computes hg, also stored as data.hg.
+/// Computes the centroidal momentum, also stored as data.hg.
 #[pyfunction]
 pub(crate) fn computeCentroidalMomentum<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -388,17 +389,17 @@ macro_rules! left {
     )*};
 }
 left! {
-    /// Computes M, both triangles, also stored as data.M.
+    /// Computes M with both triangles, also stored as data.M.
     "_spelled_crba" crba(q) = algorithms::crba => "M";
     /// Computes M⁻¹, also stored as data.Minv.
     "computeMinverse" computeMinverse(q) = algorithms::minv => "Minv";
-    /// Computes C v + g, also stored as data.nle.
+    /// Computes the nonlinear effects C v + g, also stored as data.nle.
     "nonLinearEffects" nonLinearEffects(q, v) = algorithms::nonlinear_effects => "nle";
-    /// Computes g, also stored as data.g.
+    /// Computes the gravity efforts g, also stored as data.g.
     "computeGeneralizedGravity" computeGeneralizedGravity(q) = algorithms::gravity => "g";
-    /// Computes C with C v + g = h and Ṁ − 2 C skew-symmetric, also stored as data.C.
+    /// Computes the Coriolis matrix C, also stored as data.C. C v + g = h, and Ṁ − 2 C is skew-symmetric.
     "computeCoriolisMatrix" computeCoriolisMatrix(q, v) = algorithms::coriolis_matrix => "C";
-    /// Computes ∂c/∂q, (3, nv), also stored as data.Jcom.
+    /// Computes the Jacobian of the centre of mass, (3, nv), also stored as data.Jcom.
     "jacobianCenterOfMass" jacobianCenterOfMass(q) = com_jacobian => "Jcom";
 }
 

@@ -4,8 +4,8 @@ use crate::joint::kind;
 use condyle::{Model, tree::FrameKind};
 use std::fmt::Write;
 
-/// Returns the tree of bodies as text, each with its joint, its coordinates and its mass. With `frames` it adds the
-/// names of link and user frames, except frames that have the name of their body.
+/// Returns the tree of bodies as text, each body with its joint, coordinates and mass. With `frames`, adds the names of
+/// the link and user frames of each body, except frames with the name of the body.
 pub(crate) fn tree(model: &Model, frames: bool) -> String {
     let bodies = model.bodies();
     let mut children = vec![Vec::new(); bodies.len()];
@@ -22,7 +22,7 @@ pub(crate) fn tree(model: &Model, frames: bool) -> String {
             let _ = write!(text, "\n{indent}· {}", names.join(", "));
         }
     };
-    // stack of bodies still to be written: body, its indentation, and whether it is the last child of its parent
+    // stack of bodies that are not yet written: body, indentation, and whether it is the last child of its parent
     let begin = |below: &[usize], indent: &str| -> Vec<(usize, String, bool)> {
         below.iter().enumerate().rev().map(|(k, &i)| (i, indent.to_owned(), k + 1 == below.len())).collect()
     };

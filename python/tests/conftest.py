@@ -28,7 +28,7 @@ def quadruped() -> Robot:
 
 @pytest.fixture(scope="module")
 def cuda_libraries(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path]]:
-    """Builds a driver and a compiler without a GPU, which replace NVIDIA's."""
+    """Builds replacements of NVIDIA's driver and compiler that work without a GPU."""
     if sys.platform != "linux" or not (shutil.which("cc") and shutil.which("g++")):
         pytest.skip("there are no compilers of C and C++ for the driver without a GPU")
     driver, compiler = build(tmp_path_factory.mktemp("driver"))
@@ -49,8 +49,8 @@ def shared_gpu(cuda_libraries: tuple[Path, Path]) -> Gpu:
 
 @pytest.fixture
 def gpu(shared_gpu: Gpu) -> Iterator[Gpu]:
-    """Provides another library's view of the GPU; checks that all memory is freed, and that the driver reports no
-    errors.
+    """Provides the GPU as another library sees it. After a test, checks that all memory is freed and that the driver
+    reports no errors.
     """
     yield shared_gpu
     gc.collect()

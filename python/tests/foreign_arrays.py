@@ -1,4 +1,5 @@
-"""A driver without a GPU, and two array libraries for it: the behaviour of CuPy, PyTorch, JAX and Numba in a few lines.
+"""A replacement of the driver that works without a GPU, and two array libraries that behave like CuPy, PyTorch, JAX and
+Numba.
 
 The structures of DLPack are defined again here, and capsules are made and read by Python's C interface.
 """
@@ -58,7 +59,7 @@ USED = {b"dltensor": b"used_dltensor", b"dltensor_versioned": b"used_dltensor_ve
 LENT: dict[int, "Speaker"] = {}
 """Objects that capsules keep alive."""
 DESCRIPTIONS: list[Any] = []
-"""Objects to which capsules point, and their deleters; they are kept until the end."""
+"""Objects to which capsules point, and the deleters of these capsules; they are kept until the process ends."""
 
 
 def build(folder: Path) -> tuple[Path, Path]:
@@ -72,7 +73,7 @@ def build(folder: Path) -> tuple[Path, Path]:
 
 
 class Gpu:
-    """The driver as another library uses it, on device 0, with two streams that are not ordered with other streams."""
+    """The driver as another library uses it, on device 0. Its two streams do not wait for other streams."""
 
     def __init__(self, library: Path) -> None:
         self.library = ctypes.CDLL(str(library))
@@ -151,7 +152,7 @@ class Speaker:
         sizes, steps = ((c_int64 * len(x))(*x) for x in (self.shape, self.strides))
         bits = 8 * self.dtype.itemsize
         code = {"f": 2, "i": 0}[self.dtype.kind]
-        # placed as if it were a part of a larger array
+        # address and offset as for a part of a larger array
         tensor = Tensor(self.address - 8, *self.device, len(sizes), code, bits, 1, sizes, steps, 8)
 
         deleter = ctypes.CFUNCTYPE(None, c_void_p)(lambda _: None)  # these capsules have no consumer
@@ -174,7 +175,7 @@ class Speaker:
 
 
 class Array(Speaker):
-    """An array of another library, written by the library's own stream."""
+    """An array of another library, which the library writes on its own stream."""
 
     def __init__(self, gpu: Gpu, numbers: Any, *, transposed: bool = False, is_versioned: bool = False) -> None:
         self.gpu, self.is_versioned = gpu, is_versioned
@@ -196,7 +197,9 @@ class Array(Speaker):
 
 
 class Imported(Speaker):
-    """An array that another library imports from a capsule: it takes ownership, and returns it at its end."""
+    """An array that another library imports from a capsule. The library takes ownership, and returns the array when
+    this object is deleted.
+    """
 
     def __init__(self, gpu: Gpu, array: Any, *, stream: int | None = None, max_version: Any = (1, 0)) -> None:
         self.gpu = gpu
@@ -239,7 +242,7 @@ class Interface:
 
 
 def download(gpu: Gpu, address: int, dtype: Any, shape: Sequence[int], strides: Sequence[int]) -> Any:
-    """Returns the numbers as the library's own stream sees them."""
+    """Returns the numbers of an array that are in memory when the library's own stream reads them."""
     memory = np.full(int(np.prod(shape)), np.nan, dtype)
     if memory.size:
         with gpu:

@@ -9,7 +9,7 @@ import condyle
 
 
 class Robot(NamedTuple):
-    """A model, its scratch, and one random state of it."""
+    """A model, its scratch memory, and one random state of the robot."""
 
     model: condyle.Model
     data: condyle.Data

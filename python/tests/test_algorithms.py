@@ -1,4 +1,5 @@
-"""Relations between the functions that hold for every robot; tests/peers checks the numbers themselves."""
+"""Checks relations between functions that hold for every robot; tests/peers compares the numbers with other libraries.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,16 +12,16 @@ from sample import Robot
 import condyle
 
 CLOSE = {"rtol": 1e-10, "atol": 1e-10}
-"""Rounding errors of double precision."""
+"""Tolerance for rounding errors of double precision."""
 SOLVED = {"rtol": 1e-8, "atol": 1e-8}
-"""Rounding errors after a solve with M, whose condition is up to 1e4."""
+"""Tolerance for rounding errors after a solve with M, whose condition number is up to 1e4."""
 STEP = 1e-5
 DIFFERENCES = {"rtol": 1e-5, "atol": 1e-5}
-"""Errors of central differences with that step, for accelerations up to 1e4."""
+"""Tolerance for errors of central differences with the step `STEP`, for accelerations up to 1e4."""
 
 
 def central(f: Callable[[NDArray[np.float64]], NDArray[np.float64]], n: int) -> NDArray[np.float64]:
-    """Returns ∂f/∂x at x = 0, n columns."""
+    """Returns ∂f/∂x at x = 0, n columns, by central differences."""
     return np.stack([(f(e) - f(-e)) / (2 * STEP) for e in np.eye(n) * STEP], axis=1)
 
 
@@ -36,7 +37,7 @@ def test_forward_and_inverse_dynamics(robot: Robot) -> None:
 
 
 def test_external_forces_act_on_their_body(robot: Robot) -> None:
-    """Checks τ(f) = τ(0) − Σ Jᵢᵀ fᵢ, with the Jacobian of each body's own frame."""
+    """Checks τ(f) = τ(0) − Σ Jᵢᵀ fᵢ, where Jᵢ is the Jacobian of body i in the body's own frame."""
     model, data, q, v, a, _, f_ext = robot
     tau = condyle.rnea(model, data, q, v, a)
     for body in range(1, model.nbodies):
@@ -56,7 +57,7 @@ def test_rnea_derivatives(robot: Robot) -> None:
 
 
 def test_aba_derivatives(robot: Robot) -> None:
-    """Compares with derivatives of M q̈ + h = τ."""
+    """Compares with derivatives of the equation M q̈ + h = τ."""
     model, data, q, v, _, tau, f_ext = robot
     d = condyle.aba_derivatives(model, data, q, v, tau, f_ext)
     np.testing.assert_allclose(d.a, condyle.aba(model, data, q, v, tau, f_ext), **SOLVED)
@@ -180,7 +181,7 @@ def test_centre_of_mass_and_momentum(robot: Robot) -> None:
     np.testing.assert_allclose(condyle.com_acceleration(model, data, q, v, a), dhg[:3] / mass, **CLOSE)
     np.testing.assert_allclose(still.Ig[:3], mass * np.eye(3, 6), **CLOSE)
     assert np.array_equal(still.Ig, still.Ig.T)
-    # if the robot turns as a whole, hg is Ig times its velocity at the centre of mass
+    # if the robot turns as one rigid body, hg is Ig times the velocity at the centre of mass
     if model.joint_types[1] == "free_flyer":
         turn = np.r_[0.0, 0, 0, 1, 2, 3, np.zeros(model.nv - 6)]
         omega = condyle.frame_velocity(model, data, q, turn, "root_joint", "local_world_aligned")[3:]
@@ -222,7 +223,7 @@ def test_regressors(robot: Robot) -> None:
     Y = condyle.joint_torque_regressor(model, data, q, v, a)
     rotors = 0.1 * a
     if model.joint_types[1] == "free_flyer":
-        rotors[:3] += 0.1 * np.cross(v[3:6], v[:3])  # a mass in the axes of the world
+        rotors[:3] += 0.1 * np.cross(v[3:6], v[:3])  # this armature acts like a mass, in the axes of the world
     np.testing.assert_allclose(Y @ pi + rotors, condyle.rnea(model, data, q, v, a), **CLOSE)
     T = condyle.kinetic_energy_regressor(model, data, q, v) @ pi + 0.05 * v @ v
     assert np.isclose(T, condyle.kinetic_energy(model, data, q, v), **CLOSE)

@@ -13,7 +13,7 @@ import condyle
 ARM = condyle.robots.arm7()
 DATA = condyle.Data(ARM)
 BODIES = ARM.nbodies
-# no deadline: the calls take microseconds, but a machine may pause for a while
+# no deadline: a call takes microseconds, but the machine may pause during the call
 quiet = settings(deadline=None, max_examples=200, derandomize=True)
 
 DTYPES = st.sampled_from(
@@ -23,7 +23,9 @@ DTYPES = st.sampled_from(
 
 @st.composite
 def layouts(draw: st.DrawFn, shape: tuple[int, ...]) -> np.ndarray:
-    """Draws an array of this shape that may be a view: transposed, reversed, with gaps, unaligned, not writable."""
+    """Draws an array of this shape. It may be a view that is transposed, reversed, has gaps, is unaligned or cannot be
+    written to.
+    """
     dtype = np.dtype(draw(DTYPES))
     plain = draw(hnp.arrays(dtype, shape, elements=st.just(0) | st.just(1)))
     match draw(
@@ -88,7 +90,8 @@ SHAPES = hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=9)
 @quiet
 @given(SHAPES, st.sampled_from([np.float64, np.int32, np.complex128, "U3", "M8[s]", object]))
 def test_any_shape_is_read_or_refused(shape: tuple[int, ...], dtype: Any) -> None:
-    """The array is read as one or many states, or an error has the argument, the expected and the found shape."""
+    """The array is read as one or many states, or an error names the argument, the expected shape and the found shape.
+    """
     q, zero = np.zeros(shape, dtype), np.zeros(7)
     if shape == (7,) or (len(shape) == 2 and shape[1] == 7 and shape[0] > 0):
         wanted: tuple[type[Exception], ...] = () if np.dtype(dtype).kind in "fi" else (TypeError,)
@@ -125,7 +128,7 @@ def test_any_out_is_filled_or_refused(shape: tuple[int, ...], dtype: Any, layout
 @quiet
 @given(st.integers(1, 12), st.integers(1, 12))
 def test_matrices_of_any_size_are_turned(rows: int, columns: int) -> None:
-    """Matrices are stored by columns in Rust, and transposed tile by tile."""
+    """Matrices of all sizes are returned correctly: Rust stores them by columns, and transposes them tile by tile."""
     builder, body = condyle.ModelBuilder("chain"), condyle.WORLD
     inertia = condyle.Inertia.from_com(1.0, [0.1, 0.2, 0.3], np.eye(3))
     for k in range(rows):

@@ -11,15 +11,15 @@ from sample import Robot, make
 import condyle
 
 N = 11
-"""Number of states: larger than a vector register, and not a multiple of it."""
+"""Number of states: larger than the number of SIMD lanes, and not a multiple of it."""
 CLOSE = {"rtol": 1e-9, "atol": 1e-9}
-"""Tolerance: a single call may compute a robot's limbs in parallel lanes, with sums in another order; M's condition
-amplifies the difference.
+"""Tolerance for rounding errors: a call for a single state may compute a robot's limbs in parallel lanes, with sums in
+another order. The condition number of M amplifies the difference.
 """
 
 
 def argument(name: str, robot: Robot, states: int) -> Any:
-    """Returns a value for each of `states` states, or for a single state if `states` is 0."""
+    """Returns values of the argument `name` for many states, or for a single state if `states` is 0."""
     model, rng = robot.model, np.random.default_rng(len(name))
     shape = (states,) if states else ()
     match name:
@@ -152,7 +152,9 @@ def test_errors(robot: Robot) -> None:
 
 
 def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
-    """The call releases the interpreter's lock; another thread that uses the same `Data` meanwhile gets an error."""
+    """A call for many states releases the interpreter's lock. If another thread uses the same `Data` during the call,
+    it gets an error.
+    """
     model, data = quadruped.model, condyle.Data(quadruped.model)
     q, v, tau = (argument(name, quadruped, 4000) for name in ("q", "v", "tau"))
     condyle.aba_derivatives(model, data, q[:1], v[:1], tau[:1])
@@ -178,13 +180,13 @@ def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
 def test_out_over_an_input(shift: int, threads: int) -> None:
     """`out` may be an input, or share memory with it: all states are computed from the original numbers."""
     arm = condyle.robots.arm7()
-    states = 30_000  # more than one part of a call
+    states = 30_000  # the call is computed in several parts
     data, memory = condyle.Data(arm, threads=threads), np.random.default_rng(0).standard_normal((states + 40, 7))
     q, out = memory[40 - shift : states + 40 - shift], memory[40 : states + 40]
     expected = condyle.rnea(arm, data, q, q, q)
     assert condyle.rnea(arm, data, q, q, q, out=out) is out
     np.testing.assert_array_equal(out, expected)
-    # functions that compute state by state
+    # the same for functions that compute state by state
     q, out = memory[40 - shift : 140 - shift], memory[40:140]
     expected = condyle.integrate(arm, q, q)
     condyle.integrate(arm, q, q, out=out)
@@ -202,7 +204,7 @@ def test_out_over_forces() -> None:
 
 @pytest.mark.parametrize("states", [(), (20,)])
 def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
-    """Two results in one array are refused before anything is written; an input may be given twice."""
+    """Two results in one array are an error, and nothing is written; two inputs may be the same array."""
     model, data = quadruped.model, quadruped.data
     q = np.broadcast_to(quadruped.q, (*states, 19)).copy()
     v = np.zeros((*states, 18))

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def load(path: Path) -> ModuleType:
-    """Loads a program that is not part of a package."""
+    """Loads a Python file that does not belong to a package as a module."""
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -43,7 +43,7 @@ def test_readme() -> None:
 
 @pytest.mark.parametrize("part", ["Using Condyle", "The course"])
 def test_parts_are_programs(part: str) -> None:
-    """Each page of the first two parts is a program whose results are checked, by assertions or by its output."""
+    """Each page of the book's first two parts is a program. Its results are checked by assertions or by its output."""
     pages = BOOK.chapters(part)
     assert len(pages) >= 7
     for name in pages:
@@ -56,7 +56,9 @@ def test_structure() -> None:
 
 
 def test_figures() -> None:
-    """Each sentence with measured figures is on its page. If the JSON exists, all figures are taken from it."""
+    """Each sentence with measured figures is on its page. If the JSON file of measurements exists, all figures equal
+    its numbers.
+    """
     figures = load(ROOT / "benches" / "figures.py")
     for page, sentence, _ in figures.QUOTES:
         assert figures.quote(sentence).search((ROOT / page).read_text()), f"{page}: no sentence `{sentence}`"
@@ -68,7 +70,7 @@ def test_figures() -> None:
 
 
 def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The output of a block is compared, and missing output is reported."""
+    """A wrong output of a block on a page is found, and a missing output is reported."""
     monkeypatch.setattr(BOOK, "BOOK", tmp_path / "docs")
     (tmp_path / "docs").mkdir()
     (tmp_path / "README.md").write_text("# a\n")
@@ -84,13 +86,13 @@ def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_formulas() -> None:
-    """Each formula is LaTeX that is converted to MathML; code with dollar signs does not change."""
+    """Each formula is LaTeX that can be converted to MathML; code with dollar signs does not change."""
     mathml = load(ROOT / "docs" / "mathml.py")
     assert "<math" in mathml.with_mathml("an $x_i$ b") and mathml.with_mathml("`$x$`") == "`$x$`"
     for chapter in BOOK.chapters():
         page = mathml.with_mathml((ROOT / "docs" / chapter).read_text(encoding="utf-8"))
         formulas = re.findall(r"<math.*?</math>", page, re.DOTALL)
-        wrong = [formula for formula in formulas if re.search(r"\\|>&<", formula)]  # parts that were not converted
+        wrong = [formula for formula in formulas if re.search(r"\\|>&<", formula)]  # LaTeX that was not converted
         assert not wrong, (chapter, wrong)
 
 
@@ -99,15 +101,15 @@ def test_mdbook(tmp_path: Path) -> None:
     program = shutil.which("mdbook")
     if program is None:
         pytest.skip("mdbook is not installed")
-    python = Path(sys.executable).parent  # this folder contains the converter of formulas to MathML
+    python = Path(sys.executable).parent  # this folder contains the program that converts formulas to MathML
     environment = {**os.environ, "PATH": f"{python}{os.pathsep}{os.environ['PATH']}"}
     command = [program, "build", "--dest-dir", tmp_path / "book", ROOT / "docs"]
     subprocess.run(command, check=True, env=environment)
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
 
 
-# For each worked example: the block that defines the algorithm (of the chapter or of rnea.md), the example's block,
-# and mistakes in the definition, each as (right, wrong).
+# For each worked example: the block that defines the algorithm (in the chapter or in rnea.md), the example's block,
+# and mistakes in the definition, each as a pair (right text, wrong text).
 RNEA = [
     (" + cross(vel[i]) @ vJ", ""),
     (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),
@@ -195,7 +197,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("example", MISTAKES)
 def test_examples_detect_mistakes(example: str) -> None:
-    """An example by hand fails if one term of its algorithm is dropped."""
+    """The check of a worked example fails if one term of its algorithm is left out."""
     chapter = example.partition("#")[0]
     definition, begins, mistakes = MISTAKES[example]
     text = (ROOT / "docs" / chapter).read_text()

@@ -1,4 +1,4 @@
-"""Models that are built by hand or from other models; tests/peers checks the numbers themselves."""
+"""Models that are built by hand or from other models; tests/peers compares the numbers with other libraries."""
 
 import gc
 from typing import Any

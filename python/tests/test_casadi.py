@@ -1,4 +1,4 @@
-"""`condyle.casadi`: values, derivatives of both orders, zeros, threads, lifetimes."""
+"""Tests of `condyle.casadi`: values, first and second derivatives, sparsity, threads, and lifetimes of functions."""
 
 import doctest
 import gc
@@ -17,16 +17,16 @@ casadi = pytest.importorskip("casadi")
 
 import condyle.casadi  # noqa: E402
 
-# The same numbers, up to some hundreds, computed in two ways.
+# Tolerance for the same numbers, up to some hundreds, computed in two ways.
 ROUNDING = 1e-9
-# Central differences with the step h = 1e-5: truncation, h² times a third derivative, and rounding, 1e-13 / h, are
-# about 1e-8. Second derivatives of accelerations are up to some thousands.
+# Central differences with the step h = 1e-5 have errors of about 1e-8: h² times a third derivative, and 1e-13 / h.
+# The tolerance is larger, since second derivatives of accelerations are up to some thousands.
 STEP = 1e-5
 DIFFERENCES = 1e-6
 
 
 def every_joint() -> condyle.Model:
-    """Returns a robot with each kind of joint, one after the other."""
+    """Returns a robot that is a chain with one joint of each kind."""
     builder, body = ModelBuilder("every joint"), WORLD
     axis = [0.0, 0.6, 0.8]
     joints = {
@@ -83,7 +83,7 @@ def function(name: str, robot: str, states: int = 1) -> "casadi.Function":
 
 
 def direct(name: str, robot: str, x: Arrays) -> Arrays:
-    """Computes the same results by the package's own functions."""
+    """Computes the results of a function with the functions of `condyle` itself."""
     model, frame = MODELS[robot], TIPS[robot][0]
     data = condyle.Data(model)
     match name:
@@ -107,13 +107,16 @@ def state(name: str, robot: str, seed: int = 0) -> Arrays:
 
 
 def stretched(name: str, robot: str) -> Arrays:
-    """Returns the same arguments with a position off its group, like an optimisation's iterates."""
+    """Returns the same arguments, but with quaternions of another length than 1, as in the iterates of an optimisation.
+    """
     q, *others = state(name, robot)
     return [q * 1.1, *others]
 
 
 def stacked(f: "casadi.Function") -> "casadi.Function":
-    """Returns the function of one vector, and of the multipliers of its results; the results are one vector too."""
+    """Returns a vector of all arguments, a vector of multipliers, and a vector of all results as an expression of the
+    arguments.
+    """
     sizes = [f.numel_in(k) for k in range(f.n_in())]
     x = casadi.MX.sym("x", sum(sizes))
     parts = casadi.vertsplit(x, np.cumsum([0, *sizes]).tolist())
@@ -195,8 +198,8 @@ def test_zeros_of_the_tree() -> None:
 
 @each
 def test_many_states_are_a_map(name: str) -> None:
-    """Results, derivatives and zeros are the same as with `Function.map`, also for more states than are computed at a
-    time.
+    """Results, derivatives and sparsity are the same as with `Function.map`, even for more states than are computed at
+    the same time.
     """
     robot, states = "every joint", 37
     one, many = function(name, robot), function(name, robot, states)
@@ -209,7 +212,9 @@ def test_many_states_are_a_map(name: str) -> None:
 
 
 def derived(f: casadi.Function) -> casadi.Function:
-    """Returns a function's results, their Jacobians, a product with these, and the Hessian of the weighted sum."""
+    """Returns a function that computes the results, their Jacobians, a product with the Jacobians, and the Hessian of a
+    weighted sum of the results.
+    """
     x = [casadi.MX.sym(f.name_in(k), f.size1_in(k), f.size2_in(k)) for k in range(f.n_in())]
     y = f.call(x)
     stacked = casadi.veccat(*y)
@@ -220,7 +225,9 @@ def derived(f: casadi.Function) -> casadi.Function:
 
 
 def test_where_a_tree_stands_moves_with_nothing_but_gravity() -> None:
-    """∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero and not in the sparsity, as in a graph of expressions."""
+    """If coordinate q₀ moves a whole tree, ∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero and not in the sparsity, as in a graph of
+    expressions.
+    """
     arm = MODELS["arm"]
     for name in ("rnea", "aba"):
         hessian = function(name, "arm").reverse(1).jacobian()
@@ -276,7 +283,7 @@ def test_loaded_functions_are_refused(tmp_path: Path) -> None:
     function("rnea", "arm").save(str(path))
     load = f"f = casadi.Function.load({str(path)!r}); f(0, 0, 0)"
     another = "import condyle.casadi; held = condyle.casadi.rnea(condyle.robots.arm7().with_gravity([0.0, 0.0, 1.0]))"
-    for before in ("", another):  # the slot is empty, or has another robot's function
+    for before in ("", another):  # the slot is empty, or contains a function of another robot
         code = f"import casadi, condyle; {before}\n{load}"
         loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
         assert loaded.returncode != 0
@@ -284,7 +291,9 @@ def test_loaded_functions_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_copy_within_the_process_is_refused_until_it_is_dropped() -> None:
-    """Original and copy are refused, since they cannot be distinguished; a newly made one works again."""
+    """Calls of the original and of the copy are errors, since CasADi cannot distinguish them; a newly created function
+    works again.
+    """
     robot = MODELS["arm"].with_gravity([0.0, 1.0, 0.0])
     f = condyle.casadi.rnea(robot)
     expected = np.array(f(0.3, 0, 0))
@@ -312,7 +321,9 @@ def test_examples() -> None:
 
 
 def test_swing_up_by_ipopt() -> None:
-    """A pendulum on a cart swings up: direct transcription with exact Hessians; the motion satisfies the dynamics."""
+    """A pendulum on a cart swings up, by direct transcription with exact Hessians. The resulting motion satisfies the
+    dynamics.
+    """
     builder = ModelBuilder("cart")
     cart = builder.body(
         "cart", WORLD, Joint.prismatic([1.0, 0.0, 0.0]), None, Inertia.from_com(1.0, np.zeros(3), np.eye(3))
@@ -337,11 +348,13 @@ def test_swing_up_by_ipopt() -> None:
     data, (q, v, u) = condyle.Data(model), (solution.value(x) for x in (q, v, u))
     for k in range(knots):
         acceleration = condyle.aba(model, data, q[:, k], v[:, k + 1], np.array([u[k], 0.0]))
-        assert close(v[:, k] + dt * acceleration, v[:, k + 1], 1e-6)  # IPOPT's tolerance is 1e-8 of scaled rows
+        assert close(v[:, k] + dt * acceleration, v[:, k + 1], 1e-6)  # IPOPT's tolerance for scaled equations is 1e-8
 
 
 def test_actions_of_expressions_are_those_that_are_written() -> None:
-    """Compares a pendulum as expressions and as a function: iterates, derivatives, bounds."""
+    """Compares two actions of a pendulum, one from expressions and one from a Python function: iterates, derivatives,
+    bounds.
+    """
     from condyle.optimal import Action, Fddp, Problem
 
     def step(x, u, sin, cos):

@@ -1,5 +1,5 @@
-"""Knots of optimal control as `casadi.Function`s: values, derivatives of both orders, zeros; optima compared with
-FDDP's.
+"""Knots of optimal control as `casadi.Function`s: values, first and second derivatives, and sparsity. Optima are
+compared with those found by FDDP.
 """
 
 import sys
@@ -37,14 +37,14 @@ from condyle.optimal import (  # noqa: E402
     Unicycle,
 )
 
-# The same numbers, up to some hundreds, computed in two ways.
+# Tolerance for the same numbers, up to some hundreds, computed in two ways.
 ROUNDING = 1e-9
-# Central differences, also of second derivatives, which are up to some thousands: see test_casadi.py.
+# Step and tolerance of central differences, also for second derivatives, up to some thousands: see test_casadi.py.
 STEP = 1e-5
 DIFFERENCES = 1e-6
-# IPOPT's tolerance is 1e-8 of its scaled equations, FDDP's is 1e-9 of the cost's expected change.
+# Tolerance for optima. IPOPT's is 1e-8 for scaled equations, FDDP's is 1e-9 for the expected change of the cost.
 OPTIMUM = 1e-6
-# Controls are less accurate in a flat direction of the cost, whose optimum has a relative error of 1e-8.
+# Tolerance for motions: the relative error of the cost is 1e-8, so controls are less accurate where the cost is flat.
 MOTION = 1e-3
 
 ARM, QUADRUPED = condyle.robots.arm7(), condyle.robots.quadruped()
@@ -53,7 +53,7 @@ STANDING = np.r_[condyle.neutral(QUADRUPED), np.zeros(QUADRUPED.nv)]
 
 
 def groups() -> condyle.Model:
-    """Returns a chain of all kinds of joints whose positions are not vectors."""
+    """Returns a chain with one joint of each kind that has a quaternion or a pair (cos, sin) in its position."""
     builder, body = ModelBuilder("groups"), condyle.WORLD
     at = np.eye(4)
     at[:3, 3] = [0.1, -0.2, 0.3]
@@ -98,7 +98,7 @@ KNOTS: dict[str, tuple[Any, condyle.Model | None]] = {
     "unicycle": (Unicycle(0.1), None),
     "lqr": (Lqr([[1.0, 0.1], [0.0, 1.0]], [[0.0], [0.1]], Q=np.eye(2), R=[[0.3]], q=[0.1, 0.2]), None),
 }
-# Knots for which the library has all second derivatives of the next state.
+# Knots for which Condyle provides all second derivatives of the next state.
 CURVED = ["arm", "arm, accelerations", "quadruped flies", "groups", "unicycle", "lqr"]
 
 
@@ -108,7 +108,8 @@ def sizes(name: str) -> tuple[int, int]:
 
 
 def arguments(name: str, stretch: float = 1.0) -> list[np.ndarray]:
-    """Returns a random state, whose rotations are off their group if stretched, and controls."""
+    """Returns a random state and controls. The lengths of quaternions and pairs (cos, sin) are multiplied by `stretch`.
+    """
     (nx, nu), robot, rng = sizes(name), KNOTS[name][1], np.random.default_rng(7)
     x, u = rng.standard_normal(nx), rng.standard_normal(nu)
     if robot is not None:
@@ -117,7 +118,7 @@ def arguments(name: str, stretch: float = 1.0) -> list[np.ndarray]:
 
 
 def stacked(f: Any) -> tuple[Any, Any, Any]:
-    """Returns the function of one vector of arguments, with one vector of results and one of multipliers."""
+    """Returns a vector of all arguments, a vector of all results, and a vector of multipliers."""
     x = casadi.MX.sym("x", sum(f.numel_in(k) for k in range(f.n_in())))
     parts = casadi.vertsplit(x, np.cumsum([0, *(f.numel_in(k) for k in range(f.n_in()))]).tolist())
     y = casadi.vertcat(*f.call(parts))
@@ -172,7 +173,9 @@ def test_first_derivatives(name: str, stretch: float) -> None:
 
 @pytest.mark.parametrize("name", ["arm", "arm, accelerations", "unicycle"])
 def test_first_derivatives_are_those_of_a_problem(name: str) -> None:
-    """If positions are vectors, these are A, B, q and r themselves, and Q, S, R are the Hessian of the cost."""
+    """If positions are vectors, the first derivatives are A, B, q and r of the problem, and Q, S, R are the Hessian of
+    the cost.
+    """
     model, (x, u) = KNOTS[name][0], arguments(name)
     node = Problem(x, [model], [0], end(name)).derivatives([x, x], [u])[0]
     f = condyle.casadi.knot(model)
@@ -192,7 +195,7 @@ def test_second_derivatives_of_the_next_state(name: str) -> None:
     hessian = casadi.Function("hessian", [x, multipliers], [hessian])
     gradient = casadi.Function("gradient", [x, multipliers], [gradient])
     weights = np.random.default_rng(4).standard_normal(y.numel())
-    weights[-1] = weights[-1] if KNOTS[name][1] is None else 0.0  # a robot's costs have the Gauss–Newton Hessian
+    weights[-1] = weights[-1] if KNOTS[name][1] is None else 0.0  # not compared for a robot: Gauss–Newton
     for stretch in (1.0, 1.1):
         point = np.concatenate(arguments(name, stretch))
         found = np.array(casadi.densify(hessian(point, weights)))
@@ -214,12 +217,12 @@ def test_ends_have_a_cost_only() -> None:
 def test_zeros_of_a_knot() -> None:
     lands = condyle.casadi.knot(KNOTS["quadruped lands"][0]).jacobian()
     nq, nv = QUADRUPED.nq, QUADRUPED.nv
-    # q⁺ = q: its numbers, and the quaternion depends on itself; v⁺ depends on all of the state except the trunk's
-    # position
+    # q⁺ = q: each number depends on itself, and each number of the quaternion on all four
+    # v⁺ depends on the whole state except the position of the trunk
     assert lands.nnz_out(0) <= (nq - 4) + 16 + nv * (nq + nv - 3)
     given = condyle.casadi.knot(KNOTS["arm, accelerations"][0]).jacobian()
-    assert given.nnz_out(0) == 3 * 7  # nonzeros: 1, Δt; 1
-    assert given.nnz_out(1) == 2 * 7  # nonzeros: Δt², Δt
+    assert given.nnz_out(0) == 3 * 7  # nonzeros: 1 and Δt for q⁺, 1 for v⁺
+    assert given.nnz_out(1) == 2 * 7  # nonzeros: Δt² for q⁺, Δt for v⁺
 
 
 def test_a_knot_is_that_of_its_number() -> None:
@@ -234,7 +237,7 @@ def test_a_knot_is_that_of_its_number() -> None:
     assert close(condyle.casadi.knot(problem, 4)(x), costs[4], ROUNDING)
     each = condyle.casadi.knot(step, None)
     assert close(each.map(4)(np.tile(x[:, None], 4), np.tile(u[:, None], 4), np.arange(4))[1], costs[:4], ROUNDING)
-    assert each.jacobian().nnz_out(2) == each.jacobian().nnz_out(5) == 0  # derivatives with respect to the knot's index
+    assert each.jacobian().nnz_out(2) == each.jacobian().nnz_out(5) == 0  # derivatives with respect to t
     with pytest.raises(ProblemError, match="t: expected 0 to 4, found 5"):
         condyle.casadi.knot(problem, 5)
     with pytest.raises(ProblemError, match="t: expected the number of a knot of the problem, found None"):
@@ -278,7 +281,7 @@ def test_many_threads() -> None:
 
 
 def shot(problem: Problem, xs: np.ndarray, us: list[np.ndarray]) -> tuple[float, np.ndarray]:
-    """Returns the optimum of a problem by multiple shooting with IPOPT: its cost and states."""
+    """Returns the cost and the states of a problem's optimum, found by multiple shooting with IPOPT."""
     opti, x = casadi.Opti(), []
     total, following = casadi.MX(0), casadi.MX(xs[0])
     for t in range(problem.horizon):
@@ -314,7 +317,9 @@ def test_a_reach_by_shooting_is_that_of_fddp() -> None:
 
 
 def test_a_step_of_a_quadruped_by_shooting_is_that_of_fddp() -> None:
-    """Stance on four feet, a step of two feet, their impact, stance again: contacts, an impact, a free-flyer."""
+    """Compares a motion with contacts, an impact and a free-flyer: stance on four feet, a step of two feet, their
+    impact, and stance again.
+    """
     q = condyle.neutral(QUADRUPED)
     q[7:] = np.tile([0.0, 0.6, -1.2], 4)
     gait = Gait(QUADRUPED, q, ["LF_foot", "LH_foot", "RF_foot", "RH_foot"], 0.03)
@@ -328,5 +333,5 @@ def test_a_step_of_a_quadruped_by_shooting_is_that_of_fddp() -> None:
     assert found.status == "converged"
     cost, states = shot(problem, xs, gait.us)
     assert abs(cost - found.cost) < OPTIMUM * found.cost
-    assert np.abs(np.linalg.norm(states[:, 3:7], axis=1) - 1.0).max() < 1e-6  # the knots themselves keep the length
+    assert np.abs(np.linalg.norm(states[:, 3:7], axis=1) - 1.0).max() < 1e-6  # knots keep the length at 1
     assert np.abs(states - found.xs).max() < MOTION

@@ -1,4 +1,6 @@
-"""Optimisations with IPOPT by `condyle.casadi`, compared with the same functions written as CasADi expressions."""
+"""Optimisations by IPOPT with functions of `condyle.casadi`, compared with optimisations of the same functions written
+as CasADi expressions.
+"""
 
 import sys
 from collections.abc import Callable
@@ -18,7 +20,7 @@ from casadi_expressions import Expressions
 import condyle
 import condyle.casadi
 
-# The iterates agree up to rounding; IPOPT stops at 1e-8 of its scaled equations.
+# Tolerances: the iterates agree up to rounding, and IPOPT stops at an error of 1e-8 in its scaled equations.
 SAME = 1e-6
 ROUNDING = 1e-10
 

@@ -1,4 +1,6 @@
-"""Invalid input is refused where it is given, with its name and numbers: never a NaN or a wrong result."""
+"""Invalid input raises an error in the call that gets it, with the argument's name and numbers. It never leads to a NaN
+or a wrong result.
+"""
 
 import json
 import pickle
@@ -95,7 +97,7 @@ def test_numbers_of_joints_and_gravity_are_checked() -> None:
 
 def test_frames_travel_by_name() -> None:
     point = Cost("point", 1.0, Residual.frame_translation(ARM, "tool", TARGET))
-    # a robot with more frames, in another order: the same name, another index
+    # in a robot with more frames, in another order, the frame with the same name has another index
     two = condyle.ModelBuilder("two arms")
     two.append(condyle.WORLD, None, ARM, "left_")
     two.append(condyle.WORLD, None, ARM)
@@ -108,7 +110,7 @@ def test_frames_travel_by_name() -> None:
     data = json.loads(problem.to_json())
     frame = data["knots"][0]["costs"][0]["residual"]["frame_translation"]["frame"]
     assert frame == {"name": "tool", "kind": "Link"}
-    # a robot without this frame
+    # for a robot without this frame, the problem is an error
     quadruped = condyle.robots.quadruped()
     message = r"^cost `point`: unknown frame `tool`; no frame has a similar name$"
     with pytest.raises(ProblemError, match=message):

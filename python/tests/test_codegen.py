@@ -1,4 +1,6 @@
-"""Generated code, compiled by the system's C compiler, compared with the library; skipped without a compiler."""
+"""Compares generated code, compiled by the system's C compiler, with the library's functions. Skipped if the system has
+no C compiler.
+"""
 
 import os
 import shutil
@@ -13,7 +15,7 @@ import condyle
 import condyle.codegen
 
 ROUNDING = 1e-11
-"""Tolerance relative to the largest number; M⁻¹ may have amplified rounding errors."""
+"""Tolerance relative to the largest number; M⁻¹ may amplify rounding errors."""
 
 needs_compiler = pytest.mark.skipif(
     shutil.which(os.environ.get("CC", "cc").split()[0]) is None, reason="there is no C compiler"
@@ -28,7 +30,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
     flags = condyle.codegen.FLAGS
     condyle.codegen.FLAGS = tuple(
         "-O0" if flag == "-O2" else flag for flag in flags
-    )  # compiling takes most of the time
+    )  # less optimisation, because compilation takes most of the time
     yield folder
     condyle.codegen.FLAGS = flags
     if before is None:
@@ -84,7 +86,7 @@ def test_parameters_are_inputs(quadruped: Robot) -> None:
     rnea = condyle.codegen.compile(model, "rnea", inputs=["inertia", "armature", "gravity"])
     rng = np.random.default_rng(3)
     armature = rng.random(model.nv)
-    armature[:3] = 0.3  # one number for the linear coordinates of a free joint
+    armature[:3] = 0.3  # the three linear coordinates of a free joint must have the same armature
     inertias = [
         condyle.Inertia.from_com(i.mass + 1.0, rng.uniform(-0.1, 0.1, 3), 0.1 * np.eye(3)) for i in model.inertias
     ]

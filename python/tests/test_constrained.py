@@ -1,4 +1,4 @@
-"""Constraints: results of their functions, and errors."""
+"""Tests of constraints: results of functions that take constraints, and errors."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,11 @@ import condyle
 from condyle import ConstraintSet, ContactConstraint
 
 CLOSE = {"rtol": 1e-8, "atol": 1e-8}
-"""Rounding errors after a product with M or its inverse, whose condition is up to 1e4."""
+"""Tolerance for rounding errors after a product with M or M⁻¹; the condition number of M is up to 1e4."""
 
 
 def stance(robot: Robot) -> ConstraintSet:
-    """Returns constraints of a sole or of two feet, in both references."""
+    """Returns constraints that hold two feet, one foot with each kind of reference axes."""
     feet = [
         ContactConstraint("LF_foot", "point"),
         ContactConstraint("RH_foot", "point", reference="local_world_aligned", kd=5.0),
@@ -37,7 +37,7 @@ def test_derivatives_are_of_the_function(quadruped: Robot) -> None:
     feet = stance(quadruped)
     value = condyle.constrained_dynamics(model, data, feet, q, v, tau, f_ext)
     d = condyle.constrained_dynamics_derivatives(model, data, feet, q, v, tau, f_ext)
-    # only the function without derivatives computes the limbs in parallel lanes
+    # not bit-identical, because only the function without derivatives computes the limbs in parallel lanes
     np.testing.assert_allclose(d.a, value.a, **CLOSE)
     np.testing.assert_allclose(d.lambda_, value.lambda_, **CLOSE)
     equations = condyle.constrained_dynamics_equations(model, data, feet, q, v, tau, f_ext)
@@ -101,7 +101,7 @@ def test_targets(quadruped: Robot) -> None:
 
 def test_redundant_constraints(quadruped: Robot) -> None:
     model, data, q, _, _, tau, _ = quadruped
-    v = np.zeros(18)  # the point's classical acceleration is the frame's spatial one here
+    v = np.zeros(18)  # at rest, the classical acceleration of a point equals the spatial acceleration of the frame
     twice = [ContactConstraint("LF_foot", "point"), ContactConstraint("LF_foot", "rigid")]
     without, shared = ConstraintSet(model, twice), ConstraintSet(model, twice, mu=1e-8, iterations=4)
     one = condyle.constrained_dynamics(model, data, without, q, v, tau)
@@ -164,7 +164,7 @@ def test_constraints_of_a_model() -> None:
     assert (glue.kind, glue.frame, glue.other) == ("rigid", "glue#1", "glue#2")
     assert gear == condyle.Coupling("one", "two", (0.1, -2.0, 0.5, 0.0, 0.0))
     loops = condyle.ConstraintSet(model, [pin._replace(kp=9.0)], mu=1e-8, iterations=5)
-    # position and velocity satisfy the pin constraint
+    # this position and this velocity satisfy the constraint `pin`
     data, q, v = condyle.Data(model), np.zeros(3), np.array([0.3, -0.3, 0.3])
     found = condyle.constrained_dynamics(model, data, loops, q, v, np.ones(3))
     assert loops.rows == 3

@@ -1,4 +1,4 @@
-"""Conversions between conventions: each is the inverse of the other, and powers do not change."""
+"""Conversions between conventions: the conversions in the two directions are inverse, and do not change powers."""
 
 from typing import Any
 
@@ -12,11 +12,11 @@ from condyle import conventions
 from condyle.conventions import LIBRARIES, Coordinates, FreeJoint
 
 CLOSE = 1e-13
-"""Some rounding errors of numbers near 1."""
+"""Tolerance for a few rounding errors of numbers near 1."""
 
 
 def every_joint() -> condyle.Model:
-    """Returns a model with one body on the world for each kind of joint that all libraries except Drake have."""
+    """Returns a chain with one joint of each kind that all libraries except Drake have."""
     builder = condyle.ModelBuilder("all joints")
     joints = [
         condyle.Joint.free_flyer(),
@@ -35,7 +35,7 @@ def every_joint() -> condyle.Model:
 
 
 def batch(model: condyle.Model, count: int = 5) -> tuple[NDArray[np.float64], ...]:
-    """Returns positions, and three vectors with the size of velocities."""
+    """Returns arrays of positions, and three arrays of vectors with nv numbers."""
     q = np.array([condyle.random_configuration(model, seed=k) for k in range(count)])
     return (q, *np.random.default_rng(0).standard_normal((3, count, model.nv)))
 
@@ -62,7 +62,7 @@ def test_there_and_back(library: str) -> None:
 
 @pytest.mark.parametrize("library", sorted(LIBRARIES))
 def test_acceleration_is_the_rate_of_velocity(robot: Robot, library: str) -> None:
-    """Checks by central differences along a motion with constant v̇."""
+    """Compares accelerations with central differences of velocities, along a motion with constant v̇."""
     there, h = Coordinates(robot.model, library), 1e-5
     sides = []
     for step in (-h, h):
@@ -73,7 +73,7 @@ def test_acceleration_is_the_rate_of_velocity(robot: Robot, library: str) -> Non
 
 
 def test_drake_and_julia_by_hand() -> None:
-    """A body is turned by 90° about z; its x axis is the world's y."""
+    """Checks numbers for a body that is turned by 90° about z, so that the body's x axis is the world's y axis."""
     builder = condyle.ModelBuilder("body")
     ball = condyle.Inertia.from_com(1.0, [0, 0, 0], np.eye(3))
     builder.body("root", condyle.WORLD, condyle.Joint.free_flyer(), inertia=ball)
@@ -109,7 +109,9 @@ def test_frames_of_twists(robot: Robot) -> None:
 
 
 def test_forces_by_their_power(robot: Robot) -> None:
-    """⟨f, v⟩ is the same in all frames; each conversion is the inverse of the other."""
+    """Power is the same in the axes of the body and of the world, and the conversions in the two directions are
+    inverse.
+    """
     rng = np.random.default_rng(0)
     oXb = condyle.forward_kinematics(robot.model, robot.data, robot.q)
     f, v = rng.standard_normal((2, robot.model.nbodies, 6))

@@ -1,4 +1,6 @@
-"""Kernels called through a driver without a GPU, compared with the library; skipped without C compilers."""
+"""Kernels that are called through a replacement of the driver, which needs no GPU, and compared with the library's
+functions. Skipped if the system has no C and C++ compilers.
+"""
 
 import gc
 import sys
@@ -17,15 +19,15 @@ import condyle.codegen
 import condyle.cuda
 
 ROUNDING = 1e-11
-"""Tolerance relative to the largest number; M⁻¹ may have amplified rounding errors."""
+"""Tolerance relative to the largest number; M⁻¹ may amplify rounding errors."""
 SINGLE = 1e-5
-"""Tolerance of RNEA of an arm in single precision: a hundred rounding errors of 6e-8."""
+"""Tolerance of an arm's RNEA in single precision: about a hundred rounding errors of 6e-8."""
 
 ARM = condyle.robots.arm7()
 
 
 def states(model: condyle.Model, n: int) -> tuple[Any, Any, Any]:
-    """Returns q, v and numbers for a or τ of n states, with the states along the last axis."""
+    """Returns q, v and random accelerations or efforts for n states. The states are along the last axis."""
     rng = np.random.default_rng(n)
     q = np.array([condyle.random_configuration(model, seed=k) for k in range(n)]).reshape(n, model.nq)
     v, x = rng.standard_normal((2, n, model.nv))
@@ -33,7 +35,7 @@ def states(model: condyle.Model, n: int) -> tuple[Any, Any, Any]:
 
 
 def expected(model: condyle.Model, name: str, *given: Any) -> list[Any]:
-    """Returns the library's results, with the states along the last axis."""
+    """Returns the results of the library's function; the states are along the last axis."""
     found = getattr(condyle, name)(model, condyle.Data(model), *(np.ascontiguousarray(x.T) for x in given))
     return [np.moveaxis(x, 0, -1) for x in (found if isinstance(found, tuple) else (found,))]
 
@@ -68,7 +70,8 @@ def test_single_precision(gpu: Gpu) -> None:
 
 
 def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -> None:
-    """As long as all threads fit on the device at a time: eight blocks of 256."""
+    """Several threads share a state if all threads fit on the device at the same time, in eight blocks of 256 threads.
+    """
     kernel = condyle.cuda.compile(quadruped.model, "rnea_derivatives")
     assert kernel.partitions > 2
     assert condyle.cuda.compile(ARM, "rnea_derivatives").partitions == 1
@@ -90,7 +93,9 @@ def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -
 @pytest.mark.parametrize("is_versioned", [False, True])
 @pytest.mark.parametrize("transposed", [False, True])
 def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: bool) -> None:
-    """Arrays are used without a copy and after their library's work, and the library sees the results."""
+    """Arrays are used without a copy, after the pending work of their library. The library then reads the correct
+    results.
+    """
     kernel = condyle.cuda.compile(ARM, "rnea_derivatives")
     given = states(ARM, 50)
     options = {"transposed": transposed, "is_versioned": is_versioned}
@@ -110,9 +115,9 @@ def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: boo
 
 
 def test_a_consumer_that_does_not_wait_sees_nothing(gpu: Gpu) -> None:
-    """This proves that the other tests can detect a missing wait."""
+    """A consumer that does not wait reads no results. So the other tests would detect a missing wait."""
     kernel = condyle.cuda.compile(ARM, "gravity")
-    q = condyle.cuda.array(states(ARM, 3)[0])  # kept alive: freeing memory waits for work on it
+    q = condyle.cuda.array(states(ARM, 3)[0])  # kept alive, because freeing memory would wait for the work on it
     found = kernel(q)
     assert np.isnan(Imported(gpu, found, stream=-1).numpy()).all()
     near(Imported(gpu, found).numpy(), expected(ARM, "gravity", states(ARM, 3)[0])[0])
@@ -124,7 +129,7 @@ def test_results_go_where_out_says(gpu: Gpu) -> None:
     arrays = [Array(gpu, x) for x in given]
     vector, matrix = np.zeros((7, 20)), np.zeros((49, 20))
     first = condyle.cuda.array(vector)
-    # in memory matrices are stored by columns: a transposed (7, 7, n) array of another library, or a flat one
+    # matrices are stored by columns: `out` may be a transposed (7, 7, n) array of another library, or a flat array
     turned = Array(gpu, np.zeros((7, 7, 20)))
     turned.strides = (20, 140, 1)
     out = [first, turned, Array(gpu, matrix), condyle.cuda.array(np.zeros((7, 7, 20))).swapaxes(0, 1)]
@@ -183,7 +188,7 @@ def test_what_is_lent_is_kept_until_it_was_read(gpu: Gpu) -> None:
     kernel(condyle.cuda.array(states(ARM, 1)[0]))
     assert q.given_back == 1
     kernel(q, stream=gpu.stream).numpy()
-    # if a library reports its stream, the kernel uses that stream, and the library keeps the order itself
+    # if a library reports its stream, the kernel uses this stream, so no other synchronisation is necessary
     torch: Any = ModuleType("torch")
     torch.cuda = SimpleNamespace(current_stream=lambda device: SimpleNamespace(cuda_stream=gpu.stream))
     torch.from_dlpack = lambda x: Imported(gpu, x)
@@ -238,7 +243,7 @@ def test_capsules_as_the_header_says(gpu: Gpu) -> None:
             assert (imported.managed.major, imported.managed.minor, imported.managed.flags) == (1, 0, 0)
         assert (imported.shape, imported.strides, imported.dtype.name) == ((4, 3), (1, 4), "float32")
         assert np.array_equal(imported.numpy(), np.arange(12.0).reshape(3, 4).T)
-    array.__dlpack__()  # the capsule has no consumer
+    array.__dlpack__()  # no library takes over this capsule
     del array
     gc.collect()
     assert gpu.live()["memory"] == 1, "what was imported last is still there"
@@ -263,7 +268,7 @@ def test_ptx_the_cache_and_a_newer_device(gpu: Gpu, tmp_path: Path, monkeypatch:
     assert [path.suffix for path in tmp_path.iterdir()] == [".ptx"], "the compiler does not know that device"
     first = condyle.cuda.compile(ARM, "gravity", cache=tmp_path)
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".cubin", ".ptx"]
-    monkeypatch.setenv("CXX", "false")  # existing files are not compiled again
+    monkeypatch.setenv("CXX", "false")  # no C++ compiler: files in the cache must not be compiled again
     for kernel in (
         first,
         condyle.cuda.compile(ARM, "gravity", cache=tmp_path),

@@ -74,7 +74,8 @@ capsule = found.__dlpack__()
 
 
 def run(program: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """Runs a program with its own cache: files of the compiler without a GPU are valid only within one process."""
+    """Runs a program with its own cache, because files of the replacement compiler are valid only within one process.
+    """
     with TemporaryDirectory() as cache:
         changed = os.environ | {"CONDYLE_CACHE": cache} | environment
         return subprocess.run([sys.executable, "-c", program], env=changed, capture_output=True, text=True, check=False)
@@ -100,7 +101,7 @@ def test_without_a_driver_or_a_device(cuda_libraries: tuple[Path, Path]) -> None
 
 
 def test_nvidias_compiler_takes_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs only if it is installed; it needs no GPU."""
+    """Compiles a kernel with NVIDIA's compiler, which needs no GPU; skipped if this compiler is not installed."""
     monkeypatch.delenv("CONDYLE_NVRTC_LIBRARY", raising=False)
     try:
         compiler = _cuda_driver.Compiler()

@@ -25,7 +25,7 @@ def test_data_of_another_robot(quadruped: Robot) -> None:
 
 
 def test_order_of_calls_does_not_matter(robot: Robot) -> None:
-    """No function reads results that another one left in the scratch memory."""
+    """No function reads results that another function left in the scratch memory."""
     model, data, q, v, a, tau, f_ext = robot
     other = condyle.random_configuration(model, seed=9)
     functions = [
@@ -55,7 +55,7 @@ def test_order_of_calls_does_not_matter(robot: Robot) -> None:
 
 
 class Interrupting:
-    """An array that runs a function when it is read, which is after the call has begun."""
+    """An array that runs a function when it is read. At this time the call has already begun."""
 
     def __init__(self, array: NDArray[np.float64], action: Any) -> None:
         self.array, self.action = array, action
@@ -66,7 +66,9 @@ class Interrupting:
 
 
 def test_two_threads_at_once(quadruped: Robot) -> None:
-    """A second thread is refused while the first one's call runs; the first one's result is right."""
+    """While a call runs, a call of a second thread with the same `Data` is an error. The result of the first call is
+    correct.
+    """
     model, data, q, *_ = quadruped
     expected = condyle.gravity(model, data, q)
     errors: list[str] = []
@@ -84,7 +86,7 @@ def test_two_threads_at_once(quadruped: Robot) -> None:
 
     assert np.array_equal(condyle.gravity(model, data, Interrupting(q, in_a_thread)), expected)  # type: ignore[arg-type]
     assert errors == ["data: in use by another call; give each thread a Data of its own"]
-    # the same within one thread; afterwards the scratch memory is free again
+    # nested calls in one thread are also an error; afterwards the scratch memory is free again
     with pytest.raises(RuntimeError, match="^data: in use by another call"):
         condyle.gravity(model, data, Interrupting(q, lambda: condyle.gravity(model, data, q)))  # type: ignore[arg-type]
     assert np.array_equal(condyle.gravity(model, data, q), expected)

@@ -10,7 +10,7 @@ from condyle.optimal import Cost, DifferentialAction, Fddp, FreeDynamics, Proble
 
 ARM = condyle.robots.arm7()
 SCHEMES = ("semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4")
-# Exact derivatives, with another order of sums.
+# Tolerance for exact derivatives whose sums have another order.
 EXACT = 1e-10
 DIFFERENCES = 1e-5
 

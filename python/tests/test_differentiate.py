@@ -14,15 +14,17 @@ from condyle import HyperDual
 
 STEP = 3e-4
 BY_DIFFERENCES = 2e-7
-"""Four-point differences: the fifth derivative times STEP⁴/30, and rounding errors amplified by M⁻¹ of light bodies,
-over STEP.
+"""Tolerance for four-point differences. Their error is the fifth derivative times STEP⁴/30, plus rounding errors
+divided by STEP; M⁻¹ of light bodies amplifies rounding errors.
 """
 BY_HAND = 1e-11
 VALUE = 1e-12
-"""Doubles use other code than hyper-dual numbers, with limbs in parallel lanes; M⁻¹ amplifies the difference."""
+"""Tolerance for values. Doubles are computed by other code than hyper-dual numbers, with limbs in parallel lanes; M⁻¹
+amplifies the difference.
+"""
 
 Case = Callable[[Robot, Any, Any], Any]
-"""A function of a robot, a position and a velocity, which also serves as accelerations and efforts."""
+"""A function of a robot, a position and a velocity. The velocity is also used as accelerations and efforts."""
 CASES: dict[str, Case] = {
     "aba": lambda r, q, v: condyle.aba(r.model, r.data, q, v, 2.0 * v, r.f_ext),
     "aba_derivatives": lambda r, q, v: condyle.aba_derivatives(r.model, r.data, q, v, 2.0 * v),
@@ -136,17 +138,19 @@ def test_every_function_of_a_state_is_a_case() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_along_a_direction(robot: Robot, name: str) -> None:
-    """Compares the two first derivatives and the second one with differences of the value and of a derivative."""
+    """Compares the first derivatives in two directions and the mixed second derivative with differences of the value
+    and of a first derivative.
+    """
     model, f = robot.model, CASES[name]
     rng = np.random.default_rng(2)
     along = rng.standard_normal((2, 2 * model.nv))
 
     def at(x: NDArray[Any]) -> NDArray[Any]:
-        """Returns f at (q, v) moved by x."""
+        """Returns f at the state (q, v) moved by x."""
         return flat(f(robot, condyle.integrate(model, robot.q, x[: model.nv]), robot.v + x[model.nv :]))
 
     def moved(first: float) -> NDArray[Any]:
-        """Returns f there, with ε₁ in the second direction."""
+        """Returns f at the state moved along the first direction, with ε₁ in the second direction."""
         return at(np.array([HyperDual(first * a, eps1=b) for a, b in zip(*along, strict=True)], dtype=object))
 
     def slope(f: Callable[[float], NDArray[Any]]) -> NDArray[Any]:
@@ -249,7 +253,7 @@ def test_elementary_functions(name: str, x: float) -> None:
     ],
 )
 def test_arithmetic(f: Callable[[Any, Any], Any], slopes: tuple[float, float, float]) -> None:
-    """Compares with ∂f/∂x, ∂f/∂y and ∂²f/∂x∂y at (0.5, 2), derived by hand."""
+    """Compares derivatives with values of ∂f/∂x, ∂f/∂y and ∂²f/∂x∂y at (0.5, 2) that were derived by hand."""
     z = f(HyperDual(0.5, eps1=1.0), HyperDual(2.0, eps2=1.0))
     np.testing.assert_allclose([z.eps1, z.eps2, z.eps1eps2], slopes, rtol=1e-13, atol=1e-15)
 
@@ -286,5 +290,5 @@ def test_wrong_arguments(quadruped: Robot) -> None:
         condyle.jacobian(r.model, r.v, lambda q: q)
     with pytest.raises(ValueError, match="f: expected a vector"):
         condyle.jacobian(r.model, r.q, lambda q: condyle.crba(r.model, r.data, q))
-    with pytest.raises(ZeroDivisionError):  # an exception of the function
+    with pytest.raises(ZeroDivisionError):  # an exception of the user's function is passed on
         condyle.gradient(r.model, r.q, lambda q: 1 / 0)

@@ -1,4 +1,4 @@
-"""Docstrings, whose examples run, and stubs, which match the extension module."""
+"""Tests that the examples in docstrings run, and that the stubs match the extension module."""
 
 import doctest
 import inspect
@@ -20,7 +20,7 @@ GLOBALS = {"condyle": condyle, "np": np}
 
 
 def members() -> Iterator[tuple[str, Any]]:
-    """Yields the package and its modules, and the extension module's functions, classes and members of classes."""
+    """Yields the package, its modules, and the functions, classes and members of classes of the extension module."""
     yield "condyle", condyle
     yield from (
         (name, item) for name, item in vars(condyle).items() if name in condyle.__all__ and inspect.ismodule(item)

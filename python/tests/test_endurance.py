@@ -1,4 +1,5 @@
-"""Memory and results stay the same over very many calls, and with eight threads.
+"""Over very many calls, memory does not grow and results do not change; with eight threads, results do not change
+either.
 
 Memory must not grow over 10⁷ calls with `CONDYLE_FULL`, which `./test full` sets, and over 10⁵ calls without it.
 """
@@ -16,8 +17,8 @@ import pytest
 import condyle
 
 CALLS = 10**7 if "CONDYLE_FULL" in os.environ else 10**5
-# Memory that allocators keep for later; a pointer lost in each call is twice as much. For Python objects, one object
-# lost in every fourth call of a kind exceeds the limit.
+# Maximum growth of memory: allocators may keep some for later, and a pointer lost in each call is twice as much.
+# Maximum growth of the number of Python objects: one object lost in every fourth call of a kind exceeds it.
 BYTES = 400_000
 BLOCKS = 2000
 
@@ -29,8 +30,8 @@ def resident() -> int:
 
 
 def calls() -> dict[str, Callable[[], object]]:
-    """Returns calls of every kind: results that are arrays, tuples, numbers; arguments used without a copy, converted,
-    refused.
+    """Returns calls of every kind: with results that are arrays, tuples or numbers, and with arguments that are used
+    without a copy, converted, or refused.
     """
     robot = condyle.robots.quadruped()
     data, q = condyle.Data(robot), condyle.random_configuration(robot, seed=1)
@@ -79,7 +80,9 @@ def test_memory_is_flat() -> None:
 
 
 def test_eight_threads_on_one_model() -> None:
-    """Each thread has its own `Data` and makes calls of all kinds, while the model's attributes are first made."""
+    """Each thread has its own `Data` and makes calls of all kinds, while the threads access the model's attributes for
+    the first time.
+    """
     robot, states, rounds = condyle.robots.humanoid(), 40, 25
     rng = np.random.default_rng(2)
     q = np.stack([condyle.random_configuration(robot, seed=k) for k in range(states)])
@@ -88,7 +91,7 @@ def test_eight_threads_on_one_model() -> None:
     expected = condyle.aba_derivatives(robot, reference, q, v, tau)
     torques = np.stack([condyle.rnea(robot, reference, *one) for one in zip(q, v, tau, strict=True)])
     placements = condyle.frame_placement(robot, reference, q, foot)
-    fresh = robot.with_gravity(robot.gravity)  # a model whose attributes were not accessed yet
+    fresh = robot.with_gravity(robot.gravity)  # a new model, whose attributes were not accessed yet
     failures: list[BaseException] = []
     start = threading.Barrier(8)
 

@@ -25,7 +25,7 @@ def test_example(path: Path, tmp_path: Path) -> None:
     if path.stem == "pictures":
         pytest.importorskip("viser")
     if path.stem == "coming_from_crocoddyl":
-        pytest.importorskip("crocoddyl")  # Crocoddyl's own tests run it if it is installed
+        pytest.importorskip("crocoddyl")  # the example is skipped if Crocoddyl is not installed
     environment = {**os.environ, "PYTHONWARNINGS": "error"}
     run = subprocess.run(
         [sys.executable, path], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300

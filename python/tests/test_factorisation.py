@@ -1,4 +1,4 @@
-"""Factors of M and divide and conquer: solutions and errors."""
+"""Tests of the factors of M and of divide and conquer: solutions and errors."""
 
 from typing import Any
 
@@ -11,11 +11,11 @@ from test_model import PENDULUM
 import condyle
 
 SOLVED = {"rtol": 1e-8, "atol": 1e-8}
-"""Rounding errors after a solve with M, whose condition is up to 1e4."""
+"""Tolerance for rounding errors after a solve with M, whose condition number is up to 1e4."""
 
 
 def factors(robot: Robot) -> tuple[list[Any], NDArray[np.float64]]:
-    """Returns both kinds of factors, ready to solve with, and M."""
+    """Returns M, and factors of M of both kinds, for which `factorize` was called."""
     M = condyle.crba(robot.model, robot.data, robot.q)
     made: list[Any] = [condyle.Ltdl(robot.model), condyle.Cholesky(robot.model.nv)]
     for factor in made:

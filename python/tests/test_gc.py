@@ -1,4 +1,4 @@
-"""Reference cycles through functions of the user: the garbage collector finds them."""
+"""Tests that the garbage collector finds reference cycles through functions of the user."""
 
 import gc
 import weakref
@@ -74,7 +74,7 @@ def test_cycles_are_collected(name: str) -> None:
 
 
 def test_what_is_in_use_is_not_collected() -> None:
-    """A problem keeps the functions of its actions, and a solver its problem."""
+    """A problem keeps the functions of its actions alive, and a solver keeps its problem alive."""
 
     def make() -> tuple[Fddp, "weakref.ref[Marker]"]:
         marker = Marker()
@@ -95,7 +95,7 @@ def test_what_is_in_use_is_not_collected() -> None:
 
 
 def test_all_classes_that_hold_objects_are_seen() -> None:
-    """Classes that hold Python objects take part in garbage collection."""
+    """All classes that hold Python objects take part in garbage collection."""
     simulation = condyle.simulation.Simulation(condyle.robots.arm7())
     knot = action(step)
     for holder in (knot, constrained(step), problem(knot), Fddp(problem(knot)), simulation):

@@ -1,4 +1,4 @@
-"""Modules loaded by an import: NumPy, and no other module that is slow to import."""
+"""The import of Condyle loads NumPy, but no other module that is slow to import."""
 
 import subprocess
 import sys

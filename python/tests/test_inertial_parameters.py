@@ -28,7 +28,7 @@ def test_there_and_back(robot: Robot) -> None:
 
 
 def test_pseudo_inertia() -> None:
-    """Compares with points: Σ m (x, 1) (x, 1)ᵀ."""
+    """Compares with the pseudo-inertia of point masses m at x: Σ m (x, 1) (x, 1)ᵀ."""
     rng = np.random.default_rng(0)
     points, masses = rng.standard_normal((5, 3)), rng.uniform(0.1, 1, 5)
     pi = np.zeros(10)

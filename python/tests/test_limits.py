@@ -1,4 +1,4 @@
-"""Limits of robots and their solver from Python: optimality by differences, satisfied cones, files, errors."""
+"""Tests of limits of robots and of the solver for limits: optimality by differences, satisfied cones, files, errors."""
 
 import pickle
 from collections.abc import Callable
@@ -29,7 +29,7 @@ ARM = condyle.robots.arm7()
 X0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
 TARGET = np.array([0.35, 0.2, 0.6])
 WEAK, DT, KNOTS = 30.0, 0.05, 12
-# Tolerances of the solves, and of central differences of their Lagrangian, whose numbers are of order one.
+# Tolerances of the solves, and of central differences of the Lagrangian, whose numbers are of order one.
 PRIMAL, DUAL, DIFFERENCES = 1e-7, 1e-6, 1e-5
 
 
@@ -81,7 +81,7 @@ def test_a_solution_satisfies_the_conditions_of_optimality() -> None:
         step[k] = 1e-3
         step = step.reshape(us.shape)
         assert abs(lagrangian(us + step) - lagrangian(us - step)) / 2e-3 < DIFFERENCES
-    # a multiplier pushes away from its active bound, and is zero elsewhere
+    # a multiplier is nonzero only at an active bound, and its sign shows which bound is active
     for n, u in zip(y[: KNOTS - 1], us, strict=False):
         assert ((n == 0) | ((np.abs(u) > WEAK - 1e-6) & (np.sign(n) == np.sign(u)))).all()
     assert any(n.any() for n in y[: KNOTS - 1])
@@ -106,7 +106,7 @@ def test_settings_reach_both_solvers() -> None:
     assert solution.status == "max_iterations" and len(solution.trace) == 2
     threaded = AugmentedLagrangian(problem, inner={"threads": 2, "inverse_dynamics_form": True}, penalty_start=100.0)
     assert threaded.solve(xs, us).status == "converged" and threaded.outcome.penalty >= 100.0
-    # for FDDP alone limits are costs for leaving their bounds, whatever was solved before
+    # FDDP alone treats limits as costs for leaving the bounds, even after a solve with limits
     alone = Fddp(problem).solve(xs, us)
     assert alone.status == "converged" and np.abs(tool(alone.xs[-1]) - TARGET).max() > 1e-3
     with pytest.raises(ValueError, match="there is no setting 'penalty'"):
@@ -154,7 +154,7 @@ def test_a_start_is_moved_into_the_bounds() -> None:
     assert np.abs(Fddp(problem, max_iterations=0).solve(xs, us).us).max() == 20.0
     kept = Fddp(problem, max_iterations=0, project_warm_start=False).solve(xs, us)
     assert kept.status == "max_iterations" and np.array_equal(kept.us, us)
-    inner = {"max_iterations": 0, "project_warm_start": False}  # the augmented Lagrangian sets this itself
+    inner = {"max_iterations": 0, "project_warm_start": False}  # the augmented Lagrangian method overrides this setting
     solution = AugmentedLagrangian(problem, inner=inner, max_solves=1, restart=False).solve(xs, us)
     assert solution.status != "converged" and np.abs(solution.us).max() == 20.0
 
@@ -203,7 +203,7 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
 
 
 def test_constraints_of_ones_own_are_limits() -> None:
-    """The arm's limits, written in Python: with and without derivatives, nested, and at the terminal knot."""
+    """Limits of the arm that are written in Python: with and without derivatives, nested, and at the terminal knot."""
     problem, xs, us = reach()
     expected = sharp(problem)
     solution = expected.solve(xs, us)
@@ -220,7 +220,7 @@ def test_constraints_of_ones_own_are_limits() -> None:
     last = FreeDynamics(ARM, DT, costs)
     end = ConstrainedAction(FreeDynamics(ARM, None, []), 10, lambda t, x, u: np.r_[tool(x) - TARGET, x[7:]])
     problem = Problem(X0, [held, last], [0] * (KNOTS - 1) + [1], end)
-    problem.set_weight("rest", 1e-1)  # also for knots within constraints
+    problem.set_weight("rest", 1e-1)  # also changes the weight in actions inside a constrained action
     ours = sharp(problem)
     found = ours.solve(xs, us)
     assert found.status == "converged"

@@ -1,4 +1,6 @@
-"""Messages to the user: each error has the argument, the expected and the found value; and the contents of help."""
+"""Tests of messages to the user: each error names the argument, the expected value and the found value. Also tests the
+contents of `help`.
+"""
 
 import pickle
 import pkgutil
@@ -39,7 +41,9 @@ def test_columns_and_batches_in_another_layout() -> None:
 
 @pytest.mark.parametrize("shape", [(5, 6, 8), (5, 48, 1), (5, 8, 7)])
 def test_matrices_of_many_states_in_another_layout(shape: tuple[int, ...]) -> None:
-    """These have as many numbers, or more, and were once read in the wrong order."""
+    """Matrices with a wrong shape are errors, even if they have enough numbers; otherwise the numbers would be read in
+    the wrong order.
+    """
     states = np.tile(Q, (5, 1))
     message = told(lambda: condyle.rnea(ARM, DATA, states, ZERO, ZERO, np.zeros(shape)), ValueError)
     assert message == f"f_ext: expected shape (8, 6), or (N, 8, 6) for N states, found {shape}"
@@ -146,7 +150,9 @@ def test_a_setting_of_another_type_is_named(name: str, value: object, text: str)
 
 
 def test_functions_are_functions() -> None:
-    """For user-defined actions, residuals and spaces the error comes at construction, not in a solve."""
+    """For user-defined actions, residuals and spaces, an argument that is not a function is an error at construction,
+    not in a solve.
+    """
     optimal, f = condyle.optimal, len
     for make, name in (
         (lambda: optimal.Action(2, 1, 3), "calc"),
@@ -230,7 +236,7 @@ def test_what_a_model_shows_is_made_once() -> None:
     assert ARM.limits is ARM.limits
     assert ARM.frames[3] is ARM.frames[3]
     own = ARM.frames
-    own.clear()  # a list that belongs to the caller
+    own.clear()  # the caller may change this list, because it is a copy
     ARM.names.clear()
     assert len(ARM.frames) == 17
     assert len(ARM.names) == 8

@@ -64,7 +64,7 @@ def test_inertias() -> None:
     world, rod, finger = condyle.Model.from_urdf_str(PENDULUM).inertias
     assert (world.mass, rod.mass, finger.mass) == (3.0, 3.0, 0.0)
     np.testing.assert_allclose(rod.com, [0, 0, -4 / 3], atol=1e-15)
-    # 2 kg at −1, 1 kg at −2: both turn about the axis; about their common centre 2/3 kg m² remain
+    # two masses, 2 kg at −1 and 1 kg at −2, give 6 kg m² about the axis and 2/3 kg m² about their common centre
     np.testing.assert_allclose(rod.rotational, [[6.3, 0.01, 0], [0.01, 6.2, 0], [0, 0, 0.1]], atol=1e-14)
     np.testing.assert_allclose(rod.about_com, [[0.3 + 2 / 3, 0.01, 0], [0.01, 0.2 + 2 / 3, 0], [0, 0, 0.1]], atol=1e-14)
     assert np.array_equal(finger.com, [0, 0, 0])
@@ -212,7 +212,7 @@ def test_continuous_joints_have_limits_of_speed_and_effort_only() -> None:
 
 
 ODD = PENDULUM.replace('ixx="0.3"', 'ixx="0.25"')
-"""A robot without mass at its tip, whose bodies are otherwise physical."""
+"""A robot whose tip has no mass; all other inertias are physical."""
 
 
 def test_warnings() -> None:
@@ -238,7 +238,8 @@ def test_strict(tmp_path: Path) -> None:
 
 
 def test_singular() -> None:
-    """Functions that need M⁻¹ are refused, others work; a rotor makes M regular."""
+    """If M is singular, functions that need M⁻¹ raise an error, and all other functions work. A rotor makes M regular.
+    """
     model = condyle.Model.from_urdf_str(PENDULUM)
     data, zero = condyle.Data(model), np.zeros(2)
     message = "^joint `slide` moves nothing that has inertia along it: the inertia matrix is singular$"
@@ -310,7 +311,7 @@ def test_gravity_and_armature(robot: Robot) -> None:
         with pytest.raises(condyle.ModelError, match="armature is 0, 0.1 and 0.2 along its linear coordinates"):
             model.with_armature(armature)
         armature[:3] = 0.7
-        acceleration[:3] += np.cross(v[3:6], v[:3])  # in the axes of the world
+        acceleration[:3] += np.cross(v[3:6], v[:3])  # the rate of the velocity along the axes of the world
     geared = model.with_armature(armature)
     assert np.array_equal(geared.armature, armature)
     difference = condyle.rnea(geared, data, q, v, a) - condyle.rnea(model, data, q, v, a)
@@ -332,7 +333,9 @@ def test_words(quadruped: Robot) -> None:
 
 @pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
 def test_pickle(robot: Robot, protocol: int) -> None:
-    """All numbers are bit-identical, also infinite limits; and the copy can use the original's scratch memory."""
+    """All numbers of the copy are bit-identical, also infinite limits. The copy can use the scratch memory of the
+    original.
+    """
     model, data, q, v, a, *_ = robot
     model = model.with_gravity([0.1, 0.2, 0.3]).with_armature(np.full(model.nv, 1 / 3))
     again = pickle.loads(pickle.dumps(model, protocol))

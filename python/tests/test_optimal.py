@@ -29,7 +29,7 @@ ARM = condyle.robots.arm7()
 QUADRUPED = condyle.robots.quadruped()
 X0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
 STANDING = np.r_[condyle.neutral(QUADRUPED), np.zeros(18)]
-# The optimum of the same problem, found twice with a tolerance of 1e-9 of the cost.
+# Tolerance for the optimum of the same problem, found twice with a tolerance of 1e-9 of the cost.
 OPTIMUM = 1e-8
 
 
@@ -125,7 +125,7 @@ def test_residuals_are_values() -> None:
     assert reach != Residual.frame_translation(ARM, "tool", [0.4, 0.2, 0.6])
     assert reach != Residual.center_of_mass([0.4, 0.2, 0.5])
     assert repr(Residual.control([1.0])) == '<condyle.optimal.Residual {"control":{"reference":[1.0]}}>'
-    # one residual may be used in several terms, of a knot and of several knots
+    # one residual may be used in several terms of the same knot or of different knots
     terms = [Cost("far", 1.0, reach), Cost("near", 10.0, reach, Activation.smooth2(1e-2))]
     problem = Problem(X0, [FreeDynamics(ARM, 0.1, terms)], [0], FreeDynamics(ARM, None, [terms[0]]))
     assert problem.to_json().count('"frame_translation"') == 3
@@ -218,7 +218,8 @@ def test_what_no_file_can_hold() -> None:
 
 
 def test_costs_of_a_knot_move_with_it() -> None:
-    """A horizon shifted with new targets at its end equals the horizon that has them from the start."""
+    """A horizon that was shifted and got new targets at its end equals a horizon that has these targets from the start.
+    """
     horizon = 12
 
     def follow(time: int) -> list[Cost]:

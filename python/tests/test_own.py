@@ -1,4 +1,4 @@
-"""User-defined actions: derivatives of calc, spaces of states, a whole horizon at once."""
+"""Tests of user-defined actions: derivatives of calc, spaces of states, and calls for a whole horizon at once."""
 
 import pickle
 from typing import Any
@@ -18,7 +18,7 @@ from condyle.optimal import (
     thrusters,
 )
 
-# Exact derivatives agree with given ones to rounding; central differences of second order agree to 1e-6 of their size.
+# Exact derivatives agree with given derivatives up to rounding, central differences agree up to 1e-6 of their size.
 EXACT = 1e-12
 DIFFERENCES = 1e-5
 ARM = condyle.robots.arm7()
@@ -96,7 +96,7 @@ def test_functions_of_two(f: Any) -> None:
 
 
 def check(calc: Any) -> None:
-    """Compares derivatives of calc at several knots, from one call, with central differences."""
+    """Compares the derivatives of calc at several knots, computed by one call of calc, with central differences."""
 
     def counted(t: Any, x: Any, u: Any) -> Any:
         calls.append(x.dtype)
@@ -107,7 +107,7 @@ def check(calc: Any) -> None:
     end = Lqr(np.zeros((2, 2)))
     ours = nodes(Action(2, 1, counted), xs, us, end)
     assert sum(dtype.kind == "O" for dtype in calls) == 1  # one call for both knots
-    # a conversion to float leaves only differences
+    # calc converts its results to float, so only differences can be used
     plain = Action(2, 1, lambda t, x, u: tuple(np.asarray(y, float) if np.ndim(y) else float(y) for y in calc(t, x, u)))
     assert_same(ours, nodes(plain, xs, us, end), DIFFERENCES)
 
@@ -181,7 +181,9 @@ def test_states_on_a_circle_move_as_angles() -> None:
 
 
 def test_states_of_a_robot_have_its_tangent_space() -> None:
-    """Compares a free base, controlled by its velocity, with the robot's own knot with the same costs."""
+    """Compares a user-defined action of a free base, controlled by the base's velocity, with a built-in action with the
+    same costs.
+    """
     nq, nv = QUADRUPED.nq, QUADRUPED.nv
     rest = np.r_[condyle.neutral(QUADRUPED), np.zeros(nv)]
     ours = condyle.optimal.InverseDynamics(QUADRUPED, 0.05, [])
@@ -281,7 +283,9 @@ def test_an_action_has_a_repr_and_a_pickle() -> None:
 
 
 def test_differential_equations_of_first_order() -> None:
-    """Compares a linear equation with its series, and an equation of motion with `DifferentialAction`."""
+    """Compares the step of a linear equation with a power series, and the step of an equation of motion with
+    `DifferentialAction`.
+    """
 
     def decay(t: Any, x: Any, u: Any) -> Any:
         return u - x, 0.0
@@ -317,7 +321,7 @@ def test_differential_equations_of_first_order() -> None:
 
 def test_thrusters_push_and_turn() -> None:
     place = np.eye(4)
-    place[:3, :3] = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]  # the thrust axis z along the base's x
+    place[:3, :3] = [[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]  # the thrust axis is the base's x axis
     place[:3, 3] = [0.1, 0.2, 0.3]
     S = thrusters(QUADRUPED, [place, np.eye(4)], [0.5, -0.25])
     np.testing.assert_allclose(S[:6, 0], [1.0, 0.0, 0.0, 0.5, 0.3, -0.2], atol=1e-15)

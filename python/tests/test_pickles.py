@@ -1,4 +1,4 @@
-"""Pickles of all public classes: an equal copy, or an error for a computation in progress."""
+"""Tests of pickles of all public classes: the pickle is an equal copy, or an error for a computation in progress."""
 
 import inspect
 import pickle
@@ -17,7 +17,7 @@ Q, ZERO = np.full(7, 0.3), np.zeros(7)
 STEP = FreeDynamics(ARM, 0.05, [Cost("rest", 1.0, Residual.state(np.zeros(14)))])
 PROBLEM = Problem(np.zeros(14), [STEP], [0] * 3, FreeDynamics(ARM, None, []))
 
-# Computations in progress: factors, a robot that is being built.
+# Classes of computations in progress, such as factors and builders.
 UNDER_WAY = {
     "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Sweep",
 }  # fmt: skip
@@ -32,7 +32,7 @@ def cone() -> optimal.FrictionCone:
     return optimal.FrictionCone(0.6, facets=8, inner=True, least=1.0, rotation=[[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
-# An object of each class whose pickle has no other test.
+# An object of each class whose pickle is tested only here.
 OBJECTS: dict[str, Any] = {
     "Simulation": simulation.Simulation(ARM, "runge_kutta_4", dt=0.002, passive=0.1),
     "Ground": simulation.Ground(["tool"], friction=0.3),
@@ -58,7 +58,9 @@ OBJECTS: dict[str, Any] = {
 
 
 def shown(thing: Any) -> list[str]:
-    """Returns the visible contents of an object: its text, its properties, results of methods without arguments."""
+    """Returns the visible contents of an object: its text, its properties, and the results of its methods without
+    arguments.
+    """
     members = [name for name in dir(type(thing)) if not name.startswith("_")]
     values = [getattr(thing, name) for name in members]
     called = [name in ("rows", "bounds") and callable(value) for name, value in zip(members, values, strict=True)]
@@ -81,7 +83,9 @@ def test_a_copy_shows_the_same(name: str, protocol: int) -> None:
 
 @pytest.mark.parametrize(("name", "item"), [pair for pair in classes() if pair[0] not in OBJECTS])
 def test_all_others_pickle_or_are_under_way(name: str, item: type) -> None:
-    """All classes have their own pickle, are tuples or exceptions, or are refused by name."""
+    """Every other class defines its own pickle, is a tuple or an exception, or its pickle raises an error that names
+    the class.
+    """
     own = any({"__reduce__", "__reduce_ex__", "__getstate__"} & vars(base).keys() for base in item.__mro__[:-1])
     assert own or issubclass(item, tuple | Exception) or item.__init__ is not object.__init__ or name in UNDER_WAY
 
@@ -95,7 +99,9 @@ def swing(t: int, x: np.ndarray, u: np.ndarray) -> float:
 
 
 def test_residuals_of_ones_own_go_with_their_knots() -> None:
-    """Residuals in costs, in costs of one knot, and in limits, among others: a copy gives bit-identical solutions."""
+    """A copied problem with user-defined residuals gives bit-identical solutions. The residuals are in costs, in costs
+    of single knots, and in limits.
+    """
     ends, rest = np.full(7, np.inf), Cost("rest", 0.1, Residual.state(np.zeros(14)))
     costs = [Cost("power", 1e-2, Residual.own(7, power)), rest, Cost("swing", 1.0, Residual.own_cost(swing))]
     limits = [optimal.Limit("strong", Residual.own(7, power), -ends, ends)]

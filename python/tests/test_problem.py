@@ -1,4 +1,5 @@
-"""Problems and solvers: an action for each knot, evaluation, callbacks, progress output, values that pickle."""
+"""Tests of problems and solvers: an action for each knot, evaluation, callbacks, progress output, pickles of results.
+"""
 
 import pickle
 import sys
@@ -40,7 +41,7 @@ STANDING = np.r_[condyle.neutral(QUADRUPED), np.zeros(18)]
 STANDING[8:19] = np.tile([0.7, -1.4, 0.0], 4)[:11]
 FEET = ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
 KNOTS = 11
-# The same sums in another order.
+# Tolerance for the same sums in another order.
 ROUNDING = 1e-9
 
 
@@ -92,7 +93,7 @@ def test_an_action_for_each_knot_gives_the_bits_of_one_for_all() -> None:
     one, other = (Fddp(problem, max_iterations=6).solve(xs, us) for problem in (apart, shared))
     assert one.trace[0].accepted and [i.cost for i in one.trace] == [i.cost for i in other.trace]
     np.testing.assert_array_equal(one.xs, other.xs)
-    # later changes affect only this knot
+    # costs that are set later affect only this knot
     for problem in (apart, shared):
         problem.set_costs(4, costs(7))
         problem.set_weight("com", 5.0)
@@ -262,7 +263,7 @@ def test_a_sweep_is_the_solvers() -> None:
     solution = Fddp(problem, max_iterations=1, inverse_dynamics_form=False).solve(xs, us)
     for t in range(KNOTS):
         np.testing.assert_allclose(found.K[t], solution.K[t], rtol=0, atol=1e-6 * abs(solution.K[t]).max())
-    # the first step for a linear-quadratic problem gives its optimum: u + k + K dx, computed by hand
+    # for a linear-quadratic problem, the first step u + k + K dx gives the optimum; here it is computed by hand
     dx, cost = np.zeros(14) + np.array(nodes[0].f) * 0.0, 0.0
     for node, K, k in zip(nodes, found.K, found.k, strict=False):
         A, B, f, Q, S, R, q, r = (np.array(part) for part in node)

@@ -1,4 +1,4 @@
-"""Behaviour with threads, forks, signals and environment variables. Each test runs its own program, with a time-out."""
+"""Tests with threads, forks, signals and environment variables. Each test runs its own program, with a time limit."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ import time
 import pytest
 
 TIMEOUT = 120.0
-"""Seconds after which a program counts as hanging: many times its duration, even unoptimised."""
+"""Time (s) after which a program counts as hanging: many times the duration of a program, even without optimisation."""
 
 PRELUDE = """
 import gc, multiprocessing, os, signal, sys, threading, time
@@ -86,7 +86,9 @@ CALLS = {
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("calls", CALLS.values(), ids=CALLS)
 def test_fork_after_threads(calls: str) -> None:
-    """The child of a process that has computed with threads computes the same, and so does the child's child."""
+    """If a process has computed with threads and then forks, its child, and also a child of this child, computes the
+    same results.
+    """
     check(
         calls
         + """
@@ -263,7 +265,7 @@ def test_control_c(name: str) -> None:
     """Ctrl-C raises KeyboardInterrupt within the call, which ends the program."""
     program = PRELUDE + textwrap.dedent(LONG[name] + INTERRUPTED) + "print('begin', flush=True)\n"
     program += "interrupted(KeyboardInterrupt)\nprint('again', flush=True)\ncall()\n"
-    # a shell that runs the tests in the background may ignore Ctrl-C for them
+    # restore the handler: a shell that runs the tests in the background may make them ignore Ctrl-C
     program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n" + program
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -278,7 +280,8 @@ def test_control_c(name: str) -> None:
 
 
 def test_signals_on_another_thread() -> None:
-    """Only the main thread receives signals: a solve on another one continues, and does not block the interpreter."""
+    """Only the main thread receives signals: a solve on another thread continues, and does not block the interpreter.
+    """
     check(
         LONG["simulation"].replace("2**63", "200_000")
         + """
@@ -379,7 +382,7 @@ def test_handlers_run_meanwhile(call: str) -> None:
 
 @pytest.mark.parametrize("value", ["", "avx3", "AVX2", "neon" if os.uname().machine == "x86_64" else "avx2"])
 def test_refused_level(value: str) -> None:
-    """A SIMD level that cannot be used is an error of the import, which names the available ones."""
+    """If a SIMD level cannot be used, the import raises an error that names the available levels."""
     code, _, errors = run("", CONDYLE_LEVEL=value)
     assert code == 1
     last = errors.strip().splitlines()[-1]

@@ -34,7 +34,7 @@ def test_a_step_of_euler(robot: Robot) -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_orders(integrator: Any) -> None:
-    """Halving the step reduces the error by 2 to the power of the order."""
+    """Halving the step reduces the error by the factor 2 to the power of the integrator's order."""
     arm = condyle.robots.arm7()
     q, v = [0.3] * 7, [0.1] * 7
 
@@ -52,7 +52,9 @@ def test_orders(integrator: Any) -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_control_laws(quadruped: Robot, integrator: Any) -> None:
-    """Efforts and forces that a law sets before each step have the same effect as arguments of single steps."""
+    """Efforts and forces that a control law sets before each step have the same effect as the arguments of single
+    steps.
+    """
     model, _, q, v, *_ = quadruped
     tau, f_ext = np.zeros(18), np.zeros((14, 6))
     by_law, by_hand = Simulation(model, integrator), Simulation(model, integrator)
@@ -89,7 +91,7 @@ def test_a_law_that_fails(quadruped: Robot) -> None:
     with pytest.raises(TypeError, match="^control: expected a function that sets "):
         simulation.run(3, lambda now: now.tau)  # type: ignore[arg-type,return-value]
     assert simulation.run(0, broken) == "done"
-    # a law may read the simulation that calls it
+    # a control law may read the simulation that calls it
     times: list[float] = []
     assert simulation.run(2, lambda now: times.append(simulation.time)) == "done"
     assert times == [0.0, 0.001]
@@ -169,7 +171,7 @@ def test_a_robot_lands_and_stands(quadruped: Robot) -> None:
 
 @pytest.mark.parametrize("mu", [0.2, 0.6])
 def test_a_box_slides_to_a_stop(mu: float) -> None:
-    """The distance is v²/(2 μ g), minus half a step's distance."""
+    """The sliding distance is v²/(2 μ g), minus half the distance of one step."""
     model = condyle.Model.from_mjcf_str(BOX).with_frame("centre", "box")
     simulation = Simulation(model, ground=Ground([("centre", CORNERS)], friction=mu))
     q, v = condyle.neutral(model), np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])

@@ -68,7 +68,7 @@ def test_segments_and_threads_change_no_iterate() -> None:
     np.testing.assert_array_equal(threaded.xs, one.xs)
     segments = Fddp(problem, segments=3, threads=2).solve(xs, us)
     assert segments.status == one.status
-    # segments that differ by more than 1e-9 of their value functions are swept as one
+    # if the results of segments differ by more than 1e-9 of the value functions, the horizon is swept as one segment
     np.testing.assert_allclose([i.cost for i in segments.trace], [i.cost for i in one.trace], rtol=1e-8)
     np.testing.assert_allclose(segments.xs, one.xs, atol=1e-9)
     assert (segments.xs != one.xs).any()

@@ -1,4 +1,4 @@
-"""Sweeps: the rows equal single solves, for any chunks, folders and processes."""
+"""Tests of sweeps: the rows of a sweep equal the results of single solves, for any chunks, folders and processes."""
 
 import os
 import signal
@@ -171,7 +171,7 @@ def slow(problem: Problem, weight: float) -> None:
 
 
 def once_fatal(problem: Problem, item: tuple[float, str]) -> None:
-    """Ends its process the first time that the variation requests it."""
+    """Ends the worker's process once, when a variation that requests this is computed for the first time."""
     weight, mark = item
     if mark and not Path(mark).exists():
         Path(mark).touch()

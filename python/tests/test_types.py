@@ -1,4 +1,4 @@
-"""Types in the stubs: results of functions and properties have the types in the stubs."""
+"""Tests that results of functions and properties have the types in the stubs."""
 
 import ast
 import pkgutil
@@ -21,7 +21,7 @@ ARM = condyle.robots.arm7()
 Q, V = np.full(7, 0.3), np.full(7, 0.1)
 INERTIA = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
 
-# An argument for each argument name of the functions, unless it has a default.
+# A value for each argument name of the functions, except for arguments with a default.
 ARGUMENTS = {
     "model": ARM,
     "data": condyle.Data(ARM),
@@ -39,7 +39,7 @@ ARGUMENTS = {
     "pi": condyle.inertial_parameters.from_inertia(INERTIA),
     "theta": np.zeros(10),
 }
-# An argument of each type of `condyle.pinocchio`.
+# A value for each type of argument of the functions in `condyle.pinocchio`.
 SPELLED = {"_SpelledModel": _spelling.Model(ARM), "_SpelledData": _spelling.Model(ARM).createData()}
 SPELLED |= {"ReferenceFrame": _spelling.ReferenceFrame.WORLD, "str | int": "joint3", "int": 1}
 _condyle.framesForwardKinematics(SPELLED["_SpelledModel"], SPELLED["_SpelledData"], Q)

@@ -1,4 +1,5 @@
-"""Pictures: the pattern of the tree, plots, shapes, and the contents of a motion's page."""
+"""Tests of pictures: the pattern of zeros of the tree, plots, shapes, and the contents of the page that shows a motion.
+"""
 
 import subprocess
 import sys
@@ -44,7 +45,7 @@ def test_the_pattern_is_that_of_the_inertia_matrix(name: str) -> None:
     predicted = viz.pattern(model)
     assert not M[~predicted].any()
     assert (predicted == predicted.T).all()
-    # few of the entries that may be nonzero are zero, by symmetries of the robot
+    # entries that may be nonzero are nonzero, except a few that are zero by symmetries of the robot
     assert (M[predicted] > 0.0).mean() > 0.9
 
 
@@ -54,7 +55,7 @@ def test_the_pattern_of_joints_that_follow() -> None:
     M = sum(np.abs(condyle.crba(model, data, condyle.random_configuration(model, seed=k))) for k in range(5))
     assert not M[~viz.pattern(model)].any()
     left, right = (model.idx_vs[model.joint(name)] for name in ("LF_KFE", "RF_HFE"))
-    assert viz.pattern(model)[left, right]  # the knee of one leg also moves the other leg
+    assert viz.pattern(model)[left, right]  # a mimic joint: the knee of one leg also moves the other leg
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +114,7 @@ def test_capsules_join_the_joints() -> None:
     long = {body for body in range(1, model.nbodies) if any(np.linalg.norm(end) > thick for end in _ends(model, body))}
     assert len(long) > 15
     assert {shape.body for shape in shapes} == long
-    for shape in shapes:  # the far end of the shape is at a joint or a link of the body
+    for shape in shapes:  # the far end of each shape is at the origin of a joint or a link frame of the body
         radius = -shape.vertices[:, 2].min()
         end = shape.placement[:3, 2] * (shape.vertices[:, 2].max() - radius)
         assert min(np.linalg.norm(end - other) for other in _ends(model, shape.body)) < 1e-12

@@ -1,5 +1,5 @@
-"""Whole-body control: forces carry the weight, efforts agree with `rnea`, every kind of task and contact, errors with
-names, threads.
+"""Tests of whole-body control: forces carry the weight, efforts agree with `rnea`, every kind of task and contact
+works, errors contain names, and threads get the same results.
 """
 
 import copy
@@ -33,7 +33,7 @@ SOLES = ["left_sole", "right_sole"]
 CHEST = "chest"
 STANDING = np.r_[0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2]
 TASKS = [Task.com(), Task.orientation("trunk"), Task.posture()]
-# Violations are at most 1e-6 of 1 and the weight; efforts and sums of forces agree to some of these.
+# Violations are at most 1e-6 of 1 and the weight; efforts and sums of forces agree up to a few of these violations.
 SOLVED = 1e-3
 
 
@@ -58,7 +58,7 @@ def moving(model: condyle.Model, q: np.ndarray, seed: int = 0) -> tuple[np.ndarr
 
 
 def effort(model: condyle.Model, q: np.ndarray, v: np.ndarray, contacts: list[FrictionContact], command: Any) -> Any:
-    """Returns rnea(q, v, q̈) − Σ Jᵀ f."""
+    """Returns the efforts that the command requires, rnea(q, v, q̈) − Σ Jᵀ f."""
     data = condyle.Data(model)
     tau = condyle.rnea(model, data, q, v, command.a)
     for contact, force in zip(contacts, command.forces, strict=True):
@@ -103,7 +103,7 @@ CONTACTS: dict[str, list[FrictionContact]] = {
 
 @pytest.mark.parametrize("kind", CONTACTS)
 def test_contacts_of_every_kind(kind: str) -> None:
-    """Checks M q̈ + h = τ + Σ Jᵀ f, m (c̈ − g) = Σ f, and that contacts are held."""
+    """Checks that M q̈ + h = τ + Σ Jᵀ f and m (c̈ − g) = Σ f, and that contacts are held."""
     contacts = CONTACTS[kind]
     controller = WholeBodyController(HUMANOID, contacts, [Task.com(), Task.posture()])
     q, v = moving(HUMANOID, upright())
@@ -118,7 +118,7 @@ def test_contacts_of_every_kind(kind: str) -> None:
     for contact in contacts:
         held = 3 if contact.corners is None or len(contact.corners) == 2 else 6
         a = condyle.frame_classical_acceleration(HUMANOID, data, q, v, command.a, contact.frame, "local_world_aligned")
-        if contact.corners is not None:  # the acceleration at the corners' middle: a + ω̇ × r + ω × (ω × r)
+        if contact.corners is not None:  # the acceleration at the mean of the corners: a + ω̇ × r + ω × (ω × r)
             w = condyle.frame_velocity(HUMANOID, data, q, v, contact.frame, "local_world_aligned")[3:]
             r = condyle.frame_placement(HUMANOID, data, q, contact.frame)[:3, :3] @ contact.corners.mean(0)
             a[:3] += np.cross(a[3:], r) + np.cross(w, np.cross(w, r))
@@ -135,14 +135,14 @@ def test_a_contact_comes_and_goes() -> None:
     assert loads[0] > 50.0 and 0.0 <= loads[1] <= 0.1 * 9.81 * QUADRUPED.total_mass + 1e-4 and loads[2] == 0.0
 
 
-# Acceleration requested of a task's quantity, far within the robot's abilities.
+# Desired acceleration of the task, so small that the robot can reach it.
 WANTED = 0.2
 
 
 @pytest.mark.parametrize("axes", ["world", "local", ("frame", "right_sole")])
 @pytest.mark.parametrize("kind", ["com", "pose", "position", "orientation", "velocity", "angular_momentum"])
 def test_tasks_of_every_kind(kind: str, axes: Any) -> None:
-    """A task of the highest priority is fulfilled: J q̈ + J̇ v = a*, in its axes."""
+    """A task of the first priority is fulfilled exactly: J q̈ + J̇ v = a*, along the axes of the task."""
     q, v = moving(HUMANOID, upright(), 1)
     data = condyle.Data(HUMANOID)
     on_frame = kind not in ("com", "angular_momentum")
@@ -175,7 +175,7 @@ def test_tasks_of_every_kind(kind: str, axes: Any) -> None:
     R = np.eye(3)
     if axes != "world" and (on_frame or axes != "local"):
         R = condyle.frame_placement(HUMANOID, data, q, CHEST if axes == "local" else axes[1])[:3, :3]
-    error = (found - wanted[:size]).reshape(-1, 3) @ R  # Rᵀ e
+    error = (found - wanted[:size]).reshape(-1, 3) @ R  # Rᵀ e: the error along the axes of the task
     np.testing.assert_allclose(error.ravel()[mask], 0.0, atol=SOLVED)
 
 
@@ -190,7 +190,7 @@ def test_a_task_of_force_and_one_of_posture() -> None:
 
 
 def test_settings_are_the_library_s() -> None:
-    """The defaults in Python equal the library's, and given values are returned."""
+    """The default settings in Python equal the library's defaults, and the controller returns given settings."""
     assert WholeBodyController(QUADRUPED, [], []).settings == Settings()
     limits = JointLimits(0.1, 50.0, velocity=np.full(18, 3.0))
     given = Settings(1e-4, 1e-3, Gains(1.0, 2.0), 9.0, Pyramid(6, False), np.full(18, 40.0), limits, 3, 0.1, "clarabel")
@@ -206,7 +206,7 @@ def test_settings_are_the_library_s() -> None:
 
 
 def test_limits_of_effort() -> None:
-    """Weak motors cannot carry the robot: the command reports it, and is within the limits."""
+    """If motors are too weak to carry the robot, the command reports this, and is within the torque limits."""
     weak = np.full(18, 5.0)
     controller = WholeBodyController(QUADRUPED, points(), TASKS, Settings(effort=weak))
     command = controller.step(STANDING, np.zeros(18), controller.hold(STANDING))
@@ -350,7 +350,9 @@ def test_plans_from_arrays() -> None:
 
 
 def test_plans_of_solutions() -> None:
-    """For a solution with an impact: the impact's knot has no controls, and its two ends have the same time."""
+    """Converts a solution with an impact: the knot of the impact has no controls, and the knots before and after it
+    have the same time.
+    """
     feet = {foot: condyle.ContactConstraint(foot, "point", kd=20.0) for foot in FEET}
     x0 = np.r_[STANDING, np.zeros(18)]
     rest = Cost("rest", 1.0, Residual.state(x0))
@@ -391,7 +393,7 @@ def test_values() -> None:
 
 
 def test_two_controllers_in_two_threads() -> None:
-    """Each thread's controller gives the same results as it gives alone."""
+    """Two controllers in two threads give the same results as each controller gives alone."""
 
     def run(seed: int, out: list[np.ndarray]) -> None:
         controller = WholeBodyController(QUADRUPED, points(), TASKS)
@@ -413,7 +415,9 @@ def test_two_controllers_in_two_threads() -> None:
 
 
 def test_one_controller_in_two_threads() -> None:
-    """A controller serves one thread at a time: the other one gets an error, and no command is a mixture."""
+    """Only one thread at a time can use a controller: the other thread gets an error, and no command mixes the data of
+    two threads.
+    """
     controller = WholeBodyController(
         HUMANOID, CONTACTS["soles"], [Task.com(), Task.posture()], Settings(warm_start=False)
     )

@@ -1,5 +1,5 @@
-"""Whole-body control with invalid states and references: a safe command or an error, with the name of the joint or of
-the frame; copies and pickles of controllers.
+"""Tests of whole-body control with invalid states and references: the result is a safe command or an error, with the
+name of the joint or the frame. Also tests copies and pickles of controllers.
 """
 
 import copy
@@ -59,7 +59,8 @@ def test_a_quaternion_has_length_1(factor: float) -> None:
 
 
 def test_references_are_positions_and_poses() -> None:
-    """Values that are set are checked at once; values changed in place are checked by the step."""
+    """References that are set are checked at once; references that are changed in place are checked in the next step.
+    """
     controller = new()
     good = controller.hold(STANDING)
     mirror = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -134,7 +135,7 @@ def test_normalize_needs_a_length() -> None:
         with pytest.raises(condyle.ModelError, match=rf"joint `root_joint`: .* has the length {length} and cannot"):
             condyle.normalize(QUADRUPED, q)
         with pytest.raises(condyle.ModelError, match=rf"joint `root_joint`: .* has the length {length} and cannot"):
-            condyle.normalize(QUADRUPED, np.stack([STANDING, q]))  # one of many states
+            condyle.normalize(QUADRUPED, np.stack([STANDING, q]))  # only one of the states is invalid
         with pytest.raises(condyle.ModelError, match="joint `wheel`: its rotation, q"):
             condyle.normalize(wheel, [0.6 * factor, 0.8 * factor])
     np.testing.assert_allclose(condyle.normalize(QUADRUPED, scaled(3.0)), STANDING)
@@ -143,7 +144,7 @@ def test_normalize_needs_a_length() -> None:
 
 
 def ticks(controller: WholeBodyController, first: int, count: int) -> list[str]:
-    """Returns commands at states near the stance while contacts begin and end, one of them at an invalid state."""
+    """Returns commands at states near the stance while contacts begin and end. One of the states is invalid."""
     commands = []
     for k in range(first, first + count):
         rng = np.random.default_rng(k)

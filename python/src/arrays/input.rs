@@ -28,19 +28,20 @@ impl<D: Dimension> Deref for Input<'_, D> {
 }
 
 impl Input<'_, Ix2> {
-    /// Copies the numbers to a matrix, which is stored by columns.
+    /// Copies the numbers to a matrix of nalgebra, which stores matrices by columns.
     pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
         let &[rows, columns] = self.0.shape() else { unreachable!("has two dimensions") };
         DMatrix::from_row_slice(rows, columns, self)
     }
 }
 
-/// The doubles of an argument, in C order, for calls that keep the interpreter's lock. The borrow is not registered:
-/// that would take as long as the dynamics of a small robot.
+/// The doubles of an argument, in C order, for calls that keep the interpreter's lock. NumPy is not told that the array
+/// is borrowed: this would take as long as the dynamics of a small robot.
 pub(crate) enum InPlace<'py, D: Dimension> {
     /// An array, kept alive by this reference.
     Array(Bound<'py, PyArray<f64, D>>),
-    /// The numbers of an argument (address, count), for a call that runs no Python code until it has used them.
+    /// The address and the count of an argument's numbers, for a call that runs no Python code before the numbers are
+    /// used.
     AtOnce(*const f64, usize),
 }
 
@@ -55,8 +56,8 @@ impl<D: Dimension> Deref for InPlace<'_, D> {
     type Target = [f64];
     #[inline(always)]
     fn deref(&self) -> &[f64] {
-        // SAFETY: the reader of the numbers holds the interpreter's lock and calls no Python meanwhile, so no other
-        // code writes to the array or moves it; an argument stays alive until the call returns.
+        // SAFETY: this code holds the interpreter's lock and runs no Python code, so no other code writes to the array
+        // or moves it. An argument stays alive until the call returns.
         unsafe {
             match *self {
                 Self::AtOnce(numbers, count) => core::slice::from_raw_parts(numbers, count),
@@ -66,15 +67,15 @@ impl<D: Dimension> Deref for InPlace<'_, D> {
     }
 }
 
-/// Returns the numbers of a plain array of doubles with this shape in C order, and `None` for anything else. Runs no
-/// Python code.
+/// Returns the numbers of an array of doubles with this shape in C order; `None` for all other objects. Runs no Python
+/// code.
 #[inline(always)]
 #[allow(unsafe_code)]
 pub(crate) fn at_once<'py, D: Dimension>(value: &Bound<'py, PyAny>, shape: &[usize]) -> Option<InPlace<'py, D>> {
     static DOUBLE: PyOnceLock<Py<PyArrayDescr>> = PyOnceLock::new();
     const PLAIN: c_int = NPY_ARRAY_C_CONTIGUOUS | NPY_ARRAY_ALIGNED;
     let double = DOUBLE.get_or_init(value.py(), || f64::get_dtype(value.py()).unbind()).as_ptr();
-    // SAFETY: an object of exactly this type is an array, and has as many dimensions as `nd` states.
+    // SAFETY: an object of exactly this type is an array of NumPy, and its field `nd` is the number of its dimensions.
     unsafe {
         if ffi::Py_TYPE(value.as_ptr()) != PyUntypedArray::type_object_raw(value.py()) {
             return None;
@@ -116,7 +117,7 @@ fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[
     Ok(Input(as_it_lies_or_converted(argument, value, shape)?.try_readonly()?))
 }
 
-/// Returns the array itself if it is an array of doubles in C order, else a new array with its numbers.
+/// Returns the argument itself if it is an array of doubles in C order, else a new array with the same numbers.
 #[inline]
 fn as_it_lies_or_converted<'py, D: Dimension>(
     argument: &str,
@@ -133,7 +134,7 @@ fn as_it_lies_or_converted<'py, D: Dimension>(
     Ok(convert(argument, value, shape)?.cast_into::<PyArray<f64, D>>()?)
 }
 
-/// Converts anything that NumPy understands as an array of numbers to a new float64 C-contiguous array.
+/// Converts any object from which NumPy can make an array of numbers to a new float64 C-contiguous array.
 #[cold]
 fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
@@ -164,7 +165,7 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
 pub(crate) enum Expected<'a> {
     /// One shape.
     Shape(&'a [usize]),
-    /// The shape for one state; for many states one axis is added in front.
+    /// The shape for one state; an argument for many states has one more axis, the first.
     States(&'a [usize]),
 }
 

@@ -1,9 +1,9 @@
 //! NumPy arrays as arguments and results.
 //!
 //! Arguments (`input`): a float64 C-contiguous array is read without a copy; other dtypes and strides are converted; a
-//! wrong shape is a `ValueError`. Results (`output`): a new array, or the caller's. Matrices are column-major in
-//! nalgebra and row-major here. Arrays of hyper-dual numbers are arrays of objects, see `hyper_dual.rs`. Arrays that
-//! show a model's numbers are read-only, see `read_only`.
+//! wrong shape is a `ValueError`. Results (`output`): they are written to a new array, or to the caller's `out`.
+//! Matrices are column-major in nalgebra and row-major in NumPy. Arrays of hyper-dual numbers are arrays of objects,
+//! see `hyper_dual.rs`. Arrays that show a model's numbers are read-only, see `read_only`.
 
 mod input;
 mod output;
@@ -47,7 +47,7 @@ pub(crate) trait Number: Scalar {
         shape: &[usize],
         fill: impl FnOnce(&mut [Self]),
     ) -> PyResult<Bound<'py, PyAny>>;
-    /// Returns a new vector of these numbers if there is a faster method than `output`.
+    /// Returns a new vector of these numbers, for types with a faster method than `output`; otherwise `None`.
     fn new_vector<'py>(_: Python<'py>, _: &[Self]) -> Option<Bound<'py, PyAny>> {
         None
     }

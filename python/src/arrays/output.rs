@@ -57,7 +57,7 @@ fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])
     array.into_any()
 }
 
-/// Number of elements from which an array is allocated by a call of NumPy that can report an error.
+/// Number of elements from which an array is large: NumPy allocates it in a call that can report an error.
 const LARGE: usize = 1 << 24;
 
 /// Returns whether an array of this shape has fewer than `LARGE` elements, so that its allocation is assumed to
@@ -66,7 +66,7 @@ fn is_small(shape: &[usize]) -> bool {
     shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE)
 }
 
-/// Returns the array in C order that is to be filled: the caller's, if it has the shape, or a new one.
+/// Returns an array in C order to be filled: the caller's array, whose shape is checked, or a new one.
 pub(crate) fn place<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -76,7 +76,7 @@ pub(crate) fn place<'py>(
         if is_small(shape) {
             return Ok(PyArray::<f64, _>::zeros(py, shape, false));
         }
-        // raises `MemoryError` if it is too large
+        // this call raises `MemoryError` if the array is too large
         return Ok(py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?.cast_into()?);
     };
     let wanted = || format!("expected a writable C-contiguous float64 array of shape {}", tuple(shape));
@@ -138,7 +138,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     fn write(&self, x: &mut [N]) {
         let (rows, columns) = self.shape();
         if self.strides() == (1, rows) && !self.is_empty() {
-            // SAFETY: by its strides the matrix is rows × columns contiguous numbers.
+            // SAFETY: the strides show that the matrix consists of rows × columns contiguous numbers.
             #[allow(unsafe_code)]
             let numbers = unsafe { core::slice::from_raw_parts(self.as_ptr(), rows * columns) };
             return transpose(numbers, rows, columns, x);
@@ -151,7 +151,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     }
 }
 
-/// A square matrix that is symmetric up to rounding, so that its columns can be used as rows.
+/// A symmetric matrix: its columns are written as rows, which is correct up to rounding.
 pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::spatial::Matrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {
@@ -164,20 +164,20 @@ impl<N: Number> Array for Symmetric<'_, N> {
     }
 }
 
-/// Returns four numbers from index `at` on.
+/// Returns the four numbers that begin at index `at`.
 #[inline(always)]
 fn four<N: Copy>(from: &[N], at: usize) -> [N; 4] {
     *from[at..].first_chunk().expect("a matrix has as many")
 }
 
-/// Sets four numbers from index `at` on.
+/// Sets the four numbers that begin at index `at`.
 #[inline(always)]
 fn set_four<N>(to: &mut [N], at: usize, numbers: [N; 4]) {
     *to[at..].first_chunk_mut().expect("a row has as many") = numbers;
 }
 
-/// Writes a matrix that is stored by columns in the order of its rows, in tiles of 4 × 4. A tile is read and written
-/// with a few instructions. One number at a time, each write would touch another cache line.
+/// Transposes a matrix: it is stored by columns, and written row by row, in tiles of 4 × 4. A tile is read and written
+/// with a few instructions. If numbers were written one by one, each write would touch another cache line.
 fn transpose<N: Number>(from: &[N], rows: usize, columns: usize, to: &mut [N]) {
     assert!(from.len() == rows * columns && to.len() == rows * columns, "as many numbers as a matrix has");
     let mut r = 0;
@@ -298,7 +298,7 @@ rows!(Vec3: 3, Motion: 6, Force: 6);
 
 /// A result that a function can return: an array, a number, or a tuple of them.
 pub(crate) trait Give {
-    /// Returns it to Python, in the caller's `out` if there is one.
+    /// Returns the result to Python, in the caller's `out` if it is given.
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>>;
 }
 
@@ -321,7 +321,7 @@ pub(crate) struct Computed<S, F, const AXES: usize> {
 }
 
 impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Computed<S, F, AXES> {
-    /// Creates an array of this shape, all of whose numbers `fill` sets.
+    /// Creates an array of this shape; `fill` sets all its numbers.
     pub(crate) fn new(shape: [usize; AXES], fill: F) -> Self {
         Self { shape, fill, number: PhantomData }
     }
@@ -332,7 +332,7 @@ impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Give for Computed<S, F, AXES
         if out.is_none() {
             return S::output(py, None, &self.shape, &self.fill);
         }
-        // `out` may be an input of the computation
+        // computed in other memory first, because `out` may be an input of the computation
         let mut numbers = vec![S::zero(); self.shape.iter().product()];
         (self.fill)(&mut numbers);
         S::output(py, out, &self.shape, |x| x.copy_from_slice(&numbers))
@@ -374,8 +374,8 @@ pub(crate) fn named<'py>(class: &Bound<'py, PyType>, members: Bound<'py, PyTuple
     new.bind(py).call1((class, members))
 }
 
-/// Creates a named tuple of `condyle._types` from members given by name. They are written to the arrays of `out` if
-/// there is one.
+/// Creates a named tuple of `condyle._types` from members given by name. The members are written to the arrays of `out`
+/// if it is given.
 macro_rules! give_named {
     ($py:ident, $out:ident, $class:expr, { $($name:expr => $member:expr),* }) => {{
         let mut out = $crate::arrays::members($out, &[$($name),*])?.into_iter();
@@ -385,8 +385,8 @@ macro_rules! give_named {
 }
 pub(crate) use give_named;
 
-/// Implements `Give` for structs of the library: each becomes the named tuple of the same name. It has the members
-/// listed here, some of them renamed.
+/// Implements `Give` for structs of the library: each becomes the named tuple of the same name. The tuple has the
+/// members listed here; some have another name than in Rust.
 macro_rules! named_tuples {
     (@name $member:ident) => { stringify!($member) };
     (@name $member:ident as $name:ident) => { stringify!($name) };
@@ -425,7 +425,7 @@ pub(crate) fn members<'py>(
     Ok(members.into_iter().map(Some).collect())
 }
 
-/// Returns the ranges of addresses that the results of a batch are written to.
+/// Returns the ranges of addresses to which the results of a batch are written.
 pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> {
     let Some(out) = out else { return Vec::new() };
     if out.is_instance_of::<PyUntypedArray>() {
@@ -434,8 +434,8 @@ pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> 
     out.try_iter().map_or_else(|_| Vec::new(), |members| members.flatten().map(|one| memory(&one)).collect())
 }
 
-/// Returns the range of addresses of a C-contiguous array of doubles. It is empty for anything else, which is refused
-/// later.
+/// Returns the range of addresses of a C-contiguous array of doubles. The range is empty for all other objects, which
+/// cause an error later.
 fn memory(array: &Bound<'_, PyAny>) -> Range<usize> {
     let Ok(array) = array.cast::<PyArrayDyn<f64>>() else { return 0..0 };
     let start = array.data().addr();

@@ -1,5 +1,5 @@
-//! A function in CasADi's terms: sparsity of its results and derivatives, and their numbers, converted from derivatives
-//! with respect to tangent coordinates.
+//! A function as CasADi calls it: the sparsity of its results and derivatives, and the numbers of their entries.
+//! Derivatives with respect to tangent coordinates are converted to CasADi's coordinates.
 
 use super::chart::{Chart, Position};
 use super::computation::{Calls, Computation};
@@ -9,16 +9,17 @@ use nalgebra::DMatrix;
 use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 
-/// Indices of a slot's functions.
+/// Indices of the four functions of a slot.
 pub(super) const VALUE: usize = 0;
 pub(super) const JACOBIAN: usize = 1;
 pub(super) const REVERSE: usize = 2;
 pub(super) const HESSIAN: usize = 3;
 
-/// An argument or a result in CasADi's terms.
+/// An argument or a result of a function, as CasADi describes it.
 pub(super) struct Port {
     pub(super) name: CString,
-    /// Number of rows, number of columns, index of the first entry of each column, row of each entry.
+    /// CasADi's description of a sparse matrix: number of rows, number of columns, index of the first entry of each
+    /// column, row of each entry.
     pub(super) sparsity: Vec<i64>,
 }
 
@@ -39,8 +40,8 @@ impl Port {
         (Self { name: CString::new(name).expect("names have no zeros"), sparsity }, places)
     }
 
-    /// Repeats the matrix for a number of states. The columns of the states follow each other, in the same rows, or in
-    /// rows of their own for each state.
+    /// Repeats the matrix for a number of states. The columns of the states follow each other. All states use the same
+    /// rows, or, with `own_rows`, each state has its own rows.
     fn repeat(&mut self, states: usize, own_rows: bool) {
         let number = |n: usize| i64::try_from(n).expect("CasADi counts that far");
         let (rows, columns) = (self.sparsity[0], self.sparsity[1] as usize);
@@ -66,7 +67,7 @@ impl Port {
     }
 }
 
-/// The matrix from which a result's numbers are copied.
+/// The matrix from which the numbers of a result are copied.
 #[derive(Clone, Copy)]
 enum Source {
     Value,
@@ -80,7 +81,7 @@ enum Source {
 pub(super) struct Output {
     pub(super) port: Port,
     source: Source,
-    /// For each entry of a state, its index in the source.
+    /// For each entry of one state's result, the index of its number in the source.
     from: Vec<usize>,
 }
 
@@ -92,7 +93,7 @@ pub(super) struct Description {
 }
 
 impl Description {
-    /// Repeats inputs and outputs for a number of states. Jacobians become block-diagonal.
+    /// Repeats the inputs and outputs for a number of states. Jacobians become block-diagonal.
     fn of_many(mut self, states: usize, is_jacobian: bool) -> Self {
         self.inputs.iter_mut().for_each(|port| port.repeat(states, false));
         self.outputs.iter_mut().for_each(|output| output.port.repeat(states, is_jacobian));
@@ -105,35 +106,37 @@ pub(super) struct Bound {
     computation: Box<dyn Computation>,
     /// Bytes that identify the function.
     pub(super) key: Vec<u8>,
-    /// Number of states per call; their columns follow each other.
+    /// Number of states per call. Arguments and results contain the columns of all states, one state after the other.
     states: usize,
     chart: Chart,
-    /// Sizes of the arguments and total size of the results, for one state.
+    /// Size of each argument for one state; `ny` is the total size of the results for one state.
     sizes: Vec<usize>,
     ny: usize,
-    /// For each result, its first index among all results, and the indices of its entries from there.
+    /// For each result, the index of its first number among the numbers of all results, and the indices of its entries
+    /// relative to this number.
     results: Vec<(usize, Vec<usize>)>,
     pub(super) descriptions: [Description; 4],
-    /// Free work spaces; each call takes one, so there are as many as simultaneous calls.
+    /// Unused work spaces. Each call takes one and puts it back, so their number is the largest number of simultaneous
+    /// calls.
     free: Mutex<Vec<Work>>,
 }
 
-/// Work space of a call. Its positions and matrices J and H are as many as the states that it computes together.
+/// Work space of a call. It has one position, one J and one H for each state that is computed at the same time.
 struct Work {
     calls: Box<dyn Calls>,
     positions: Vec<Position>,
     x: Vec<Vec<f64>>,
     lambda: Vec<f64>,
     y: Vec<f64>,
-    /// With respect to tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
+    /// `J`, `g` and `H` are derivatives with respect to tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
     J: Vec<DMatrix<f64>>,
     g: Vec<f64>,
     H: Vec<DMatrix<f64>>,
-    /// With respect to CasADi's coordinates: J, Jᵀλ, and the Hessian.
+    /// `Jx`, `gx` and `Hx` are the same derivatives with respect to CasADi's coordinates.
     Jx: DMatrix<f64>,
     gx: Vec<f64>,
     Hx: DMatrix<f64>,
-    /// H T and its transpose.
+    /// `half` is H T, and `turned` its transpose; T maps changes of CasADi's coordinates to tangent vectors.
     half: DMatrix<f64>,
     turned: DMatrix<f64>,
 }
@@ -269,7 +272,8 @@ impl Bound {
     /// Evaluates a function of the slot.
     ///
     /// # Safety
-    /// `arg` and `res` have a pointer, to as many numbers as it has entries or null, for each input and each output.
+    /// `arg` has a pointer for each input, and `res` for each output. Each pointer is null or points to as many numbers
+    /// as the input or output has entries.
     #[allow(unsafe_code)]
     pub(super) unsafe fn evaluate(
         &self,
@@ -281,14 +285,14 @@ impl Bound {
         let most = work.J.len();
         for first in (0..self.states).step_by(most) {
             let some = first..self.states.min(first + most);
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller promises valid pointers in `arg` and `res`.
             unsafe { self.evaluate_some(function, some, &mut work, arg, res)? };
         }
         self.give_back(work);
         Ok(())
     }
 
-    /// Evaluates some states, at most as many as one call computes.
+    /// Evaluates a function for the states in the range `some`, which one call of the computation can do.
     ///
     /// # Safety
     /// As for `evaluate`.
@@ -302,7 +306,7 @@ impl Bound {
         res: *const *mut f64,
     ) -> Result<(), Error> {
         let (n, all) = (some.len(), self.states);
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller promises valid pointers in `arg` and `res`.
         let input = |k: usize, count: usize| unsafe {
             let given = *arg.add(k);
             (!given.is_null())
@@ -336,7 +340,7 @@ impl Bound {
                 }
             }
         }
-        // SAFETY: the caller's promise.
+        // SAFETY: the caller promises valid pointers in `arg` and `res`.
         let is_wanted = |k: usize| unsafe { !(*res.add(k)).is_null() };
         let mut outputs = self.descriptions[function].outputs.iter().enumerate();
         let wants_jacobian = outputs.any(|(k, o)| matches!(o.source, Source::TransposedJacobian) && is_wanted(k));
@@ -372,7 +376,7 @@ impl Bound {
             let Hx = if is_flat { H } else { &w.Hx };
             for (k, output) in self.descriptions[function].outputs.iter().enumerate() {
                 let count = output.from.len();
-                // SAFETY: the caller's promise.
+                // SAFETY: the caller promises valid pointers in `arg` and `res`.
                 let to = unsafe {
                     let to = *res.add(k);
                     if to.is_null() {

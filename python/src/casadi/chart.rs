@@ -1,8 +1,8 @@
-//! Positions as CasADi has them: vectors of nq numbers, some of which are quaternions or points of a circle.
+//! Positions in CasADi: vectors of nq numbers, which contain quaternions and points of a circle.
 //!
-//! A function f of a robot's position is defined on the group. For an arbitrary vector q it is evaluated at q̂, where
-//! quaternions and points of circles are divided by their lengths. Its derivatives with respect to q follow from its
-//! derivatives with respect to the tangent vector δ = q' ⊖ q̂:
+//! A function f of a robot's position is defined only for quaternions and points of circles of length 1. For an
+//! arbitrary vector q, f is evaluated at q̂: q with quaternions and points of circles divided by their lengths. The
+//! derivatives of f with respect to q follow from its derivatives with respect to the tangent vector δ = q' ⊖ q̂:
 //!
 //! ```text
 //! δ = T dq + ½ Σ dqᵀ C_k dq e_k + …      ∂f/∂q = ∂f/∂δ T      ∂²f/∂q² = Tᵀ ∂²f/∂δ² T + Σ_k ∂f/∂δ_k C_k
@@ -12,10 +12,10 @@ use condyle::{Joint, Model, Vec3, spatial::Mat3};
 use core::ops::Range;
 use nalgebra::{DMatrix, SMatrix};
 
-/// T of a group, in the leading rows and columns.
+/// The matrix T of one joint, in the leading rows and columns.
 type Block = SMatrix<f64, 6, 7>;
 
-/// The coordinates of a joint: its ranges in q and v.
+/// The coordinates of a joint: their ranges in q and v.
 #[derive(Clone, Debug)]
 struct Group {
     joint: Joint,
@@ -44,12 +44,12 @@ pub(super) struct Chart {
     pub(super) nv: usize,
 }
 
-/// A position, and T at it.
+/// A position, and the matrix T at this position.
 #[derive(Clone, Debug)]
 pub(super) struct Position {
     /// q̂, nq numbers.
     pub(super) q: Vec<f64>,
-    /// T of each group; only set for groups with a quaternion or a point of a circle.
+    /// The matrix T of each group; only set for groups with a quaternion or a point of a circle.
     T: Vec<Block>,
     /// For each group, the length by which its quaternion or point of a circle was divided.
     lengths: Vec<f64>,
@@ -70,7 +70,7 @@ impl Chart {
         Self { groups: Vec::new(), nq: 0, nv: 0 }
     }
 
-    /// Returns whether there is neither a quaternion nor a point of a circle: then T is the identity, and q̂ is q.
+    /// Returns whether q has neither a quaternion nor a point of a circle: then T is the identity, and q̂ is q.
     pub(super) fn is_flat(&self) -> bool {
         self.curved().next().is_none()
     }
@@ -106,7 +106,8 @@ impl Chart {
         }
     }
 
-    /// Computes Y = X T; X is read from nv columns from `from` on, and Y is written from column `first` on.
+    /// Computes Y = X T. X is the nv columns of the matrix `X` that begin at column `from`; the result is written to
+    /// `Y`, beginning at column `first`.
     pub(super) fn multiply(&self, at: &Position, X: &DMatrix<f64>, from: usize, Y: &mut DMatrix<f64>, first: usize) {
         for (group, T) in self.groups.iter().zip(&at.T) {
             if group.unit().is_none() {
@@ -125,13 +126,13 @@ impl Chart {
         }
     }
 
-    /// Adds Σ_k g_k C_k to H, in nq rows and columns from `first` on.
+    /// Adds Σ_k g_k C_k to the nq rows and columns of H that begin at index `first`.
     pub(super) fn add_curvature(&self, at: &Position, g: &[f64], H: &mut DMatrix<f64>, first: usize) {
         for (k, group) in self.groups.iter().enumerate() {
             let Some(unit) = group.unit() else { continue };
             let (T, q, start) = (&at.T[k], &at.q[unit.clone()], unit.start - group.q.start);
-            let turns = group.v.len() - if q.len() == 4 { 3 } else { 1 }; // first tangent coordinate that is a rotation
-            // rotations: δ = T dq (1 − q̂ᵀ dq / length), so C = −(q̂ Tᵀ + T q̂ᵀ) / length
+            let turns = group.v.len() - if q.len() == 4 { 3 } else { 1 }; // index of the first rotation in δ
+            // for rotations δ = T dq (1 − q̂ᵀ dq / length), so C = −(q̂ Tᵀ + T q̂ᵀ) / length
             for i in 0..unit.len() {
                 for j in 0..unit.len() {
                     let mut sum = 0.0;
@@ -142,7 +143,7 @@ impl Chart {
                     H[(first + unit.start + i, first + unit.start + j)] += sum / at.lengths[k];
                 }
             }
-            // translations: δ_v = (1 − ½ δ_ω×) Rᵀ dp
+            // for translations δ_v = (1 − ½ δ_ω×) Rᵀ dp
             for a in 0..start {
                 for j in 0..unit.len() {
                     let (p, w) = (T.column(a), T.column(start + j));
@@ -168,7 +169,7 @@ impl Chart {
         self.groups.iter().filter(|group| group.unit().is_some())
     }
 
-    /// Computes the change of the coordinates of q ⊕ δ with δ: E δ with E = ∂(q ⊕ δ)/∂δ at zero.
+    /// Computes the change E δ of the coordinates of q ⊕ δ, to first order in δ; E = ∂(q ⊕ δ)/∂δ at δ = 0.
     pub(super) fn push(&self, q: &[f64], delta: &[f64], out: &mut [f64]) {
         for group in self.groups.iter().filter(|group| group.unit().is_none()) {
             out[group.q.clone()].copy_from_slice(&delta[group.v.clone()]);
@@ -181,7 +182,7 @@ impl Chart {
         }
     }
 
-    /// Computes Eᵀ λ.
+    /// Computes Eᵀ λ, with E = ∂(q ⊕ δ)/∂δ at δ = 0.
     pub(super) fn pull(&self, q: &[f64], lambda: &[f64], out: &mut [f64]) {
         for group in self.groups.iter().filter(|group| group.unit().is_none()) {
             out[group.v.clone()].copy_from_slice(&lambda[group.q.clone()]);
@@ -194,8 +195,8 @@ impl Chart {
         }
     }
 
-    /// Passes λᵀ ∂²(q ⊕ δ)/∂δ² of each group where it is not zero: its range in v, and the matrix in the leading rows
-    /// and columns.
+    /// Calls `show` for each group with nonzero second derivatives λᵀ ∂²(q ⊕ δ)/∂δ². The arguments are the range of the
+    /// group in v, and a matrix that has these derivatives in the leading rows and columns.
     pub(super) fn each_curvature(
         &self,
         q: &[f64],
@@ -209,8 +210,8 @@ impl Chart {
 }
 
 impl Group {
-    /// Returns Eᵀ at a normalised position, from T E = 1. In T the block of lengths is a rotation, the row of a circle
-    /// has length 1, and the rows of a quaternion have length 2.
+    /// Returns Eᵀ at a normalised position, from T E = 1. In T, the block of a translation is a rotation matrix, the
+    /// row of a circle has length 1, and the rows of a quaternion have length 2.
     fn retraction(&self, q: &[f64]) -> Block {
         let mut E = tangent_map(self.joint, &q[self.q.clone()], 1.0);
         let turns = self.unit().expect("a group that is none of numbers");

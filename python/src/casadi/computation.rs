@@ -1,5 +1,5 @@
-//! The computation behind a slot: results, and their derivatives with respect to tangent vectors, for one or several
-//! states at a time. This file does not depend on CasADi.
+//! The computation that a slot performs: results, and their derivatives with respect to tangent vectors, for one or
+//! several states at a time. This file does not depend on CasADi.
 
 use super::chart::Chart;
 use condyle::ModelError as Error;
@@ -13,9 +13,8 @@ pub(super) struct Output {
     pub(super) columns: usize,
 }
 
-/// A function of vectors. The leading numbers of the first argument may be a position, which `chart` describes.
-/// Derivatives are taken with respect to the tangent vector there and to all other numbers, in the order of the
-/// arguments.
+/// A function of vectors. The first argument may begin with a position, which `chart` describes. Derivatives are taken
+/// with respect to the tangent vector at this position and to all other numbers, in the order of the arguments.
 pub(super) trait Computation: Send + Sync {
     /// Returns the names and sizes of the arguments.
     fn arguments(&self) -> Vec<(&'static str, usize)>;
@@ -39,19 +38,20 @@ pub(super) trait Computation: Send + Sync {
     /// Returns whether the second derivative of λᵀf with respect to tangent coordinates i and j may differ from zero.
     fn curves(&self, i: usize, j: usize) -> bool;
 
-    /// Returns a work space for calls with this number of states; simultaneous calls have one each.
+    /// Returns a work space for calls with this number of states. Each of several simultaneous calls needs its own work
+    /// space.
     fn calls(&self, states: usize) -> Result<Box<dyn Calls>, Error>;
 }
 
-/// Work space for calls of a function, each for one or several states. Arguments and results are stored state by state,
-/// and there is one matrix for each state.
+/// Work space for calls of a function, each for one or several states. Arguments and results are stored state by state;
+/// each state has its own matrix of derivatives.
 pub(super) trait Calls: Send {
     /// Returns the maximum number of states of a call.
     fn most(&self) -> usize {
         1
     }
 
-    /// Computes all results, one after the other, each by columns.
+    /// Computes all results. They are written to `y` one after the other, each by columns.
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]);
 
     /// Computes the first derivatives of all results with respect to all tangent coordinates.

@@ -33,11 +33,11 @@ pub(crate) enum Kind {
 /// The second derivatives that may differ from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pattern {
-    /// None.
+    /// No second derivatives.
     Zero,
-    /// Entries for pairs of coordinates that move a body in common.
+    /// Second derivatives with respect to pairs of coordinates that move at least one common body.
     Related,
-    /// All.
+    /// All second derivatives.
     Full,
 }
 
@@ -46,12 +46,12 @@ pub(super) struct Scratch<S> {
     data: Data<S>,
     constraints: Option<ConstraintSet<S>>,
     tensors: Option<Box<RneaSecondDerivatives<S>>>,
-    /// A frame's Jacobian, 6 × nv, and zeros, nv numbers.
+    /// The Jacobian of a frame, 6 × nv, and a vector of nv zeros.
     J: DMatrix<S>,
     zeros: Vec<S>,
 }
 
-/// Writes the derivative of the results from a row on with respect to one argument.
+/// Writes a block of derivatives to J: its rows begin at `row`, its columns are those for one argument.
 fn place<S: Scalar>(J: &mut DMatrix<S>, row: usize, argument: usize, block: &DenseMatrix<S, impl Dense<S>>) {
     J.view_mut((row, argument * block.ncols()), block.shape()).copy_from(block);
 }
@@ -67,7 +67,7 @@ impl Kind {
         }
     }
 
-    /// Returns names and shapes of the results; `rows` is the number of rows of the constraints.
+    /// Returns the names and shapes of the results; `rows` is the number of rows of the constraints.
     pub(super) fn outputs(&self, nv: usize, rows: usize) -> Vec<Output> {
         let output = |name, rows, columns| Output { name, rows, columns };
         match self {
@@ -83,7 +83,7 @@ impl Kind {
     }
 
     /// Returns whether a first derivative may differ from zero: the derivative of number `row` of all results with
-    /// respect to tangent coordinate j. `related` returns whether two coordinates move a body in common.
+    /// respect to tangent coordinate j. `related` returns whether two coordinates move a common body.
     pub(super) fn depends(&self, row: usize, j: usize, nv: usize, related: impl Fn(usize, usize) -> bool) -> bool {
         match self {
             Self::Rnea => related(row, j),
@@ -115,7 +115,7 @@ impl Kind {
         Ok(Scratch { data, constraints, tensors, J: DMatrix::from_element(6, nv, zero), zeros: vec![zero; nv] })
     }
 
-    /// Computes all results, one after the other, each by columns.
+    /// Computes all results. They are written to `y` one after the other, each by columns.
     pub(super) fn value(&self, model: &Model, s: &mut Scratch<f64>, x: &[Vec<f64>], y: &mut [f64]) {
         let data = &mut s.data;
         match self {
@@ -219,8 +219,8 @@ impl Kind {
         }
     }
 
-    /// Computes the Hessian of λᵀf with respect to all tangent coordinates if the library has it in closed form, and
-    /// the Jacobian if it is wanted. Returns whether the library has the closed form.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates, and the Jacobian if J is given, if the
+    /// library has closed formulas for them. Returns whether it has.
     pub(super) fn closed_hessian(
         &self,
         model: &Model,
@@ -262,9 +262,9 @@ impl Kind {
         }
     }
 
-    /// Computes the Hessian of λᵀf with respect to all tangent coordinates: the derivatives of Jᵀλ, with hyper-dual
-    /// numbers in two directions at a time. The derivatives with respect to q are taken at q ⊕ δ, whose tangent space
-    /// differs from the one at q. The Hessian is their symmetric part.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates as derivatives of Jᵀλ, with hyper-dual
+    /// numbers in two directions at a time. J is taken in the tangent space at q ⊕ δ, which differs from the tangent
+    /// space at q. The Hessian is the symmetric part of these derivatives.
     pub(super) fn hessian(
         &self,
         model: &Model,

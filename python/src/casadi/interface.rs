@@ -1,9 +1,9 @@
-//! CasADi's C interface to functions that are bound to numbered slots.
+//! Exports functions to CasADi through its C interface. Each function is bound to a numbered slot.
 //!
-//! `casadi.external` finds a function by its name among the symbols of a library, and its derivatives by names that are
-//! derived from it. A robot is known only at run time, so the library exports the symbols of [`SLOTS`] functions. Each
-//! computes the function that is bound to its slot. CasADi counts its uses of a slot; the slot becomes free when the
-//! last use ends.
+//! `casadi.external` finds a function by its name among the symbols of a library, and its derivatives by names that
+//! contain the function's name. A robot is known only at run time, so the library exports the symbols of [`SLOTS`]
+//! functions. Each symbol computes the function that is bound to its slot. CasADi reports when a use of a slot begins
+//! and ends; the slot becomes free when the last use ends.
 //!
 //! For slot n the library exports `condyle_n`, the function; `jac_condyle_n`, its Jacobian; `adj1_condyle_n`, Jᵀλ; and
 //! `jac_adj1_condyle_n`, whose blocks are the Hessian of λᵀf and Jᵀ.
@@ -19,22 +19,24 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Maximum number of functions at a time.
+/// Maximum number of functions that exist at the same time.
 pub(super) const SLOTS: usize = 64;
 
-/// Maximum time between the creation of a function and its first query; after that it counts as loaded from a file.
+/// Maximum time between the creation of a function in CasADi and its query of the inputs. After this time the function
+/// counts as loaded from a file.
 const DESCRIPTION_TIME: Duration = Duration::from_millis(50);
 
 /// A slot: the function bound to it, and the number of its users.
 struct Slot {
     bound: AtomicPtr<Bound>,
     users: Mutex<Users>,
-    /// For each function, the number of CasADi's functions that have not asked for their description: CasADi has loaded
-    /// them from a file.
+    /// For each function of the slot, the number of CasADi's objects that have not asked for their description. CasADi
+    /// loaded these objects from a file.
     loaded: [AtomicUsize; 4],
 }
 
-/// Number of CasADi's functions that use a slot, for each of the slot's functions, and number of holds.
+/// Users of a slot: for each of its functions, the number of CasADi's objects that use it, and the number of holds by
+/// Python objects.
 #[derive(Clone, Copy)]
 struct Users {
     functions: [usize; 4],
@@ -58,7 +60,7 @@ static SLOT: [Slot; SLOTS] = [const {
 impl Slot {
     /// Returns the function bound to the slot.
     fn get(&self) -> Option<&Bound> {
-        // SAFETY: the bound function stays until the last user leaves, and the caller is a user.
+        // SAFETY: the bound function is freed only after the last user has left, and the caller is a user.
         unsafe { self.bound.load(Ordering::Acquire).as_ref() }
     }
 
@@ -66,19 +68,20 @@ impl Slot {
         self.users.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts one more function of CasADi. A newly created function asks for its inputs next; a loaded one knows them.
+    /// Counts one more object of CasADi. A newly created object asks for its inputs next; an object loaded from a file
+    /// does not.
     fn enter(&self, function: usize) {
         self.users().functions[function] += 1;
         self.loaded[function].fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Notes that a function asked for its description, so it was not loaded.
+    /// Notes that an object of CasADi asked for its description, so it was not loaded from a file.
     fn describe(&self, function: usize) {
         let less = |n: usize| n.checked_sub(1);
         let _ = self.loaded[function].fetch_update(Ordering::AcqRel, Ordering::Acquire, less);
     }
 
-    /// Counts one function of CasADi less, or one hold less if `function` is `None`.
+    /// Counts one object of CasADi less, or one hold less if `function` is `None`.
     fn leave(&self, function: Option<usize>) {
         let mut users = self.users();
         match function {
@@ -94,14 +97,14 @@ impl Slot {
         if !users.any() {
             let bound = self.bound.swap(core::ptr::null_mut(), Ordering::AcqRel);
             if !bound.is_null() {
-                // SAFETY: the pointer comes from a box, and there are no users any more.
+                // SAFETY: the pointer comes from a box, and the slot has no users any more.
                 drop(unsafe { Box::from_raw(bound) });
             }
         }
     }
 
-    /// Returns whether a function may have been loaded from a file, so that its slot may belong to another robot by
-    /// now. Waits for functions that another thread is creating.
+    /// Returns whether an object of CasADi may have been loaded from a file: then the slot may now belong to another
+    /// robot. Waits for objects that another thread is creating.
     fn was_loaded(&self, function: usize) -> bool {
         let begin = Instant::now();
         while self.loaded[function].load(Ordering::Acquire) > 0 {
@@ -141,7 +144,7 @@ pub(super) fn hold(
     Ok(None)
 }
 
-/// Ends a hold.
+/// Ends a hold of the slot with this name.
 pub(super) fn release(name: &str) {
     let slot = name.strip_prefix("condyle_").and_then(|k| k.parse::<usize>().ok()).and_then(|k| SLOT.get(k));
     if let Some(slot) = slot {
@@ -182,14 +185,14 @@ unsafe fn evaluate(slot: usize, function: usize, arg: *const *const f64, res: *c
     let bound = match SLOT[slot].get() {
         Some(bound) if !SLOT[slot].was_loaded(function) => bound,
         _ => {
-            // CasADi's interface has no error message
+            // printed, because CasADi's interface cannot pass an error message
             eprintln!(
                 "condyle_{slot}: a function of condyle.casadi cannot be loaded or unpickled: make it anew, without the copy"
             );
             return 1;
         }
     };
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller promises valid pointers in `arg` and `res`.
     let outcome = catch_unwind(AssertUnwindSafe(|| unsafe { bound.evaluate(function, arg, res) }));
     c_int::from(!matches!(outcome, Ok(Ok(()))))
 }
@@ -206,7 +209,7 @@ macro_rules! symbols_of {
                 _: *mut f64,
                 _: c_int,
             ) -> c_int {
-                // SAFETY: CasADi passes arrays with the sparsities below.
+                // SAFETY: CasADi passes arrays with the sparsities that it asked for.
                 unsafe { evaluate($slot, $function, arg, res) }
             }
             #[unsafe(export_name = concat!($name, "_incref"))]
@@ -246,7 +249,7 @@ macro_rules! symbols_of {
     };
 }
 
-/// Exports the symbols of all functions of some slots.
+/// Exports the symbols of all functions of the listed slots.
 macro_rules! symbols {
     ($($slot:literal)*) => {$(
         symbols_of!($slot, VALUE, concat!("condyle_", $slot));

@@ -1,7 +1,8 @@
-//! A knot of an optimal control problem, as slots compute it: next state and cost as functions of state and controls.
+//! The computation of a slot for a knot of an optimal control problem: next state and cost as functions of state and
+//! controls.
 //!
 //! Let ψ(z) = φ(x ⊕ δx, u + δu) ⊖ φ(x, u) be the change of the next state with z = (δx, δu). A problem's actions
-//! provide ∂ψ = [A B] and ∂²(μᵀψ). The numbers of the next state are those in φ ⊕ ψ. With E = ∂(φ ⊕ δ)/∂δ
+//! provide ∂ψ = [A B] and ∂²(μᵀψ). The next state is x⁺ = φ ⊕ ψ. With E = ∂(φ ⊕ δ)/∂δ
 //!
 //! ```text
 //! ∂x⁺ = E [A B]      ∂²(λᵀx⁺) = ∂²(μᵀψ) + [A B]ᵀ ∂²(λᵀ(φ ⊕ δ)) [A B],   μ = Eᵀ λ
@@ -16,11 +17,11 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::sync::{Mutex, PoisonError};
 
-/// Number of random states at which a derivative of the next state is evaluated. If it is zero at all of them, it is
-/// taken as zero everywhere. The derivative is an analytic function, so one state would suffice.
+/// Number of random states at which the derivatives of the next state are evaluated. A derivative that is zero at all
+/// of these states is taken as zero everywhere. Since derivatives are analytic functions, one state would suffice.
 const STATES: u64 = 3;
 
-/// A knot.
+/// A knot of an optimal control problem.
 pub(super) struct KnotFunction {
     /// The action; each call works on a copy.
     action: Mutex<Box<dyn ActionModel>>,
@@ -37,8 +38,8 @@ pub(super) struct KnotFunction {
 }
 
 impl KnotFunction {
-    /// Creates knot t of an action, or all knots of it if t is `None`; `robot` is the robot of the action, if it has
-    /// one. Returns `None` if the action cannot be copied.
+    /// Creates the function of an action at knot t, or at all knots if t is `None`. `robot` is the robot of the action,
+    /// if the action has one. Returns `None` if the action cannot be copied.
     pub(super) fn new(
         mut action: Box<dyn ActionModel>,
         robot: Option<&Model>,
@@ -137,7 +138,7 @@ impl KnotCalls {
         Self { action, chart, t, end, next, mu, node, hessian }
     }
 
-    /// Returns index, state and controls of the knot in the arguments.
+    /// Returns the index, the state and the controls of the knot, from the arguments.
     fn read<'a>(&self, x: &'a [Vec<f64>]) -> (usize, &'a [f64], &'a [f64]) {
         let last = || x.last().map_or(0.0, |t| t[0]);
         let u: &[f64] = if self.action.nu() > 0 { &x[1] } else { &[] };
@@ -145,7 +146,7 @@ impl KnotCalls {
     }
 }
 
-/// Returns column j of [A B].
+/// Returns column j of the matrix [A B] of a node.
 fn slope(node: &LqNode, j: usize) -> &[f64] {
     let n = node.ndx();
     match j.checked_sub(n) {
@@ -155,7 +156,7 @@ fn slope(node: &LqNode, j: usize) -> &[f64] {
 }
 
 impl KnotCalls {
-    /// Computes the next state and the node, which holds the derivatives.
+    /// Computes the next state, and its derivatives in the node.
     fn differentiate(&mut self, x: &[Vec<f64>]) {
         let (t, x, u) = self.read(x);
         if !self.end {
@@ -205,7 +206,7 @@ impl Calls for KnotCalls {
         let H = &mut H[0];
         let (t, x, u) = self.read(x);
         let Self { action, chart, end, next, mu, node, hessian, .. } = self;
-        let n = node.ndx() + node.nu(); // t comes after these
+        let n = node.ndx() + node.nu(); // if t is an argument, its coordinate follows these n
         let (weight, lambda) = lambda.split_last().expect("the cost is there");
         H.fill(0.0);
         add(H, *weight, [&node.Q, &node.S, &node.R]);

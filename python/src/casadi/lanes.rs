@@ -4,7 +4,7 @@ use super::function::Kind;
 use condyle::{Batch, Model, batch::Matrices};
 use nalgebra::DMatrix;
 
-/// Maximum number of states of a call: they fill some registers, and their matrices fit in the cache.
+/// Maximum number of states of a call: a few registers of lanes, with matrices that fit in the cache.
 const MOST: usize = 32;
 
 /// Work space for several states.
@@ -14,14 +14,14 @@ pub(super) struct Lanes {
     forward: bool,
 }
 
-/// Writes a block of each state to that state's matrix, from this row and column on.
+/// Writes a block of each state to the matrix of this state, beginning at `row` and `column`.
 fn place(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
     for (to, block) in to.iter_mut().zip(blocks.iter()) {
         block.copy_to(&mut to.view_mut((row, column), block.shape()));
     }
 }
 
-/// Writes the transpose of a block of each state to that state's matrix, from this row and column on.
+/// Writes the transpose of a block of each state to the matrix of this state, beginning at `row` and `column`.
 fn place_transposed(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
     for (to, block) in to.iter_mut().zip(blocks.iter()) {
         let block = block.transpose();
@@ -54,7 +54,8 @@ impl Lanes {
         });
     }
 
-    /// Computes the first derivatives of each state's results with respect to its tangent coordinates.
+    /// Computes the first derivatives of the results of each state with respect to the tangent coordinates of this
+    /// state.
     pub(super) fn jacobian(&mut self, model: &Model, x: &[Vec<f64>], J: &mut [DMatrix<f64>]) {
         let (q, v, third, n) = (&x[0], &x[1], &x[2], model.nv());
         let blocks = if self.forward {
@@ -67,7 +68,7 @@ impl Lanes {
         blocks.into_iter().enumerate().for_each(|(k, block)| place(J, 0, k * n, block));
     }
 
-    /// Computes the Hessian of each state's λᵀf, and the first derivatives if they are wanted.
+    /// Computes the Hessian of λᵀf for each state, and the first derivatives if J is given.
     pub(super) fn hessian(
         &mut self,
         model: &Model,
@@ -87,7 +88,7 @@ impl Lanes {
             let h = self.batch.rnea_hessian(model, q, v, third, &[], lambda);
             [h.dqdq, h.dvdq, h.dvdv, h.dadq]
         };
-        // the other blocks are zero and are never written
+        // the blocks that are not written here are zero
         place(H, 0, 0, dqdq);
         place(H, n, 0, dvdq);
         place_transposed(H, 0, n, dvdq);

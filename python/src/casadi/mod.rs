@@ -1,10 +1,10 @@
 //! Functions of a robot for CasADi's `external`: exact values and derivatives without Python in the loop.
 //!
 //! `chart` handles positions in CasADi's coordinates. `computation` defines the interface of a function. `function` and
-//! `robot` have the functions of a robot, `lanes` has some of them for several states, and `knot` has the knots of
-//! optimal control problems. `bound` converts numbers to CasADi's coordinates. `interface` is CasADi's C interface:
-//! numbered slots, each with the symbols of a function, its Jacobian, its reverse product and the Jacobian of that
-//! product.
+//! `robot` contain the functions of a robot; `lanes` computes inverse and forward dynamics for several states. `knot`
+//! contains the knots of optimal control problems. `bound` converts numbers to CasADi's coordinates. `interface` is
+//! CasADi's C interface: numbered slots. Each slot has the symbols of a function, its Jacobian, its product Jᵀλ and the
+//! Jacobian of this product.
 
 mod bound;
 mod chart;
@@ -30,10 +30,10 @@ use robot::RobotFunction;
 /// Holds a slot of CasADi's interface that computes a function of a robot, until `_casadi_release`.
 ///
 /// function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
-/// 'constrained_dynamics'. states: number of states per call; arguments and results have the columns of all states, one
-/// state after the other.
+/// 'constrained_dynamics'. states: number of states per call; arguments and results contain the columns of all states,
+/// one state after the other.
 ///
-/// Returns the name of its symbols.
+/// Returns the name of the slot, from which CasADi derives the names of the symbols.
 #[pyfunction]
 #[pyo3(name = "_casadi_hold", signature = (model, function, *, states, frame=None, reference=None, constraints=None))]
 pub(crate) fn casadi_hold(
@@ -84,13 +84,13 @@ fn count_of_states(given: &Bound<'_, PyAny>) -> PyResult<usize> {
     }
 }
 
-/// Holds a slot that computes the next state and the cost of knot t of an action or of a problem, until
-/// `_casadi_release`. Without t, the index of the knot is an argument of the function.
+/// Holds a slot until `_casadi_release`. The slot computes the next state and the cost of knot t of an action or of a
+/// problem. Without t, the index of the knot is an argument of the function.
 #[pyfunction]
 #[pyo3(name = "_casadi_hold_knot", signature = (of, t))]
 pub(crate) fn casadi_hold_knot(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<String> {
     let Alone { action, robot, end, text } = alone(of, t)?;
-    let mut key = format!("{} {end} {text}", t.is_some()).into_bytes(); // the text contains the costs of knot t
+    let mut key = format!("{} {end} {text}", t.is_some()).into_bytes(); // `text` contains the costs of knot t
     let robot = robot.as_deref();
     key.extend(robot.and_then(|robot| postcard::to_allocvec(robot).ok()).unwrap_or_default());
     let knot: Box<dyn Computation> = match KnotFunction::new(action, robot, t, end) {
@@ -111,7 +111,7 @@ fn named(slot: Option<String>) -> PyResult<String> {
     })
 }
 
-/// Ends a hold; the slot stays in use as long as CasADi has functions of it.
+/// Ends a hold of a slot; the slot stays in use as long as CasADi has objects for its functions.
 #[pyfunction]
 #[pyo3(name = "_casadi_release")]
 pub(crate) fn casadi_release(name: &str) {

@@ -1,4 +1,4 @@
-//! The functions of a robot, as slots compute them.
+//! The computations of slots for the functions of a robot.
 
 use super::chart::Chart;
 use super::computation::{Calls, Computation, Output};
@@ -11,12 +11,13 @@ use std::sync::Arc;
 /// A function of a robot.
 pub(super) struct RobotFunction {
     of: Arc<(Model, Kind)>,
-    /// Number of rows of the constraints, and number of all results.
+    /// Number of rows of the constraints. `results` is the total number of entries of the results.
     rows: usize,
     results: usize,
-    /// For each pair of coordinates, whether they move a body in common; nv × nv.
+    /// For each pair of coordinates, whether they move a common body; nv × nv.
     relation: Vec<bool>,
-    /// For each of the nv coordinates, whether it moves a whole tree: M and the Coriolis forces do not depend on it.
+    /// For each of the nv coordinates, whether it moves a whole tree. M and the Coriolis forces do not depend on such a
+    /// coordinate.
     moves_a_tree: Vec<bool>,
 }
 
@@ -62,7 +63,7 @@ impl Computation for RobotFunction {
     }
 
     fn present(&self, _: usize, i: usize, j: usize) -> bool {
-        !matches!(self.of.1, Kind::Crba) || self.related(i, j) // the zeros of M
+        !matches!(self.of.1, Kind::Crba) || self.related(i, j) // M has zeros for unrelated coordinates
     }
 
     fn depends(&self, row: usize, j: usize) -> bool {
@@ -73,7 +74,7 @@ impl Computation for RobotFunction {
 
     fn curves(&self, i: usize, j: usize) -> bool {
         let nv = self.of.0.nv();
-        // M and c(q, v) v do not depend on where a whole tree is, only g does: τ = M(q) a + c(q, v) v + g(q)
+        // in τ = M(q) a + c(q, v) v + g(q), only g depends on the position of a whole tree
         let stands = |i: usize| i < nv && self.moves_a_tree[i];
         let other_than_gravity = match self.of.1 {
             Kind::Rnea | Kind::Aba => i >= nv || j >= nv,

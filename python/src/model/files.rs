@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use std::path::PathBuf;
 
-/// Reads the kinds of warnings that a strict reader accepts.
+/// Reads the argument `allow`: the kinds of warnings that a strict reader accepts.
 fn kinds(allow: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<WarningKind>> {
     let Some(allow) = allow else { return Ok(Vec::new()) };
     let kind = |word: &Bound<'_, PyAny>| {
@@ -36,21 +36,22 @@ impl Model {
     ///
     /// Fixed joints are merged into their parent body and remain as frames. Meshes are never read. A file whose name
     /// ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`. That program evaluates expressions
-    /// of the file, so use it only for files from sources that you trust.
+    /// in the file, so read only files from sources that you trust.
     ///
     /// path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
     /// root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
     ///     'spherical' or 'translation'; None fixes the root link to the world.
-    /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
-    ///     their own.
+    /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow. Otherwise they have
+    ///     their own coordinates.
     /// strict: whether a warning (`warnings`) is an error.
-    /// packages: folders that contain packages, or are packages; searched before the folders in `ROS_PACKAGE_PATH` and
-    ///     `AMENT_PREFIX_PATH` of the environment.
+    /// packages: folders that contain packages, or are packages. They are searched before the folders in the
+    ///     environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
     /// allow: kinds of warnings that are not errors even if `strict` is set: 'massless', 'negative', 'triangle',
     ///     'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
     /// arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
     ///
-    /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+    /// Raises `ParseError`, with file, line and element, or `ModelError` for an invalid robot, and `ValueError` for an
+    /// unknown kind of warning.
     #[staticmethod]
     #[pyo3(signature = (
         path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, arguments=None
@@ -94,18 +95,19 @@ impl Model {
     ///
     /// q and v have the layout of MuJoCo's `qpos` and `qvel`, with two exceptions: quaternions are x, y, z, w, and a
     /// free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's frame). Several joints on
-    /// one body become a chain, with bodies without mass, `name#1`, `name#2`, …, between them. Contents that a model
-    /// cannot represent are left out and reported in `warnings`.
+    /// one body become a chain of joints, connected by bodies without mass, `name#1`, `name#2`, and so on. Contents
+    /// that a model cannot represent are left out and reported in `warnings`.
     ///
     /// path: a path, as text or `os.PathLike`.
-    /// mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2, instead of being a constraint outside the
-    ///     model; its `polycoef` must be linear.
+    /// mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2; its `polycoef` must then be linear.
+    ///     Otherwise it is one of the `constraints`, which the tree does not include.
     /// strict: whether a warning (`warnings`) is an error.
     /// weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
-    ///     `warnings`, instead of being an error.
+    ///     `warnings`. Otherwise it is an error.
     /// packages, allow: as for `from_urdf`.
     ///
-    /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+    /// Raises `ParseError`, with file, line and element, or `ModelError` for an invalid robot, and `ValueError` for an
+    /// unknown kind of warning.
     #[staticmethod]
     #[pyo3(signature = (path, mimic=false, strict=false, weightless_meshes=false, packages=None, *, allow=None))]
     fn from_mjcf(
@@ -141,20 +143,21 @@ impl Model {
         Ok(condyle::Model::from_mjcf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// Reads a model from an SDF file (Gazebo), with the models that it includes.
+    /// Reads a model from an SDF file (Gazebo), and the models that the file includes.
     ///
-    /// All models of a file, or of its first world, become one robot; its names then begin with the model's name:
+    /// All models of a file, or of its first world, become one robot. Each name then begins with the name of its model:
     /// `robot::arm`. Joints are visited breadth first from the root, in the order of the file. A joint that would give
-    /// a link a second parent closes a loop. A universal joint becomes two revolute ones.
+    /// a link a second parent closes a loop. A universal joint becomes two revolute joints.
     ///
     /// path: a path, as text or `os.PathLike`.
     /// root_joint: as for `from_urdf`.
-    /// mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+    /// mimic: whether an axis with a `<mimic>` follows another axis. Otherwise it moves freely.
     /// strict: whether a warning (`warnings`) is an error.
-    /// packages, allow: as for `from_urdf`; `model://` addresses are searched in `packages` too.
+    /// packages, allow: as for `from_urdf`; `packages` are also searched for `model://` addresses.
     /// model: the name of the one model to read; None reads all models of the file.
     ///
-    /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+    /// Raises `ParseError`, with file, line and element, or `ModelError` for an invalid robot, and `ValueError` for an
+    /// unknown kind of warning.
     #[staticmethod]
     #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, model=None))]
     fn from_sdf(
@@ -195,15 +198,15 @@ impl Model {
 
     /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
     ///
-    /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of
-    /// MuJoCo's compiler is included: meshes, `replicate`, `attach`, composites, `settotalmass`. Numbers that were
-    /// changed after compilation are used.
-    /// Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
-    /// is not imported.
+    /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. The results of
+    /// MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`. If numbers were
+    /// changed after compilation, the changed numbers are used. Contents that a model cannot represent are reported in
+    /// `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not imported.
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///
-    /// Raises `TypeError` for anything but an `MjModel`, `ParseError`, `ModelError`; `ValueError` for an unknown kind.
+    /// Raises `TypeError` if the argument is not an `MjModel`, `ParseError` or `ModelError` if its contents are
+    /// invalid, and `ValueError` for an unknown kind of warning.
     #[staticmethod]
     #[pyo3(signature = (model, mimic=false, strict=false, *, allow=None))]
     fn from_mujoco(
@@ -218,27 +221,29 @@ impl Model {
         Ok(condyle::Model::from_compiled_mjcf(&text, &options).map_err(exception)?.into())
     }
 
-    /// Converts a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that results are equal.
-    /// `to_pinocchio` is the inverse.
+    /// Converts a `pinocchio.Model`. The result has the same joints, bodies, frames, limits, damping and friction, so
+    /// algorithms give equal results. `to_pinocchio` is the inverse.
     ///
-    /// Composite, universal and spherical ZYX joints become several joints, with bodies without mass between them.
-    /// Limits of quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+    /// Composite, universal and spherical ZYX joints become several joints, connected by bodies without mass. Limits of
+    /// quaternions, cosines and sines, geometry, and reference configurations are left out.
     ///
-    /// Raises `ModelError` if its joints are not in depth-first order, in which Pinocchio's file readers number them,
-    /// or if a joint is of an unsupported kind.
+    /// Raises `ModelError` if a joint has an unsupported kind, or if the joints are not in depth-first order.
+    /// Pinocchio's file readers number joints in this order.
     #[staticmethod]
     fn from_pinocchio<'py>(model: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         model.py().import("condyle._pinocchio_models")?.call_method1("from_pinocchio", (model,))
     }
 
-    /// Reads the named positions of an SRDF file, its `<group_state>`s: a dictionary from names to q, nq numbers each.
+    /// Reads the named positions of an SRDF file, which are its `<group_state>`s. Returns a dictionary from names to q,
+    /// nq numbers each.
     ///
-    /// Joints that a state does not mention stay as in `neutral`; for a joint that turns without limits the state may
-    /// give its angle. States with the same name, of several groups, form one position. All other contents of the file
-    /// are ignored.
+    /// Joints that a state does not mention stay as in `neutral`. For a joint that turns without limits, the state may
+    /// give the angle. If states of several groups have the same name, they form one position. All other contents of
+    /// the file are ignored.
     ///
     /// path: a path, as text or `os.PathLike`.
-    /// strict: whether joints that the robot lacks are errors; an SRDF is often shared by robots with fewer joints.
+    /// strict: whether a joint that the robot does not have is an error. Without `strict` it is ignored, since robots
+    /// with fewer joints often share an SRDF.
     ///
     /// Raises `ParseError`, with file, line and element.
     #[pyo3(signature = (path, strict=false))]

@@ -1,4 +1,4 @@
-//! Numbers of a model: inertias, limits, losses, springs, actuators, keyframes.
+//! Numbers of a model: inertias, limits, damping and friction, springs, actuators, keyframes.
 
 use super::Model;
 use crate::arrays::{class, read_only};
@@ -21,7 +21,7 @@ impl Model {
         self.cached.value(py, attribute, || read_only(py, &numbers()[..], instead))
     }
 
-    /// Returns one part of each keyframe, in a new dictionary by name.
+    /// Returns one vector of each keyframe (such as its velocity), in a new dictionary by name.
     fn keyframe_parts<'py>(
         &self,
         py: Python<'py>,
@@ -37,7 +37,7 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4).
+    /// The pose of each joint's frame in the frame of the parent body, at joint position zero: (nbodies, 4, 4).
     #[getter]
     fn joint_placements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.cached.value(py, Attribute::JointPlacements, || read_only(py, &self.of_bodies(|b| b.placement)[..], ""))
@@ -52,9 +52,9 @@ impl Model {
         })
     }
 
-    /// The inertial parameters π, with which regressors are multiplied: ten numbers for each body except the world, 10
-    /// (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
-    /// inertia about the origin of the body's frame.
+    /// The inertial parameters π, by which regressors are multiplied: ten numbers for each body except the world, 10
+    /// (nbodies − 1) in all. The ten numbers are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the
+    /// rotational inertia about the origin of the body's frame.
     #[getter]
     fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let bodies = || self.inner.bodies()[1..].iter();
@@ -76,7 +76,7 @@ impl Model {
     }
 
     /// The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
-    /// with d₀ in `damping`. It acts where `damping` acts.
+    /// with d₀ in `damping`. It is used by the same functions as `damping`.
     #[getter]
     fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let polynomial = || read_only(py, self.inner.damping_polynomial(), "with_damping");
@@ -97,8 +97,8 @@ impl Model {
         })
     }
 
-    /// The supported weights, as `GravityCompensation(body, mass, mass_com, ratio)`: MuJoCo's `gravcomp`. They act only
-    /// in `passive_torque` and in a `Simulation` that includes them.
+    /// The supported fractions of the weights of bodies, as `GravityCompensation(body, mass, mass_com, ratio)`:
+    /// MuJoCo's `gravcomp`. They act only in `passive_torque` and in a `Simulation` that includes them.
     #[getter]
     fn gravity_compensation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::GravityCompensation, || {
@@ -112,8 +112,8 @@ impl Model {
         })
     }
 
-    /// The actuators of the file, as `Actuator`, in the order of the file. `limits` already includes their ranges, and
-    /// the joints' `armature` and `damping` include theirs.
+    /// The actuators of the file, as `Actuator`, in the order of the file. `limits`, `armature` and `damping` of the
+    /// joints already include the ranges, the armature and the damping of actuators.
     #[getter]
     fn actuators<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Actuators, || {
@@ -151,7 +151,7 @@ impl Model {
         self.keyframe_parts(py, |keyframe| &keyframe.v)
     }
 
-    /// The controls of the `keyframes`: a dictionary by name, with a number for each of `actuators`.
+    /// The controls of the `keyframes`: a dictionary from names to arrays, with one number for each of `actuators`.
     #[getter]
     fn keyframe_controls<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.keyframe_parts(py, |keyframe| &keyframe.control)
@@ -177,11 +177,13 @@ impl Model {
         self.numbers(py, Attribute::Armature, "with_armature", || self.inner.armature().to_vec())
     }
 
-    /// Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
-    /// stabilisation, and coupled joints as `Coupling`. Inactive ones and the `<mimic>` of a URDF or SDF are left out.
+    /// Returns the constraints in the robot's file that are not part of the tree, by name. Loops are
+    /// `ContactConstraint`s without stabilisation; coupled joints are `Coupling`s. Inactive constraints are left out,
+    /// and so is the `<mimic>` of a URDF or SDF.
     ///
-    /// The algorithms for trees ignore both. `constrained_dynamics` closes loops of its `ConstraintSet`. No function
-    /// enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
+    /// The algorithms for trees ignore loops and couplings. `constrained_dynamics` closes the loops that are in its
+    /// `ConstraintSet`. No function enforces a `Coupling`. A linear coupling becomes a part of the tree if the file is
+    /// read with `mimic=True`.
     ///
     /// >>> robot = condyle.robots.quadruped()
     /// >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]

@@ -1,4 +1,4 @@
-//! Copies of a robot with a change.
+//! Methods of a model that return a changed copy.
 
 use super::{Model, body_index, frame_index, members_of};
 use crate::arrays::{matrix, pose, three, vector};
@@ -13,7 +13,7 @@ use pyo3::types::PyString;
 impl Model {
     /// Returns the same robot with another gravity (m/s², 3 numbers, in the world's frame).
     ///
-    /// Raises `ModelError` if it is not finite.
+    /// Raises `ModelError` if the gravity is not finite.
     fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
         let gravity = three("gravity", gravity)?;
         Ok((*self.inner).clone().with_gravity(gravity).map_err(exception)?.into())
@@ -21,7 +21,7 @@ impl Model {
 
     /// Returns the same robot with another armature, nv numbers (kg m², kg).
     ///
-    /// Raises `ModelError` if one is negative or not finite.
+    /// Raises `ModelError` if a number is negative or not finite.
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
         Ok((*self.inner).clone().with_armature(&armature).map_err(exception)?.into())
@@ -29,8 +29,8 @@ impl Model {
 
     /// Returns the same robot with another viscous damping, nv numbers (N m s/rad, N s/m).
     ///
-    /// polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2). None keeps
-    /// them.
+    /// polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2). None keeps the
+    /// old coefficients.
     ///
     /// Raises `ModelError` if a number is not finite, or a damping is negative.
     ///
@@ -50,14 +50,14 @@ impl Model {
 
     /// Returns the same robot with another Coulomb friction, nv numbers (N m, N).
     ///
-    /// Raises `ModelError` if one is negative or not finite.
+    /// Raises `ModelError` if a number is negative or not finite.
     fn with_friction(&self, friction: &Bound<'_, PyAny>) -> PyResult<Self> {
         let friction = vector("friction", friction, self.inner.nv())?;
         Ok((*self.inner).clone().with_friction(&friction).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps a
-    /// limit; an infinite number removes it.
+    /// Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps the
+    /// old limits; an infinite number removes a limit.
     ///
     /// effort: maximum magnitude; sets both `effort_lower` and `effort_upper`, and cannot be combined with either.
     ///
@@ -99,8 +99,8 @@ impl Model {
         Ok((*self.inner).clone().with_limits(limits).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with other inertias, one for each body in the form of `inertias`, the world's first.
-    /// Implausible values are reported in its `warnings` and `singular_joints`.
+    /// Returns the same robot with other inertias: a list like `inertias`, with one `Inertia` for each body, beginning
+    /// with the world. Implausible values are reported in the `warnings` and `singular_joints` of the result.
     ///
     /// Raises `ModelError` if a mass is negative or a number is not finite.
     ///
@@ -119,15 +119,15 @@ impl Model {
         Ok(self.inner.with_inertias(|body, _| inertias[body]).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with one more frame of the user's, the last one of `frames`. All other numbers stay the
-    /// same.
+    /// Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
+    /// unchanged.
     ///
-    /// name: the new frame's name; parent: the name or index of the frame to which it is attached, or the name of a
-    /// body; None is the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the
-    /// identity.
+    /// name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the
+    /// name of a body; None is the world; placement: the pose of the new frame in the parent's frame, a homogeneous (4,
+    /// 4) matrix; None is the identity.
     ///
     /// Raises `ModelError` if the parent does not exist, the placement is not a homogeneous matrix, or another frame of
-    /// the user's has this name.
+    /// kind 'user' has this name.
     ///
     /// >>> tip = np.eye(4)
     /// >>> tip[2, 3] = 0.1
@@ -157,8 +157,8 @@ impl Model {
     /// Returns the same robot with some joints locked at their positions in q.
     ///
     /// Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
-    /// joint that it follows. A locked joint keeps its part of the length of a tendon, and holds the other joint of a
-    /// coupling if that is linear. Warnings about the file are kept.
+    /// joint that it follows. A locked joint still contributes to the length of a tendon. If a linear coupling connects
+    /// it to another joint, that joint is held, too. Warnings about the file are kept.
     ///
     /// joints: a list of names or indices of bodies.
     /// q: nq numbers.
@@ -166,7 +166,8 @@ impl Model {
     /// >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
     /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
     ///
-    /// Raises `ModelError`, also if `q` is not finite or contains a rotation whose length is not 1 (up to 1e-3).
+    /// Raises `ModelError` if a joint does not exist, or if `q` is not finite or contains a rotation whose length is
+    /// not 1 (up to 1e-3).
     fn lock(&self, joints: &Bound<'_, PyAny>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
         let joints = members_of("joints", "names or numbers of bodies", joints)?;
         let joints = joints
@@ -179,8 +180,8 @@ impl Model {
 
     /// Returns this robot with another one attached to one of its frames, as a new model.
     ///
-    /// The new bodies are numbered after all existing descendants of the body that carries them, as by Pinocchio's
-    /// `appendModel`. Name and gravity are this robot's.
+    /// The new bodies are numbered as by Pinocchio's `appendModel`: after all existing descendants of the body to which
+    /// they are attached. The result has the name and the gravity of this robot.
     ///
     /// frame: the name or index of a frame; None is the world.
     /// model: the other robot.
@@ -211,8 +212,8 @@ impl Model {
         Ok(self.inner.append(body, bXf * fXw, &model.get().inner, prefix).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's, and
-    /// it has no coordinate of its own. The leader's limits then apply to it.
+    /// Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's
+    /// position. It has no coordinate in q. The limits of the leader's coordinate then apply to both joints.
     ///
     /// follower, leader: the joints' names, or the indices of their bodies.
     ///
@@ -220,8 +221,8 @@ impl Model {
     /// >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
     /// 6
     ///
-    /// Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or
-    /// another joint follows the follower.
+    /// Raises `ModelError` if a joint does not have exactly one degree of freedom, the leader is itself a mimic joint,
+    /// or another joint follows the follower.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
     fn with_mimic(
         &self,

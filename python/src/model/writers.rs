@@ -1,4 +1,4 @@
-//! Models to files, text, pickles, and other libraries.
+//! Methods that convert a model to files, text, pickles, and models of other libraries.
 
 use super::Model;
 use crate::exceptions::{ModelError, ParseError, exception};
@@ -12,21 +12,21 @@ impl Model {
     /// stay the same.
     ///
     /// Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
-    /// new file gives this model again, up to rounding. `original` may be `path`. If fixed joints merge several links,
-    /// the difference goes to the link that the joint carries. An armature becomes the rotor inertia of a
-    /// `<transmission>`.
+    /// new file gives this model again, up to rounding. `original` and `path` may be the same file. If fixed joints
+    /// merge several links into one body, changes of its inertia are written to the link that the moving joint carries.
+    /// An armature becomes the rotor inertia of a `<transmission>`.
     ///
     /// path: the new file. original: the file from which the robot was read.
     ///
-    /// Raises `ParseError`, with the item and both numbers, if the format cannot express a value, such as an infinite
-    /// limit, or if the file belongs to another robot.
+    /// Raises `ParseError` if the format cannot express a value, such as an infinite limit, or if the file belongs to
+    /// another robot. The message contains the element and both numbers.
     fn write_urdf(&self, path: PathBuf, original: PathBuf) -> PyResult<()> {
         self.inner.write_urdf(path, original).map_err(exception)
     }
 
-    /// Writes the same numbers into a copy of the MJCF `original`; see `write_urdf`.
+    /// Writes the numbers that `write_urdf` writes into a copy of the MJCF `original`.
     ///
-    /// Bodies and joints that differ must be in the file itself, not in an included file. Effort limits are written as
+    /// Changed bodies and joints must be in the file itself, not in an included file. Effort limits are written as
     /// `actuatorfrcrange` of the joint.
     ///
     /// path: the new file. original: the file from which the robot was read.
@@ -60,9 +60,9 @@ impl Model {
 
     /// Returns the same robot as a `pinocchio.Model`; requires Pinocchio 3 or later.
     ///
-    /// Mimic joints remain mimic joints; it is an error if one turns without limits. Springs, damping that depends on
-    /// the speed, gravity compensation, actuators, keyframes and constraints are left out. Each causes a `UserWarning`
-    /// whose argument is a `ModelWarning`.
+    /// Mimic joints remain mimic joints; a mimic joint that turns without limits is an error. Springs, damping that
+    /// depends on the speed, gravity compensation, actuators, keyframes and constraints are left out. Each item that is
+    /// left out causes a `UserWarning`, whose argument is a `ModelWarning`.
     fn to_pinocchio<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("condyle._pinocchio_models")?;
         module.call_method1("to_pinocchio", (slf,))

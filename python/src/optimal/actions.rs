@@ -1,4 +1,4 @@
-//! Actions of robots.
+//! Actions of robots: `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`.
 
 use super::costs::{Cost, Limit};
 use super::integrators;
@@ -16,7 +16,7 @@ use rust::robot::{self, Actuation, ControlBounds, ControlPolynomial, Dynamics, K
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Returns the matrix S, if one is given, and the number of controls. Without S every joint is driven, except a
+/// Returns the actuation matrix S if it is given, and the number of controls. Without S, every joint is driven except a
 /// free-flyer at the root.
 pub(super) fn actuation(
     model: &condyle::Model,
@@ -34,13 +34,13 @@ pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> V
     costs.iter().map(|cost| cost.of(model)).collect()
 }
 
-/// Costs, or limits, of single knots.
+/// Costs or limits that belong to single knots, by index of the knot.
 pub(super) type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 
-/// Limits of all knots; `None` if there are no limits.
+/// Limits that apply at all knots; `None` if there are no limits.
 pub(super) type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
 
-/// Collects the residuals that are written in Python.
+/// Collects the residuals of costs and limits that are written in Python.
 pub(super) fn kept_at(
     py: Python<'_>,
     costs: &[PyRef<'_, Cost>],
@@ -57,7 +57,7 @@ fn limits(model: &Arc<condyle::Model>, limits: Limits<'_>) -> Vec<robot::Limit> 
     limits.into_iter().flatten().map(|limit| limit.of(model)).collect()
 }
 
-/// Reads contacts with the names that residuals use for them.
+/// Reads contacts by name; residuals refer to a contact by this name.
 pub(super) fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
     let contact = |(name, given): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         Ok(robot::Contact::new(&name.extract::<String>()?, constraint(model, &given)?))
@@ -83,22 +83,22 @@ pub(super) fn knot(
 
 /// A knot of a robot that moves freely under its joints' efforts.
 ///
-/// q̈ = aba(q, v, S u). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt Σ w a(r),
-/// and the state is x = (q, v).
+/// q̈ = aba(q, v, S u). With semi-implicit Euler, v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt Σ w a(r)
+/// over all `Cost`s, with weight w, activation a and residual r. The state is x = (q, v).
 ///
 /// model: the robot.
 /// dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
 /// costs: a list of `Cost`.
-/// costs_at: lists of `Cost` by index of the knot, for knots with costs of their own; so one action can serve a phase
-///     of several knots.
+/// costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve several
+///     knots of a phase.
 /// actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
 /// limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
-/// limits_at: lists of `Limit` by index of the knot, for knots with limits of their own.
-/// controls: their course in time within a knot: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times
-///     nu controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt ('runge_kutta_3': 0, Δt/3 and 2 Δt/3).
-///     Bounds apply to each of these values.
+/// limits_at: lists of `Limit` by index of the knot. At these knots they replace `limits`.
+/// controls: the polynomial that the controls follow within a knot: 'constant', 'linear' or 'quadratic'. The knot then
+///     has nu, 2 nu or 3 nu controls: one value of u; values at the times 0 and Δt/2; or values at 0, Δt/2 and Δt
+///     ('runge_kutta_3': 0, Δt/3 and 2 Δt/3). Bounds apply to each of these values.
 ///
 /// Raises `ProblemError` for a cost, a limit or an actuation that does not fit the robot.
 #[pyclass(frozen, module = "condyle.optimal")]
@@ -143,13 +143,13 @@ methods! {
     }
 }
 
-/// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
+/// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as for `FreeDynamics`.
 ///
 /// model: the robot.
-/// contacts: a dict of `ContactConstraint`s by name; residuals call them by these names. May be empty.
+/// contacts: a dict of `ContactConstraint`s by name, which may be empty. Residuals refer to a contact by this name.
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
-/// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
+/// damping: μ in J M⁻¹ Jᵀ + μ 1 (1/kg), which makes this matrix invertible for redundant contacts.
 /// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot, and for two contacts on
@@ -163,8 +163,8 @@ methods! {
 pub(crate) struct ContactDynamics(pub(super) RobotAction<robot::ContactDynamics>);
 
 methods! {
-    /// Returns the controls that hold the robot still at the state x, nu numbers; controls and contact forces together
-    /// have the smallest norm.
+    /// Returns the controls that hold the robot still at the state x, nu numbers. Among all solutions, controls and
+    /// contact forces together have the smallest norm.
     ContactDynamics::quasi_static;
 
     #[new]
@@ -197,8 +197,8 @@ methods! {
     }
 }
 
-/// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w
-/// a(r).
+/// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
+/// w a(r), as for `FreeDynamics` without Δt.
 ///
 /// There are no controls.
 ///
@@ -207,7 +207,7 @@ methods! {
 /// costs: a list of `Cost`, which are evaluated at the state before the impact.
 /// restitution: ε, 0 to 1.
 /// damping: μ (1/kg).
-/// limits: a list of `Limit`, or None; they are also evaluated at the state before the impact.
+/// limits: a list of `Limit`, or None; limits are also evaluated at the state before the impact.
 ///
 /// Raises `ProblemError` as `ContactDynamics` does.
 #[pyclass(frozen, module = "condyle.optimal")]

@@ -1,4 +1,4 @@
-//! Cones that residuals refer to.
+//! Friction cones and wrench cones, to which residuals refer.
 
 use crate::arrays::{self, Give};
 use crate::exceptions::{ProblemError, problem_error, within};
@@ -6,11 +6,12 @@ use condyle::optimal::robot;
 use condyle::spatial::Mat3;
 use pyo3::prelude::*;
 
-/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
+/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper for a force
+/// f.
 ///
 /// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
-/// rotation: the surface's axes (its normal is z) in the contact's axes, (3, 3); least, greatest: bounds on the normal
-/// force (N), by default 0 and infinite.
+/// rotation: the surface's axes in the contact's axes, (3, 3), with the surface's normal as z axis; least, greatest:
+/// bounds on the normal force (N), by default 0 and infinite.
 ///
 /// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is not a
 /// rotation matrix.
@@ -63,8 +64,8 @@ impl FrictionCone {
     }
 }
 
-/// The wrench cone of a rectangular sole, lower ≤ A w ≤ upper: friction, centre of pressure within the rectangle, and
-/// yaw moment.
+/// The wrench cone of a rectangular sole, lower ≤ A w ≤ upper for a wrench w. The rows bound friction, the centre of
+/// pressure (within the rectangle) and the yaw moment.
 ///
 /// friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 ///
@@ -109,7 +110,7 @@ impl WrenchCone {
     }
 }
 
-/// Converts bounds to arrays.
+/// Converts lower and upper bounds to arrays.
 fn pair<'py>(
     py: Python<'py>,
     (lower, upper): (Vec<f64>, Vec<f64>),

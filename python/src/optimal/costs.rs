@@ -1,4 +1,4 @@
-//! Terms of costs, and limits: a residual with a weight or bounds.
+//! Terms of costs (a residual with a weight) and limits (a residual with bounds).
 
 use super::residuals::Residual;
 use crate::arrays::numbers;
@@ -36,8 +36,8 @@ impl Activation {
         Ok(Self(robot::Activation::Barrier { lower, upper }))
     }
 
-    /// Returns the weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl squares wᵢ in its
-    /// value.
+    /// Returns the weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has wᵢ² instead of wᵢ
+    /// in the value of this activation.
     #[staticmethod]
     fn weighted_barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>, w: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (lower, upper, weights) = (numbers("lower", lower)?, numbers("upper", upper)?, numbers("w", w)?);
@@ -57,8 +57,8 @@ impl Activation {
         Self(robot::Activation::Smooth1 { epsilon })
     }
 
-    /// Returns the smooth cost √(ε + ‖r‖²), approximately ‖r‖. Its Hessian is approximated by ε/a³ times the identity;
-    /// ε/a³ is the least eigenvalue of the exact Hessian.
+    /// Returns the smooth cost √(ε + ‖r‖²), approximately ‖r‖. With the cost a, the Hessian is approximated by ε/a³
+    /// times the identity; ε/a³ is the least eigenvalue of the exact Hessian.
     #[staticmethod]
     #[pyo3(signature = (epsilon=1.0))]
     fn smooth2(epsilon: f64) -> Self {
@@ -86,8 +86,8 @@ impl Activation {
 /// name: used by `Problem.set_weight` and in errors.
 /// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
-/// activation: an `Activation`. None is the barrier of the bounds for a cone or a centre of pressure, the sum for
-///     `Residual.own_cost`, and quadratic for other residuals.
+/// activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone or a centre of pressure,
+///     the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
 ///
 /// >>> from condyle.optimal import Cost, Residual
 /// >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -101,7 +101,7 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// Returns the term for a robot.
+    /// Converts the term to the library's type, for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Cost {
         robot::Cost::new(&self.name, self.weight, self.residual.get().of(model), self.activation.clone())
     }
@@ -154,7 +154,8 @@ impl Cost {
 /// name: used in errors.
 /// residual: a `Residual`.
 /// lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
-///     centre of pressure has its own bounds, and any other r must be 0. Entries where both are equal are equalities.
+///     centre of pressure has its own bounds, and every other r must be 0. An entry with equal lower and upper bounds
+///     is an equality.
 ///
 /// >>> from condyle.optimal import Limit, Residual
 /// >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
@@ -168,7 +169,7 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// Returns the limit for a robot.
+    /// Converts the limit to the library's type, for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Limit {
         robot::Limit::new(&self.name, self.residual.get().of(model), self.lower.clone(), self.upper.clone())
     }
@@ -195,7 +196,7 @@ impl Limit {
             (Some(lower), Some(upper)) => (lower, upper),
             (Some(lower), None) => (lower.clone(), vec![f64::INFINITY; lower.len()]),
             (None, Some(upper)) => (vec![f64::NEG_INFINITY; upper.len()], upper),
-            (None, None) => residual.get().bounds().unwrap_or_default(), // no bounds: r = 0
+            (None, None) => residual.get().bounds().unwrap_or_default(), // a limit without bounds means r = 0
         };
         Ok(Self { name, residual: residual.clone().unbind(), lower, upper })
     }
@@ -206,7 +207,7 @@ impl Limit {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, Self { name, residual, lower, upper }) = (slf.py(), slf.get());
-        let (lower, upper) = (!lower.is_empty()).then(|| (lower.clone(), upper.clone())).unzip(); // empty: r = 0
+        let (lower, upper) = (!lower.is_empty()).then(|| (lower.clone(), upper.clone())).unzip(); // None means r = 0
         Ok((slf.get_type(), (name.clone(), residual.clone_ref(py), lower, upper)).into_pyobject(py)?.into_any())
     }
 

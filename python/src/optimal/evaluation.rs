@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-/// Returns the number of controls per knot, if it is the same for all knots.
+/// Returns the number of controls of a knot, if all knots have the same number.
 fn common_nu(problem: &rust::Problem) -> Option<usize> {
     let nu = problem.nu(0);
     (0..problem.horizon()).all(|t| problem.nu(t) == nu).then_some(nu)
@@ -93,7 +93,8 @@ pub(super) fn evaluate<'py>(
     ))
 }
 
-/// Returns the gaps x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁; `next` contains φ of each knot.
+/// Returns the gaps: first x̂₀ ⊖ x₀ with the problem's initial state x̂₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁ for each knot t. `next`
+/// contains φ(xₜ, uₜ).
 pub(super) fn gaps(problem: &rust::Problem, xs: &[f64], next: &[f64]) -> Vec<f64> {
     let (nx, ndx) = (problem.nx(), problem.ndx());
     let mut gaps = vec![0.0; (problem.horizon() + 1) * ndx];
@@ -128,7 +129,7 @@ pub(super) fn solution<'py>(
         trace,
         timings,
     ))?;
-    // source from which the solution computes accelerations, efforts and forces on request
+    // the solution computes accelerations, efforts and forces on request, from this problem and this number of shifts
     solution.setattr("_source", (of.clone_ref(py), of.get().moved()))?;
     Ok(solution)
 }

@@ -11,11 +11,13 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
+/// A knot of a robot whose nv controls are the robot's accelerations: q̈ = u, τ = rnea(q, v, u). Integrator and cost
+/// are as for `FreeDynamics`.
 ///
 /// model: the robot.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.undriven_effort` the undriven part of τ.
+/// costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
+///     efforts without actuators.
 /// integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a cost or a limit that does not fit the robot.
@@ -49,21 +51,21 @@ methods! {
     }
 }
 
-/// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), and
-/// τ = M q̈ + h − Jᵀλ; otherwise as `FreeDynamics`.
+/// A knot of a robot in contact, whose controls are the nv accelerations of the robot and the forces of its contacts: u
+/// = (q̈, λ), and τ = M q̈ + h − Jᵀλ. Integrator and cost are as for `FreeDynamics`.
 ///
-/// The knot has two kinds of `Limit` to zero by default. One bounds the undriven efforts, Nᵀτ = 0 with Nᵀ S = 0
-/// (`undriven efforts`; for a floating base the first 6). The other bounds each contact's J q̈ + γ = 0 (`contact …`).
-/// `AugmentedLagrangian` enforces them; `Fddp` alone treats them as costs. Nothing is inverted, so contacts may be
-/// redundant. Crocoddyl's `DifferentialActionModelContactInvDynamics` has the same equations, and without contacts
-/// `DifferentialActionModelFreeInvDynamics`.
+/// By default the knot has two kinds of `Limit`, which keep a residual at zero. The limit named `undriven efforts`
+/// keeps Nᵀτ = 0, where Nᵀ S = 0; for a floating base these are the first 6 efforts. A limit named `contact` and the
+/// contact's name keeps J q̈ + γ = 0. `AugmentedLagrangian` enforces both; `Fddp` alone treats them as costs. No matrix
+/// is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
+/// `DifferentialActionModelContactInvDynamics`, and without contacts as in `DifferentialActionModelFreeInvDynamics`.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. May be empty.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.contact_force` uses λ.
+/// costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.contact_force` on λ.
 /// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`. The actuation
-///     defines which efforts are driven; bounds apply to all nv + rows controls.
+///     defines which efforts have actuators. Bounds apply to all controls: nv accelerations and the rows of λ.
 ///
 /// Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot.
 ///
@@ -76,8 +78,8 @@ methods! {
 pub(crate) struct ContactInverseDynamics(pub(super) RobotAction<robot::ContactInverseDynamics>);
 
 methods! {
-    /// Returns zero accelerations and the contact forces that hold the robot still at the state x: nv zeros and λ.
-    /// Efforts and forces together have the smallest norm.
+    /// Returns the controls that hold the robot still at the state x: nv zeros, the accelerations, and the contact
+    /// forces λ. Among all solutions, efforts and forces together have the smallest norm.
     ContactInverseDynamics::quasi_static;
 
     #[new]

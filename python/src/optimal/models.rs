@@ -1,4 +1,4 @@
-//! Models of a problem: actions of any kind.
+//! Reads the models of a problem, which are actions of any kind.
 
 use super::actions::{ContactDynamics, FreeDynamics, ImpulseDynamics};
 use super::inverse::{ContactInverseDynamics, InverseDynamics};

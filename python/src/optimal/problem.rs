@@ -31,27 +31,26 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// x0: the initial state, nx numbers.
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
 ///     `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-/// stages: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive knots
-///     with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
-///     differ only in their costs and limits.
+/// stages: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed as a group
+///     if they have the same model, or if their models belong to one robot and differ only in their costs and limits.
 /// terminal: the model of the terminal knot, without controls.
 ///
 /// Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
-/// is not 1 (up to 1e-3). Also raises it for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot,
-/// or 2²⁸ numbers in the matrices [A B] of all knots.
+/// is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, more than 4096 numbers in a state or in
+/// the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
     /// Descriptions of the models of robots, the terminal model last; `None` for other models.
     pub(super) described: Mutex<Vec<Option<Arc<Described>>>>,
-    /// Objects of the models that are not a robot's, as the user passed them, the terminal model last. The problem's
-    /// copies of these models call their functions.
+    /// The models that do not belong to a robot, as the objects that the user passed, the terminal model last. The
+    /// problem's copies of these models call the functions of the objects.
     pub(super) objects: Vec<Option<Py<PyAny>>>,
     /// Residuals of robots that are written in Python, as the user passed them.
     written: Mutex<Vec<Py<PyAny>>>,
-    /// First error of the actions.
+    /// The first error of an action that is written in Python.
     fault: Fault,
-    /// Errors of the residuals.
+    /// Variables for the first error of each residual that is written in Python.
     faults: Mutex<Vec<Fault>>,
     /// Number of times that the horizon was shifted.
     moved: AtomicUsize,
@@ -81,14 +80,14 @@ impl Problem {
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
         self.objects.iter().try_for_each(|object| visit.call(object))?;
-        let written = self.written.try_lock(); // no Python code runs while it is locked
+        let written = self.written.try_lock(); // `written` is never locked while Python code runs, so it is free here
         written.map_or(Ok(()), |written| written.iter().try_for_each(|action| visit.call(action)))
     }
 
     /// Reads a robot's problem from the text that `to_json` returned.
     ///
-    /// Raises `ProblemError` for text that is not a problem, for parts that do not fit together, and for sizes beyond
-    /// the limits of `Problem`.
+    /// Raises `ProblemError` if the text is not a problem, if models, states or costs do not fit together, or if a size
+    /// is beyond the limits of `Problem`.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let data: rust::robot::RobotProblem =
@@ -101,7 +100,7 @@ impl Problem {
     }
 
     /// Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
-    /// is null.
+    /// is written as null.
     ///
     /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
     /// different robots.
@@ -218,9 +217,10 @@ impl Problem {
         problem.set_x0(&x0).map_err(problem_error)
     }
 
-    /// Changes the weight of the terms with this name in all knots, the terminal one included. Call it between solves.
+    /// Changes the weight of all cost terms with this name, in all knots including the terminal one. Call this method
+    /// between solves.
     ///
-    /// Raises `KeyError` if no term has this name, `ProblemError` if the weight is negative or not finite.
+    /// Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
     fn set_weight(&self, name: &str, weight: f64) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let mut described = lock("problem", &self.described)?;
@@ -233,13 +233,13 @@ impl Problem {
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
     }
 
-    /// Sets a knot's own costs, such as an MPC's new targets. They move with their knot in a `shift`. Call it between
-    /// solves.
+    /// Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs
+    /// move with the knot. Call this method between solves.
     ///
     /// knot: its index, 0 to N; N is the terminal knot.
     /// costs: a list of `Cost`.
     ///
-    /// Raises `ProblemError` for a term that does not fit, or if the knot's action does not belong to a robot.
+    /// Raises `ProblemError` if a term does not fit the robot, or if the knot's action does not belong to a robot.
     fn set_costs(&self, py: Python<'_>, knot: usize, costs: Vec<PyRef<'_, Cost>>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let horizon = problem.horizon();
@@ -268,9 +268,9 @@ impl Problem {
         Ok(())
     }
 
-    /// Computes the quasi-static controls of all knots, which hold each knot's state still as well as possible: (N,
-    /// nu), or a list of N arrays if knots differ in nu. For a robot they follow from statics, for other actions from
-    /// Newton's method.
+    /// Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
+    /// (N, nu), or a list of N arrays if knots differ in nu. For robots they are computed by statics, for other actions
+    /// by Newton's method.
     ///
     /// xs: states, (N + 1, nx).
     fn quasi_static<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -299,7 +299,7 @@ impl Problem {
         Ok(evaluation)
     }
 
-    /// Computes the evaluation of a solution, unless the horizon was shifted since.
+    /// Computes the evaluation of a solution; an error if the horizon was shifted after the solve.
     fn _evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -315,8 +315,8 @@ impl Problem {
         self.evaluate(py, xs, us)
     }
 
-    /// Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqNode`s, which a `Sweep`
-    /// solves.
+    /// Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
+    /// `LqNode`s, which a `Sweep` solves.
     ///
     /// xs, us: as for `evaluate`.
     fn derivatives<'py>(
@@ -354,7 +354,7 @@ impl Problem {
     ///
     /// us: (N, nu), or a list of N arrays if knots differ in nu.
     ///
-    /// Other threads can run meanwhile. An exception raised by a signal handler, such as KeyboardInterrupt, stops it
+    /// Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
     /// between knots.
     fn rollout<'py>(&self, py: Python<'py>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.inner)?;
@@ -391,7 +391,7 @@ impl Problem {
         Ok(Self { inner, described, objects, written, fault, faults, moved: AtomicUsize::new(0) })
     }
 
-    /// Shifts the descriptions of the models by a knot.
+    /// Shifts the descriptions of the models by one knot.
     pub(super) fn describe_shift(&self) -> PyResult<()> {
         let mut described = lock("problem", &self.described)?;
         let models = described.len() - 1;
@@ -406,7 +406,7 @@ impl Problem {
         self.moved.load(Ordering::Relaxed)
     }
 
-    /// Calls a function with each error slot.
+    /// Calls a function with each variable in which an error is stored, until the function returns a value.
     fn each_fault<T>(&self, mut f: impl FnMut(&mut Option<PyErr>) -> Option<T>) -> Option<T> {
         let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
         let mut found = None;
@@ -422,7 +422,7 @@ impl Problem {
         self.each_fault(Option::take).map_or(Ok(()), Err)
     }
 
-    /// Returns whether such an error is stored.
+    /// Returns whether an error of one of the problem's Python functions is stored.
     pub(super) fn has_failed(&self) -> bool {
         self.each_fault(|error| error.is_some().then_some(())).is_some()
     }

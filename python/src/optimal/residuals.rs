@@ -18,8 +18,9 @@ use std::sync::Arc;
 /// A residual: a vector r(x, u) of a robot, which a `Cost` minimises or a `Limit` bounds.
 ///
 /// A frame is given by its name or index in a model. A contact is given by its name in `ContactDynamics`,
-/// `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot
-/// it uses the frame with that name, or is refused. A target that is not given is zero; a rotation is the identity.
+/// `ContactInverseDynamics` or `ImpulseDynamics`. A residual stores the name of its frame. In a problem of another
+/// robot it uses the frame with the same name; if this robot has no such frame, it is an error. A target that is not
+/// given is zero; a target rotation is the identity.
 ///
 /// >>> from condyle.optimal import Residual
 /// >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -66,7 +67,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::Control { reference: numbers("reference", reference)? }))
     }
 
-    /// Returns the efforts and forces in excess of those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers.
+    /// Returns the difference between the actual efforts and forces and those that hold the robot still, r = τ − g(q) +
+    /// Jᵀλ, nv numbers.
     #[staticmethod]
     fn control_gravity() -> Self {
         Self::from(robot::Residual::ControlGravity)
@@ -78,15 +80,15 @@ impl Residual {
         Ok(Self::from(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
     }
 
-    /// Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base
-    /// the 6 numbers of the force on it. They are 0 in a feasible motion.
+    /// Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base,
+    /// 6 numbers: the force on the base. They are 0 in a feasible motion.
     #[staticmethod]
     fn undriven_effort() -> Self {
         Self::from(robot::Residual::UndrivenEffort)
     }
 
-    /// Returns the acceleration of a contact if accelerations are controls, r = J q̈ + γ along the axes of its rows: 1,
-    /// 2, 3 or 6 numbers. It is 0 while the contact holds.
+    /// Returns the acceleration of a contact, r = J q̈ + γ, for actions whose controls include the accelerations: 1, 2,
+    /// 3 or 6 numbers along the axes of the contact's rows. It is 0 while the contact holds.
     #[staticmethod]
     fn contact_acceleration(contact: String) -> Self {
         Self::from(robot::Residual::ContactAcceleration { contact })
@@ -157,8 +159,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
-    /// Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows:
-    /// 1, 2, 3 or 6 numbers; target has 6.
+    /// Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of the
+    /// contact's rows: 1, 2, 3 or 6 numbers; target always has 6.
     #[staticmethod]
     #[pyo3(signature = (contact, target=None))]
     fn contact_force(contact: String, target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
@@ -178,7 +180,7 @@ impl Residual {
     }
 
     /// Returns the position of a rigid contact's centre of pressure relative to a rectangle: four numbers, all at most
-    /// 0 while it is inside.
+    /// 0 while the centre of pressure is inside.
     ///
     /// size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes in the contact's axes,
     /// (3, 3).
@@ -194,12 +196,12 @@ impl Residual {
         Self::from(robot::Residual::ImpulseCenterOfMass)
     }
 
-    /// Returns a residual that is written in Python, r(t, x, u) at knot t, size numbers.
+    /// Returns a residual r(t, x, u) that is written in Python; t is the index of the knot.
     ///
     /// size: the number of entries, at most 4096.
-    /// calc: a function of (t, x, u) that returns them; x = (q, v); u is empty at the terminal knot.
+    /// calc: a function of (t, x, u) that returns r; x = (q, v); u is empty at the terminal knot.
     /// calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the
-    ///     tangent space of the state. Without it, calc is differentiated as for `Action`.
+    ///     tangent space of the state. Without calc_diff, calc is differentiated as for `Action`.
     ///
     /// >>> from condyle.optimal import Residual
     /// >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
@@ -209,15 +211,16 @@ impl Residual {
         Ok(Self(Kind::Own(within("size", size, 0, MOST_SIZE)?, Functions::new(calc, calc_diff)?)))
     }
 
-    /// Returns a cost that is written in Python: a number ℓ(t, x, u) at knot t with its own Hessian, as a residual of
-    /// one entry. The default activation of its `Cost` is `Activation.sum()`, so the term is weight · ℓ.
+    /// Returns a cost that is written in Python, as a residual of one entry: a number ℓ(t, x, u) with its own Hessian,
+    /// where t is the index of the knot. The default activation of a `Cost` with this residual is `Activation.sum()`,
+    /// so the term is weight · ℓ.
     ///
     /// calc: a function of (t, x, u) that returns ℓ; x = (q, v); u is empty at the terminal knot.
-    /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero parts among q, r, Q, S, R: gradient and
-    ///     Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without it, calc is
+    /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero arrays among q, r, Q, S, R: gradient and
+    ///     Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without calc_diff, calc is
     ///     differentiated as for `Action`.
     ///
-    /// Knots with such a cost are solved with respect to their controls, not in inverse-dynamics form.
+    /// For knots with such a cost, the sweep of `Fddp` does not use the inverse-dynamics form.
     ///
     /// >>> from condyle.optimal import Cost, Residual
     /// >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
@@ -227,7 +230,7 @@ impl Residual {
         Ok(Self(Kind::Number(Functions::new(calc, calc_diff)?)))
     }
 
-    /// Returns the residual as JSON, as in the JSON of a problem.
+    /// Returns the residual as JSON, in the form in which the JSON of a problem contains it.
     fn __repr__(&self) -> String {
         match &self.0 {
             Kind::Given(inner) => {
@@ -279,7 +282,7 @@ impl Residual {
 }
 
 impl Residual {
-    /// Returns the residual for a robot.
+    /// Converts the residual to the library's type, for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Residual {
         let (size, functions, number) = match &self.0 {
             Kind::Given(inner) => return inner.clone(),
@@ -290,12 +293,12 @@ impl Residual {
         robot::Residual::Own(robot::OwnResidual::new(OwnFunction { size, number, functions, space, way, fault }))
     }
 
-    /// Returns whether it is written in Python.
+    /// Returns whether the residual is written in Python.
     pub(super) fn is_own(&self) -> bool {
         matches!(self.0, Kind::Own(..) | Kind::Number(_))
     }
 
-    /// Returns whether it is a scalar cost.
+    /// Returns whether the residual is a scalar cost.
     pub(super) fn is_number(&self) -> bool {
         matches!(self.0, Kind::Number(_))
     }
@@ -319,20 +322,20 @@ fn residuals_mut(knot: &mut robot::Knot) -> impl Iterator<Item = &mut robot::Res
     costs.map(|robot::Cost { residual, .. }| residual).chain(limits.map(|robot::Limit { residual, .. }| residual))
 }
 
-/// Takes the residuals that are written in Python, with their indices, out of a knot, which then can be written as
-/// JSON.
+/// Takes the residuals that are written in Python out of a knot, and returns them with their indices. Then the knot can
+/// be written as JSON.
 pub(super) fn take_written(knot: &mut robot::Knot) -> Vec<(usize, Residual)> {
     let take = |(place, residual): (usize, &mut robot::Residual)| {
         let robot::Residual::Own(own) = residual else { return None };
         let own: &dyn Any = &**own;
         let written = Residual::from(own.downcast_ref::<OwnFunction>()?);
-        *residual = robot::Residual::ImpulseCenterOfMass; // placeholder until `put_written`
+        *residual = robot::Residual::ImpulseCenterOfMass; // `put_written` replaces this placeholder
         Some((place, written))
     };
     residuals_mut(knot).enumerate().filter_map(take).collect()
 }
 
-/// Puts these residuals back at their indices.
+/// Puts residuals that are written in Python back into a knot, at their indices.
 pub(super) fn put_written(
     knot: &mut robot::Knot,
     model: &Arc<condyle::Model>,
@@ -346,7 +349,8 @@ pub(super) fn put_written(
     Ok(())
 }
 
-/// Returns the name of a frame, given by name or index in a model, as a residual stores it.
+/// Returns the name of a frame in the form that a residual stores; the frame is given by name or by its index in the
+/// model.
 fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
     let model = &model.get().inner;
     Ok((&model.frames()[frame_index(model, frame)?]).into())

@@ -20,13 +20,13 @@ pub(super) struct Described {
     pub knot: Knot,
 }
 
-/// A robot's action and its description. Neither owns the scratch memory for computations: a problem creates this once
+/// A robot's action and its description. Neither has scratch memory for computations: a problem creates the memory once
 /// for all actions that differ only in their costs.
 pub(super) struct RobotAction<A> {
     action: A,
     pub(super) described: Arc<Described>,
     model: Py<Model>,
-    /// Residuals that are written in Python; Python's garbage collector must know them.
+    /// Residuals that are written in Python; they are reported to Python's garbage collector.
     kept: Vec<Py<PyAny>>,
 }
 
@@ -64,7 +64,7 @@ impl<A: ActionModel + Clone> RobotAction<A> {
         self.kept.iter().try_for_each(|residual| visit.call(residual))
     }
 
-    /// Returns a short text about the action.
+    /// Returns a short description of the action.
     pub(super) fn repr(&self, class: &str) -> String {
         let Knot { dynamics, costs, limits, .. } = &self.described.knot;
         let duration = match (dynamics.dt(), dynamics) {
@@ -163,8 +163,8 @@ pub(super) struct Boxed {
     pub described: Option<Arc<Described>>,
 }
 
-/// Returns the action of type A in model k of a problem, or in the terminal model if k is `None`; it may be wrapped in
-/// constraints.
+/// Returns the action of type A in model k of a problem, or in the terminal model if k is `None`. The action may be
+/// inside a constrained action.
 pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
     fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
         match k {
@@ -182,7 +182,8 @@ pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usiz
     around.action_mut()
 }
 
-/// Changes a robot's action in a problem, see `inside`; `None` if the action does not belong to a robot.
+/// Changes a robot's action in a problem, which `inside` finds. Returns `None` if the action does not belong to a
+/// robot.
 macro_rules! change {
     ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
         change!(
@@ -200,8 +201,8 @@ macro_rules! change {
 }
 pub(super) use change;
 
-/// Defines the methods of a class that is a [`RobotAction`]: `quasi_static` with its documentation, the class's own
-/// methods, and the common methods.
+/// Defines the methods of a class that contains a [`RobotAction`]: `quasi_static` with its documentation, methods of
+/// this class only, and methods of all such classes.
 macro_rules! methods {
     ($(#[doc = $gives:literal])+ $class:ident::quasi_static; $($own:tt)*) => {
         #[pymethods]

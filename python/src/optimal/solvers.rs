@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use std::sync::Mutex;
 use std::time::Duration;
 
-/// Sets the fields of a `Settings` that are given by name; some fields have their own reader function.
+/// Sets those fields of a `Settings` that are given by name. Some fields are read by a special function.
 macro_rules! set {
     ($settings:expr, $given:expr, { $($field:ident $(by $read:ident)?),* }) => {
         for (name, value) in $given.into_iter().flatten() {
@@ -36,7 +36,7 @@ macro_rules! set {
     ($field:expr, $value:ident, $name:expr, $read:ident) => { $field = $read(&$value)? };
 }
 
-/// A type of setting, with a description of its values.
+/// A type of setting, with a description of its valid values.
 trait Setting {
     fn expected(&self) -> &'static str;
 }
@@ -74,7 +74,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
                 "time_budget: expected at least 0 seconds (and at most 1.8e19, or inf), found {seconds:e}"
             ))
         };
-        let limit = seconds.filter(|&s| s != f64::INFINITY); // an infinite time is no limit
+        let limit = seconds.filter(|&s| s != f64::INFINITY); // an infinite time means no limit
         limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
     }
     set!(s, given, {
@@ -87,7 +87,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     Ok(())
 }
 
-/// Output of a solve after each iteration.
+/// The output that a user wants after each iteration of a solve.
 struct Observer<'py> {
     callback: Option<Bound<'py, PyAny>>,
     verbose: bool,
@@ -95,7 +95,7 @@ struct Observer<'py> {
 }
 
 impl Observer<'_> {
-    /// Returns a function to call after each iteration, if any output is wanted.
+    /// Returns a function that the solve calls after each iteration; `None` if the user wants no output.
     fn start(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
         let Self { callback, verbose, progress } = self;
         match (callback, verbose | progress) {
@@ -109,7 +109,7 @@ impl Observer<'_> {
     }
 }
 
-/// Runs a solve, from a warm start (xs, us) if it is given. Other threads can run meanwhile.
+/// Runs a solve, from the warm start (xs, us) if it is given. Other Python threads can run meanwhile.
 fn run<'py, S: Send>(
     py: Python<'py>,
     problem: &Py<Problem>,
@@ -136,7 +136,7 @@ fn run<'py, S: Send>(
     let signals = Signals::new(signals::LONG);
     let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
     let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
-    let raised = problem.get().raise(); // clears the stored error even if another error is raised below
+    let raised = problem.get().raise(); // called in every case: it also clears the stored error
     let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
     if let Some(observer) = observer.filter(|_| closes) {
         observer.call_method0(py, "close")?;
@@ -147,7 +147,8 @@ fn run<'py, S: Send>(
     give(py, problem, inner, result.map_err(problem_error)?)
 }
 
-/// Defines a solver class: the methods that both solvers have, besides their constructors and own methods.
+/// Defines a solver class. Both classes get the same methods, besides a constructor and methods that only one class
+/// has.
 macro_rules! solver {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -155,7 +156,7 @@ macro_rules! solver {
         pub(crate) struct $class {
             problem: Py<Problem>,
             solver: Mutex<rust::$class>,
-            /// Settings as the user passed them, and settings of the inner solver.
+            /// Settings as the user passed them; `inner` are the settings of the inner solver.
             settings: Py<PyDict>,
             inner: Option<Py<PyDict>>,
         }
@@ -164,18 +165,18 @@ macro_rules! solver {
         impl $class {
             $($own)*
 
-            /// Solves the problem from a warm start, and returns a `Solution`, whose status tells how the solve ended.
+            /// Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
             ///
             /// Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-            /// an iteration. An exception of a signal handler, such as KeyboardInterrupt, is raised here. `solution` is
-            /// then the best iterate, from which `resume` continues.
+            /// an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
+            /// Then `solution` is the best iterate, from which `resume` continues.
             ///
             /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
             /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
             /// callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            ///     solve ends ("interrupted"). Its exceptions are raised here.
+            ///     solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
             /// verbose: whether to print a line for each iteration.
-            /// progress: whether to show the progress, by tqdm if it is installed, else as lines.
+            /// progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
             ///
             /// Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
             #[pyo3(signature = (xs, us, callback=None, verbose=false, progress=false))]
@@ -198,8 +199,8 @@ macro_rules! solver {
             /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
             /// `Solution`.
             ///
-            /// With a `time_budget`, a delayed solve does not shorten the following ones: each makes at least one
-            /// iteration.
+            /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
+            /// least one iteration.
             ///
             /// callback, verbose, progress: as for `solve`.
             ///
@@ -264,13 +265,13 @@ macro_rules! solver {
 
             /// Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
             ///
-            /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, with its own costs and
-            /// limits. A model of the problem serves the new last knot, with the costs and limits that the model has
-            /// for all knots. The last control is repeated, and the last state follows from it. At a second shift
-            /// without a solver step in between, the last state is repeated too, because a rollout with repeated
+            /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
+            /// limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
+            /// model has for all knots. The last control is repeated, and the last state follows from it. At a second
+            /// shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
             /// controls would diverge.
             ///
-            /// last: the index of that model.
+            /// last: the index of the new last knot's model.
             ///
             /// Raises `ProblemError` if the model does not exist.
             fn shift(&self, last: usize) -> PyResult<()> {
@@ -286,25 +287,26 @@ macro_rules! solver {
 }
 
 solver! {
-/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the equations and
+/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or plain, with the equations and
 /// constants of Crocoddyl.
 ///
-/// If controls are bounded, it follows Crocoddyl's box solvers.
+/// If controls are bounded, the solver has the equations of Crocoddyl's box solvers.
 ///
 /// problem: the problem to solve; all memory is allocated for its shape, once.
-/// settings: any of these, by name. `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose
-///     trials are plain rollouts. `second_order`: whether to use the curvature of the dynamics if the models provide it
-///     (full DDP). `inverse_dynamics_form`: whether the sweep takes knots of robots as equations of inverse dynamics if
-///     possible (default: yes). The steps are the same and take less time. `project_warm_start`: whether controls of a
-///     warm start outside their bounds are moved into them, in `solve` and in `resume` (default: yes). Crocoddyl keeps
-///     them; its iterates need False. `time_budget` (s): a solve that has used it up returns its current result, with
-///     the status "time_limit". The first iteration always runs, unless the budget is 0. A later phase runs if the
-///     median of its last five durations fits. `timings.overrun` is the excess of a solve that takes longer.
-///     `segments`: the number of parts of the horizon on which a sweep works at the same time, at most 1024, default 1.
-///     It uses as many threads as are available. The results differ by rounding, but not with the number of threads.
-///     `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep in
-///     parallel), at most 1024, default 1. The results are bit-identical. `max_iterations`, `tolerance`,
-///     `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+/// settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or
+///     "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics
+///     if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse
+///     dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
+///     `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
+///     yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
+///     has used it up returns its current result, with the status "time_limit". The first iteration always runs, unless
+///     the budget is 0. A later phase of an iteration runs only if the median of its last five durations fits into the
+///     budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the number of
+///     segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep uses as many
+///     threads as are available. The number of segments changes the results by rounding errors; the number of threads
+///     does not change them. `threads`: the number of threads that share an iteration on a robot (derivatives and
+///     gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical. `max_iterations`,
+///     `tolerance`, `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
 ///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
 ///     `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
 Fddp {
@@ -339,28 +341,30 @@ impl Fddp {
 solver! {
 /// The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 ///
-/// It repeats two steps. First it minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP. Then, if
-/// the limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. It ends when limits and the gradient of ℓ + yᵀg
-/// vanish to the tolerances.
+/// The method repeats two steps. First FDDP minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖² with z = g + μ y, where
+/// ℓ is the cost of a knot, g its limits, y their multipliers, and Π the projection onto the bounds. Then, if the
+/// limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. The method ends when the violation of limits and the
+/// gradient of ℓ + yᵀg are below the tolerances.
 ///
 /// `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve, unless
-/// that solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
-/// multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. It is
-/// "constraints_violated" if the penalty reached its maximum and the limits do not hold. This proves nothing: another
-/// warm start may find a solution. It is "infeasible" if the initial state itself violates a limit of knot 0 that no
-/// control can change. `outcome.worst` has the knot, the limit and the amount. The cost of the solution includes the
-/// terms of the limits, the cost of `outcome` does not. The solution's trace and gains are from the last inner solve,
-/// its timings from the whole solve. Controls of a warm start outside their bounds are moved into them.
+/// the last solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
+/// multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. The status is
+/// "constraints_violated" if the penalty reached its maximum and the limits do not hold. This does not prove that no
+/// solution exists: another warm start may find one. The status is "infeasible" if the initial state itself violates a
+/// limit of knot 0 that no control can change. `outcome.worst` contains the knot, the limit and the amount of the
+/// largest violation. The cost of the solution includes the penalties of the limits; the cost of `outcome` does not.
+/// The solution's trace and gains are from the last inner solve, its timings from the whole solve. Controls of a warm
+/// start are moved into their bounds.
 ///
 /// problem: the problem to solve; all memory is allocated for its shape, once.
-/// inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` applies
-///     to the whole solve.
+/// inner: a dict of settings of `Fddp` for the inner solves. The tolerances of inner solves are chosen automatically;
+///     `time_budget` applies to the whole solve.
 /// settings: any of these, by name. `tolerance`: the largest accepted distance of a limit from its bounds.
 ///     `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the maximum number
 ///     of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its maximum,
 ///     and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem with limits or
-///     bounds once, from the initial state held still at all knots (default: yes). A solve fails if it is not finite,
-///     or violates limits at the largest penalty. The better result is returned.
+///     bounds once (default: yes). The second solve starts from the initial state, held still at all knots. A solve
+///     fails if it is not finite, or violates limits at the largest penalty. The better result is returned.
 ///
 /// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()
@@ -385,7 +389,7 @@ AugmentedLagrangian {
         Self::with(problem, inner, settings)
     }
 
-    /// The state of the limits after the last solve, an `Outcome`.
+    /// The violation of limits and other results of the last solve, as an `Outcome`.
     #[getter]
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let solver = lock("solver", &self.solver)?;

@@ -11,12 +11,13 @@ use rust::LqNode;
 
 const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 
-/// The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
+/// The backward Riccati sweep over a horizon of linear-quadratic knots: an iteration of `Fddp` without derivatives and
+/// line search.
 ///
 /// nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
 /// controls.
 ///
-/// Raises `ProblemError` if their shapes do not fit together.
+/// Raises `ProblemError` if the shapes of the nodes do not fit together.
 ///
 /// >>> from condyle.optimal import Lqr, Problem, Sweep
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])

@@ -8,10 +8,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rust::{Normal, Shape, SurfaceForces};
 
-/// A contact with friction: the touching frame is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+/// A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
+/// ‖f_t‖ ≤ μ f_n.
 ///
-/// `ContactTarget.activation` defines whether the contact touches at a tick, and how strongly. Numbers are checked when
-/// a `WholeBodyController` is made.
+/// `ContactTarget.activation` defines at each tick whether the contact touches, and how far it is loaded. The
+/// constructor of `WholeBodyController` checks the numbers.
 ///
 /// Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
 /// max_force: bounds on the normal force of the whole contact (N).
@@ -41,7 +42,7 @@ impl FrictionContact {
     /// Returns a point contact: the frame's origin is held, the frame may turn about it.
     ///
     /// normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is z, level ground.
-    /// axes: the axes of the normal: 'world', in which it is constant, or 'frame', with which it turns.
+    /// axes: the axes of the normal: 'world' for a constant normal, or 'frame' for a normal that turns with the frame.
     #[staticmethod]
     #[pyo3(signature = (frame, friction, normal=None, axes="world", min_force=0.0, max_force=f64::INFINITY))]
     fn point(
@@ -65,13 +66,15 @@ impl FrictionContact {
     /// Returns an edge contact (two corners: the frame may turn about the edge) or a convex polygon (three or more
     /// corners: the frame is held).
     ///
-    /// corners: positions in the frame (m), (n, 3), in their order around the polygon, in one plane across the normal.
+    /// corners: positions in the frame (m), (n, 3), in order around the polygon, in one plane perpendicular to the
+    ///     normal.
     /// forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
     ///     about the normal; or 'corners', a force with a friction cone at each corner.
     /// normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
     ///     None is z.
-    /// yaw_friction: γ (m), with which a wrench's moment about the normal is at most γ f_n. None is ⅔ μ r, with r the
-    ///     radius of the largest circle about the corners' mean within the polygon; ½ μ l for an edge of length 2 l.
+    /// yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔ μ r, where r is the
+    ///     radius of the largest circle in the polygon about the mean of the corners; for an edge of length 2 l it is ½
+    ///     μ l.
     #[staticmethod]
     #[pyo3(signature = (
         frame, friction, corners, forces="wrench", normal=None, yaw_friction=None, min_force=0.0, max_force=f64::INFINITY
@@ -96,7 +99,7 @@ impl FrictionContact {
 
     /// Returns a contact of a rectangular sole about the frame's origin, whose normal is the frame's z axis.
     ///
-    /// size: its sides along the frame's x and y (m); forces, yaw_friction: as for `surface`.
+    /// size: the sides of the sole along the frame's x and y (m); forces, yaw_friction: as for `surface`.
     #[staticmethod]
     #[pyo3(signature = (
         frame, friction, size, forces="wrench", yaw_friction=None, min_force=0.0, max_force=f64::INFINITY
@@ -115,7 +118,7 @@ impl FrictionContact {
         Ok(Self(rust::FrictionContact { yaw_friction, min_force, max_force, ..sole }))
     }
 
-    /// The name of its frame.
+    /// The name of the contact's frame.
     #[getter]
     fn frame(&self) -> &str {
         &self.0.frame
@@ -144,7 +147,7 @@ impl FrictionContact {
         self.0.normal.direction().give(py, None)
     }
 
-    /// The axes in which the normal is given: 'world' or 'frame'.
+    /// The axes along which the normal is given: 'world' or 'frame'.
     #[getter]
     fn axes(&self) -> &'static str {
         if matches!(self.0.normal, Normal::World(_)) { "world" } else { "frame" }

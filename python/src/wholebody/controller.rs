@@ -41,7 +41,7 @@ use std::sync::Mutex;
 /// without its contact, for a number outside its range, and for an effort limit of 0 in the model or the settings.
 ///
 /// A controller can be copied and pickled; the copy continues with bit-identical results. With the back end 'clarabel',
-/// whose solvers are built again, results are equal up to its tolerance.
+/// the copy builds its solvers again, so results are equal only up to the tolerance.
 ///
 /// >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
 /// >>> robot = condyle.robots.quadruped()
@@ -64,7 +64,7 @@ pub(crate) struct WholeBodyController {
 
 struct Inner {
     controller: rust::WholeBodyController,
-    /// References of a call; scratch memory.
+    /// Scratch memory for the references of a call.
     references: rust::References,
     q: Vec<f64>,
     v: Vec<f64>,
@@ -102,8 +102,8 @@ impl WholeBodyController {
         settings::give(py, &self.settings)
     }
 
-    /// Returns the `References` that keep the robot at rest at a position: all tasks at their current values, each
-    /// contact held and touching, the weight shared equally by the contacts.
+    /// Returns the `References` that keep the robot at rest at a position: all tasks keep their current values, all
+    /// contacts touch and are held, and the contacts share the weight equally.
     ///
     /// q: nq numbers.
     ///
@@ -115,9 +115,9 @@ impl WholeBodyController {
         references::give(py, &self.model.get().inner, &inner.controller.hold(&q).map_err(controller_error)?)
     }
 
-    /// Sets references to a plan at a time: the joints, and the resulting centre of mass, momentum and frames; the
-    /// contacts with their activation, held where the plan has them. The contacts share the force that the plan's c̈
-    /// requires.
+    /// Sets references to the state of a plan at a time: the joints, and the resulting centre of mass, momentum and
+    /// frames. Contacts get the plan's activation, and are held at the poses that the plan gives them. The contacts
+    /// share the force that the plan's acceleration c̈ of the centre of mass requires.
     ///
     /// plan: a `Plan` of the same robot with the same number of contacts.
     /// t: the time (s); before the first knot and after the last one, the plan rests at that knot.
@@ -136,10 +136,10 @@ impl WholeBodyController {
         references::write(numbers, references)
     }
 
-    /// Computes the `Command` at a state. It always returns a command: without a solution, a safe one, whose status
-    /// tells why. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an invalid
-    /// quaternion, pair (cos, sin) or rotation of a reference; the reason names the joint or the frame. Other threads
-    /// can run meanwhile.
+    /// Computes the `Command` at a state. It always returns a command: without a solution, a safe command whose status
+    /// shows the cause. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an
+    /// invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the joint or the frame.
+    /// Other Python threads can run meanwhile.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -161,8 +161,8 @@ impl WholeBodyController {
     }
 
     /// Returns the distance of the last step from the optimum of its first-priority program, as `KktResiduals`: the
-    /// errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the same state
-    /// and references as to the last step. For tests: it assembles the program anew.
+    /// errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the state and references
+    /// of the last step again. Use this method in tests: it assembles the program anew.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -207,7 +207,7 @@ impl WholeBodyController {
     }
 }
 
-/// Creates the controller of a pickle. The model, which is one of its parts, checks the version.
+/// Creates the controller of a pickle. The pickle contains the model, whose own pickle checks the version.
 #[pyfunction]
 #[pyo3(name = "_controller_from_numbers")]
 pub(crate) fn controller_from_numbers(

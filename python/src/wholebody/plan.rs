@@ -15,17 +15,18 @@ use rust::PlanData;
 /// A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
 /// touch in each interval.
 ///
-/// `WholeBodyController.track` converts it to references. Between knots q is interpolated in the joints' groups, and v
-/// is interpolated, with a = Δv / Δt. Two knots may have the same time: then the velocity jumps there (an impact).
+/// `WholeBodyController.track` converts it to references. Between knots, q is interpolated with constant velocity (as
+/// by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at this
+/// time (an impact).
 ///
 /// model: the robot.
 /// times: N + 1 times in ascending order (s); two may be equal.
 /// states: (q, v) of the knots, (N + 1, nq + nv).
-/// touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
-/// controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next
-///     one, (N, nu); None for no controls.
+/// touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
+/// controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
+///     free-flyer's), (N, nu); None for no controls.
 /// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
-/// fade: the time over which a contact is loaded after it begins to touch, and unloaded before it ends (s).
+/// fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it ends to touch.
 ///
 /// Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
 /// or pairs (cos, sin) do not have length 1.
@@ -101,8 +102,8 @@ impl Plan {
         (begin, end)
     }
 
-    /// Returns the activation of a contact, given by index, at a time: 0 while it does not touch, a ramp when it begins
-    /// and ends to touch, else 1.
+    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after it begins and
+    /// before it ends to touch, else 1. contact: the index of the contact.
     fn activation(&self, contact: usize, t: f64) -> PyResult<f64> {
         if contact >= self.contacts {
             return Err(PyIndexError::new_err(format!(
@@ -113,7 +114,8 @@ impl Plan {
         Ok(self.inner.activation(contact, t))
     }
 
-    /// Computes the plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
+    /// Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers; they are 0 for
+    /// a free-flyer.
     ///
     /// t: the time (s); q: nq numbers; v: nv.
     ///

@@ -14,7 +14,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// nq, nv, number of frames and number of contacts.
+/// The sizes nq and nv, the number of frames and the number of contacts.
 pub(super) type Sizes = (usize, usize, usize, usize);
 
 pub(super) fn sizes(references: &References) -> Sizes {
@@ -140,7 +140,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>, out: &mut References) -> PyResult<(
     Ok(())
 }
 
-/// Writes references over those that were made for the same robot, frames and contacts.
+/// Overwrites references that were made for the same robot, frames and contacts.
 pub(super) fn write(references: &References, given: &Bound<'_, PyAny>) -> PyResult<()> {
     let array = its_numbers(given, sizes(references))?;
     write_numbers(references, writable(&array)?.as_slice_mut()?);
@@ -156,7 +156,7 @@ pub(super) fn give<'py>(py: Python<'py>, model: &Model, references: &References)
     class!(py, "condyle._wholebody", "References")?.call1((sizes, numbers, rotations))
 }
 
-/// Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is valid.
+/// Raises `ValueError` if the rotation in a pose, which is a (4, 4) matrix, is not valid.
 #[pyfunction]
 #[pyo3(name = "_check_pose")]
 pub(crate) fn check_pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -168,8 +168,8 @@ pub(crate) fn check_pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
     Err(PyValueError::new_err(message))
 }
 
-/// Raises `ValueError` unless all rotations of a position have length 1; each rotation is given by its joint and its
-/// range in q.
+/// Raises `ValueError` if a quaternion or a pair (cos, sin) in a position does not have length 1. Each of them is given
+/// by its joint and its range in q.
 #[pyfunction]
 #[pyo3(name = "_check_rotations")]
 pub(crate) fn check_rotations(

@@ -14,7 +14,7 @@ pub(super) fn gains(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<rust::
     Ok(rust::Gains { stiffness, damping })
 }
 
-/// Reads the numbers of a member, if it is not None.
+/// Reads the numbers of a member of `Settings`; `None` if the member is None.
 fn list(given: &Bound<'_, PyAny>, prefix: &str, name: &str) -> PyResult<Option<Vec<f64>>> {
     let value = given.getattr(name)?;
     (!value.is_none()).then(|| numbers(&format!("{prefix}{name}"), &value)).transpose()

@@ -10,14 +10,14 @@ use rust::{Axes, TaskKind};
 
 /// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
 ///
-/// The `References` contain its target. Tasks of priority 0 come first; tasks of priority 1 only use the freedom that
-/// these leave, and so on. Within a priority only the ratios of the weights matter. Numbers are checked when a
-/// `WholeBodyController` is made.
+/// The `References` contain the target of the task. Tasks of priority 0 come first. Tasks of priority 1 only use the
+/// freedom that tasks of priority 0 leave, and so on. Within a priority, only the ratios of the weights matter. The
+/// constructor of `WholeBodyController` checks the numbers.
 ///
 /// Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
-/// is `Gains.critical(100.0)`. mask: one flag for each number of the task, whether it is controlled; None is all. axes:
-/// the axes of these numbers: 'world'; 'local', the frame's own (for tasks without a frame: the world's); or ('frame',
-/// name), the axes of another frame.
+/// is `Gains.critical(100.0)`. mask: for each number of the task, whether it is controlled; None controls all numbers.
+/// axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame, of the
+/// world); or ('frame', name), the axes of another frame.
 /// priority: 0 is the first priority; at most 2.
 ///
 /// >>> from condyle.wholebody import Task
@@ -55,7 +55,7 @@ impl Task {
         Ok(Self(task))
     }
 
-    /// Returns the name of the frame that the task moves, or of its contact.
+    /// Returns the name of the frame that the task moves, or of the frame whose contact force it controls.
     fn its_frame(&self) -> Option<&str> {
         match &self.0.kind {
             TaskKind::Pose(f)
@@ -92,8 +92,8 @@ fn axes(given: &Bound<'_, PyAny>) -> PyResult<Axes> {
     }
 }
 
-/// Defines the methods of tasks: constructors of tasks with a mask and axes, some of them with a frame; and all other
-/// methods.
+/// Defines the methods of tasks: the constructors of tasks with a mask and axes, for tasks with and without a frame,
+/// and all other methods.
 macro_rules! methods {
     ($($(#[$doc:meta])* $name:ident($($frame:ident)?): $size:literal;)* { $($other:tt)* }) => {
         #[pymethods]
@@ -128,11 +128,11 @@ pose(frame): 6;
 position(frame): 3;
 /// Returns a task for a frame's rotation, ω̇: 3 numbers; weight 10.
 orientation(frame): 3;
-/// Returns a task for the velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6
-/// numbers, linear first; weight 10.
+/// Returns a task for the velocity of a frame's origin and rotation: 6 numbers, linear first; weight 10. The pose does
+/// not matter: only the gain d acts.
 velocity(frame): 6;
-/// Returns a task for the rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers;
-/// weight 0.1.
+/// Returns a task for the rate of the angular momentum about the centre of mass: 3 numbers; weight 0.1. Only the gain d
+/// acts.
 angular_momentum(): 3;
 {
     /// Returns a task for the actuated joints, q̈; weight 0.1.
@@ -150,16 +150,16 @@ angular_momentum(): 3;
         Self::with(rust::Task { joints, ..rust::Task::posture() }, 0, weight, gains, None, None, priority)
     }
 
-    /// Returns a task for the force of this frame's contact: 6 numbers, force and moment at the contact's centre in its
-    /// axes (t₁, t₂, n); a point contact has the first 3; weight 1e-3. It has no gains, and does not act while the
-    /// contact is off.
+    /// Returns a task for the force of this frame's contact; weight 1e-3. It has 6 numbers: force and moment at the
+    /// contact's centre, along the contact's axes (t₁, t₂, n); for a point contact, the first 3 of them. The task has
+    /// no gains, and does not act while the contact is off.
     #[staticmethod]
     #[pyo3(signature = (frame, weight=None, mask=None, priority=0))]
     fn contact_force(frame: &str, weight: Option<f64>, mask: Option<Vec<bool>>, priority: usize) -> PyResult<Self> {
         Self::with(rust::Task::contact_force(frame), 6, weight, None, mask, None, priority)
     }
 
-    /// The controlled quantity: the name of the task's constructor.
+    /// The controlled quantity, as the name of the constructor that made the task.
     #[getter]
     fn kind(&self) -> &'static str {
         match self.0.kind {
@@ -175,7 +175,7 @@ angular_momentum(): 3;
         }
     }
 
-    /// The name of its frame; None without a frame.
+    /// The name of the task's frame; None for a task without a frame.
     #[getter]
     fn frame(&self) -> Option<&str> {
         self.its_frame()
@@ -193,13 +193,13 @@ angular_momentum(): 3;
         give_gains(py, self.0.gains)
     }
 
-    /// The mask: for each of its numbers, whether it is controlled.
+    /// The mask: for each number of the task, whether it is controlled.
     #[getter]
     fn mask(&self) -> Vec<bool> {
         self.0.mask[..self.size()].to_vec()
     }
 
-    /// The axes of its numbers: 'world', 'local' or ('frame', name).
+    /// The axes of the task's numbers: 'world', 'local' or ('frame', name).
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(match &self.0.axes {
@@ -209,13 +209,13 @@ angular_momentum(): 3;
         })
     }
 
-    /// Its priority; 0 is the first.
+    /// The priority of the task; 0 is the first.
     #[getter]
     fn priority(&self) -> usize {
         self.0.priority
     }
 
-    /// Factors of the posture's weight, nv numbers; empty if all are 1.
+    /// Factors of the weight for the coordinates of a posture task, nv numbers; empty if all factors are 1.
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.0.joints.give(py, None)

@@ -20,18 +20,18 @@ use std::sync::Arc;
 /// An action written in Python.
 ///
 /// nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the next state and the cost; only at the terminal knot the next state may
-///     be None.
+/// calc: a function of (t, x, u) that returns the next state and the cost; the next state may be None only at the
+///     terminal knot.
 /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
-///     ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, calc is called with arrays of numbers that
-///     carry their exact derivatives. One call serves all knots if calc does not use t and has no branches that differ
-///     between knots. So compute its results from its arguments (`np.array([...])`, `np.concatenate`), and do not write
-///     them into arrays of floats. If this fails, calc is differentiated by hyper-dual numbers, and if that fails, by
-///     differences.
+///     ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without calc_diff, calc is called with arrays of
+///     numbers that carry their exact derivatives. So calc must make new arrays for its results (`np.array([...])`,
+///     `np.concatenate`), and not write into arrays of floats. One call serves all knots if calc does not use t and has
+///     no branches that differ between knots. If this method fails, calc is differentiated by hyper-dual numbers, and
+///     if they also fail, by differences.
 /// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
 /// space: the space of states: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate,
-///     difference). Then integrate(x, dx) is x ⊕ dx, difference(x0, x1) is the dx with x0 ⊕ dx = x1, and dx has ndx
-///     numbers. Derivatives are taken with respect to dx.
+///     difference). In this tuple, integrate(x, dx) returns x ⊕ dx, difference(x0, x1) returns the dx with x0 ⊕ dx =
+///     x1, and dx has ndx numbers. Derivatives are taken with respect to dx.
 /// batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and results with N
 ///     rows.
 ///
@@ -44,7 +44,7 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Action(Written);
 
-/// The parts of an `Action`, which its copies in problems share.
+/// The functions and sizes of an `Action`. The copies of the action in problems share the functions.
 #[derive(Clone)]
 struct Written {
     space: Space,
@@ -108,7 +108,8 @@ impl Action {
 }
 
 impl Action {
-    /// Copies the action for a problem, for the terminal knot or for other knots; its errors are stored in `fault`.
+    /// Copies the action for a problem, for the terminal knot or for other knots. Errors of the copy are stored in
+    /// `fault`.
     pub(in crate::optimal) fn boxed(&self, terminal: bool, fault: &Fault) -> Box<dyn ActionModel> {
         Box::new(Own { written: self.0.clone(), terminal, fault: fault.clone() })
     }
@@ -118,12 +119,12 @@ impl Action {
 #[derive(Clone)]
 struct Own {
     written: Written,
-    /// Whether it serves the terminal knot, which has no next state.
+    /// Whether the action serves the terminal knot, which has no next state.
     terminal: bool,
     fault: Fault,
 }
 
-/// Adds the function and the knot to the message of an error about a result of wrong type or size.
+/// Adds the names of the function and the knot to an error message about a result of wrong type or size.
 pub(super) fn named(py: Python<'_>, function: &str, knots: &[usize], error: PyErr) -> PyErr {
     let knot = match knots {
         [t] => format!("knot {t}"),
@@ -143,7 +144,7 @@ pub(super) fn named(py: Python<'_>, function: &str, knots: &[usize], error: PyEr
 }
 
 impl Own {
-    /// Returns the arguments for some knots.
+    /// Returns the arguments of a call for these knots.
     fn arguments<'py>(&self, py: Python<'py>, knots: &[usize], [xs, us]: [&[f64]; 2]) -> PyResult<Bound<'py, PyTuple>> {
         let (x, u) = (PyArray1::from_slice(py, xs), PyArray1::from_slice(py, us));
         if !self.written.batch {
@@ -212,7 +213,7 @@ impl Own {
         read().map_err(|error| named(py, "calc_diff", knots, error))
     }
 
-    /// Writes the derivatives at some knots, unless differences must compute them.
+    /// Writes the derivatives at these knots, unless only central differences can compute them.
     fn try_derivatives(
         &self,
         py: Python<'_>,
@@ -254,7 +255,7 @@ impl ActionModel for Own {
         self.written.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
-    /// Returns whether `other` is a copy of the same action, so that their knots form one group.
+    /// Returns whether `other` is a copy of the same action, so that the knots of both are computed as one group.
     fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
         let other: &mut dyn Any = other;
         let same = |other: &mut Self| {

@@ -1,6 +1,7 @@
-//! Derivatives of a Python function that does not compute them itself. Four methods are tried in this order: one call
-//! for all knots with numbers that carry their derivatives; one such call for each knot; hyper-dual numbers, which the
-//! functions of a model also accept; and central differences. A method that fails for a function is not tried again.
+//! Derivatives of a Python function whose user gave no function for them. Four methods are tried in this order: one
+//! call for all knots with numbers that carry their derivatives; one such call for each knot; hyper-dual numbers, which
+//! the functions of a model also accept; and central differences. A method that fails for a function is not tried
+//! again.
 
 use super::expansion::{Directions, Expansion, SeveralKnots, objects};
 use super::functions::Functions;
@@ -14,12 +15,12 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Methods of differentiation, the best one first; 2 is hyper-dual numbers.
+/// Methods of differentiation, from the best to the last one. Number 2, without a name, is hyper-dual numbers.
 const TOGETHER: u8 = 0;
 const ALONE: u8 = 1;
 const DIFFERENCES: u8 = 3;
 
-/// Best method that may still work for a function.
+/// The best method that has not yet failed for a function.
 #[derive(Clone, Default)]
 pub(in crate::optimal) struct Way(Arc<AtomicU8>);
 
@@ -28,9 +29,9 @@ pub(super) struct Differentiated<'a> {
     pub functions: &'a Functions,
     pub space: &'a Space,
     pub nu: usize,
-    /// Whether it takes arrays with a row for each knot.
+    /// Whether the function takes arrays with a row for each knot.
     pub batch: bool,
-    /// Whether it may return no next state.
+    /// Whether the function may return None instead of the next state.
     pub terminal: bool,
 }
 
@@ -56,7 +57,8 @@ impl Differentiated<'_> {
         Directions { n: self.space.ndx() + self.nu, second }
     }
 
-    /// Writes the derivatives of an action at some knots. Returns whether it did; if not, differences must be used.
+    /// Writes the derivatives of an action at these knots. Returns false if no method works, so that differences must
+    /// be used.
     pub(super) fn action(
         &self,
         py: Python<'_>,
@@ -78,8 +80,8 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of the accelerations at a knot, nv × n, row by row, and the derivatives of the cost to a
-    /// node; returns whether it did.
+    /// Writes the derivatives of the accelerations at a knot to `slopes`, nv × n, row by row, and the derivatives of
+    /// the cost to a node. Returns false if no method works.
     pub(super) fn dynamics(
         &self,
         py: Python<'_>,
@@ -122,7 +124,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of m numbers at a knot, m × n, row by row; returns whether it did.
+    /// Writes the derivatives of m numbers at a knot, m × n, row by row. Returns false if no method works.
     pub(super) fn vector(
         &self,
         py: Python<'_>,
@@ -150,7 +152,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes gradient and Hessian of a number at a knot; returns whether it did.
+    /// Writes the gradient and the Hessian of a number at a knot. Returns false if no method works.
     pub(super) fn number(
         &self,
         py: Python<'_>,
@@ -179,8 +181,8 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of the accelerations at a knot, as `dynamics`, and the second derivatives of μᵀ a
-    /// to the node, where the cost's would be; returns whether it did.
+    /// Writes the derivatives of the accelerations a at a knot, as `dynamics` does, and the second derivatives of μᵀ a.
+    /// The latter are stored in the node instead of the Hessian of a cost. Returns false if no method works.
     pub(super) fn curvature(
         &self,
         py: Python<'_>,
@@ -218,7 +220,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Computes the result at some knots, with its derivatives.
+    /// Computes the function's result at these knots, with its derivatives.
     fn expand<'py>(
         &self,
         py: Python<'py>,
@@ -263,8 +265,7 @@ impl Differentiated<'_> {
         Ok(())
     }
 
-    /// Calls the function with pairs of directions: with all pairs, or with enough pairs that each direction occurs
-    /// once.
+    /// Calls the function with pairs of directions, so that each direction occurs at least once.
     fn hyper(
         &self,
         py: Python<'_>,
@@ -301,7 +302,7 @@ impl Differentiated<'_> {
         self.functions.call(py, 0, (t, x, u))
     }
 
-    /// Calls the function with each pair of directions, and passes on its two results.
+    /// Calls the function with each pair of directions, and passes its two results to `read`.
     fn hyper_pairs(
         &self,
         py: Python<'_>,
@@ -345,7 +346,7 @@ pub(super) fn next_and_cost<'py>(result: &Bound<'py, PyAny>) -> PyResult<(Bound<
     })
 }
 
-/// Writes gradient and Hessian of a cost.
+/// Writes the gradient and the Hessian of a cost.
 fn write_cost(node: &mut LqNode, d: Directions, numbers: &[f64]) {
     for i in 0..d.n {
         write_gradient(node, i, numbers[1 + i]);
@@ -367,7 +368,7 @@ fn write_gradient(node: &mut LqNode, i: usize, slope: f64) {
     }
 }
 
-/// Writes ∂²ℓ/∂zᵢ∂zⱼ, j ≤ i.
+/// Writes ∂²ℓ/∂zᵢ∂zⱼ for j ≤ i, with z = (x, u).
 pub(super) fn write_curvature(node: &mut LqNode, i: usize, j: usize, curvature: f64) {
     let ndx = node.q.len();
     match (i < ndx, j < ndx) {

@@ -12,14 +12,14 @@ use rust::ActionModel;
 
 /// An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// `Fddp` alone treats it as a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+/// `Fddp` alone treats the constraint as a cost for leaving the bounds. For residuals of a robot, `Limit` is faster.
 ///
 /// action: the action.
 /// size: the number of entries of g, at most 4096.
 /// calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
 /// calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
-///     space of the state. Without it, central differences of calc.
-/// lower, upper: bounds of g, infinite for no bound; g = 0 if both are None.
+///     space of the state. Without calc_diff, central differences of calc are used.
+/// lower, upper: bounds of g, infinite for no bound. If both are None, the constraint is g = 0.
 ///
 /// >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
 /// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
@@ -75,7 +75,7 @@ impl ConstrainedAction {
 }
 
 impl ConstrainedAction {
-    /// Copies the constraint around a copy of its action; errors are stored in `fault`.
+    /// Adds a copy of the constraint to a copy of its action. Errors of the constraint are stored in `fault`.
     pub(in crate::optimal) fn boxed(&self, action: Box<dyn ActionModel>, fault: &Fault) -> Box<dyn ActionModel> {
         let (functions, columns) = (self.functions.clone(), [action.ndx(), action.nu()]);
         let constraint = Written { functions, bounds: self.bounds.clone(), columns, fault: fault.clone() };

@@ -21,20 +21,21 @@ use std::ops::Range;
 
 /// An action whose accelerations and cost per second are written in Python; it advances by a time step.
 ///
-/// The state is x = (q, v). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
+/// The state is x = (q, v). With semi-implicit Euler, v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt ℓ,
+/// where ℓ is the cost per second.
 ///
 /// nv, nu: the sizes of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
 /// calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; at the terminal knot the
 ///     accelerations may be None.
 /// dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
 /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among da_dq, da_dv, da_du, the
-///     derivatives of the accelerations, and q, r, Q, S, R, the derivatives of ℓ as for `Action`. Without it, calc is
-///     differentiated as for `Action`. Second derivatives of the accelerations, for a solver's `second_order`, always
-///     come from calc. They are zero if calc cannot be called with numbers that carry derivatives. Second derivatives
-///     of ⊕ are taken as zero.
+///     derivatives of the accelerations, and q, r, Q, S, R, the derivatives of ℓ as for `Action`. Without calc_diff,
+///     calc is differentiated as for `Action`. The second derivatives of the accelerations, which a solver's
+///     `second_order` needs, are always computed from calc. They are zero if calc cannot be called with numbers that
+///     carry derivatives. Second derivatives of ⊕ are taken as zero.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
-/// model: the robot to which the positions q and their ⊕ belong; None for vectors of nv numbers.
+/// model: the robot that defines the positions q and the operation ⊕; None if q is a vector of nv numbers.
 /// controls: 'constant', 'linear' or 'quadratic', as for `FreeDynamics`.
 ///
 /// Raises `ProblemError` if dt is not above 0.
@@ -57,7 +58,7 @@ pub(crate) struct DifferentialAction {
     model: Option<Py<Model>>,
 }
 
-/// The parts of a `DifferentialAction`, which its copies in problems share.
+/// The functions and sizes of a `DifferentialAction`. The copies of the action in problems share the functions.
 #[derive(Clone)]
 struct Written {
     nv: usize,
@@ -138,7 +139,7 @@ impl DifferentialAction {
 }
 
 impl DifferentialAction {
-    /// Copies the action for a problem; its errors are stored in `fault`.
+    /// Copies the action for a problem. Errors of the copy are stored in `fault`.
     pub(in crate::optimal) fn boxed(&self, fault: &Fault) -> PyResult<Box<dyn ActionModel>> {
         let Written { nv, nu, space, .. } = &self.written;
         let groups = match space {
@@ -196,8 +197,7 @@ impl OwnDynamics {
         read().map_err(|error| named(py, "calc", &[t], error))
     }
 
-    /// Writes the derivatives of the accelerations and of the cost. Returns whether it did; if not, differences must be
-    /// used.
+    /// Writes the derivatives of the accelerations and of the cost. Returns false if only differences can compute them.
     fn try_calc_diff(&mut self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], node: &mut LqNode) -> PyResult<bool> {
         let Written { nv, nu, functions, space, way } = &self.written;
         if !functions.has(1) {
@@ -267,7 +267,7 @@ impl OwnDynamics {
         }
     }
 
-    /// Computes ℓ at a state, and the accelerations in `a`. All are NaN if the function fails.
+    /// Computes the cost ℓ at a state, and the accelerations in `a`. All these numbers are NaN if the function fails.
     fn value(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         let fault = self.fault.clone();
         unless_failed(&fault, |py| self.try_calc(py, t, x, u)).unwrap_or_else(|| {
@@ -375,7 +375,7 @@ impl ContinuousModel for OwnDynamics {
     }
 }
 
-/// The accelerations as the first numbers of a next state, for differences.
+/// Presents the accelerations as the first numbers of a next state, so that they can be differentiated by differences.
 struct Probe(OwnDynamics);
 
 impl ActionModel for Probe {

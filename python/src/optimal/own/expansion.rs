@@ -1,5 +1,5 @@
-//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. So one call of
-//! a Python function differentiates it at all knots of a horizon.
+//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. With them, one
+//! call of a Python function computes its derivatives at all knots of a horizon.
 //!
 //! ```text
 //! f(x):      g = f′ gₓ,                 H = f′ Hₓ + f″ gₓ gₓᵀ
@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// Number of directions, and whether second derivatives are wanted.
+/// Number of directions of differentiation, and whether second derivatives are computed, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Directions {
     pub n: usize,
@@ -19,12 +19,13 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// Returns the number of values per knot: the value, the gradient, and the Hessian's lower triangle, row by row.
+    /// Returns how many numbers are stored for each knot: the value, the gradient, and the Hessian's lower triangle,
+    /// row by row.
     pub(super) fn stride(self) -> usize {
         1 + self.n + if self.second { self.n * (self.n + 1) / 2 } else { 0 }
     }
 
-    /// Returns the index of ∂²/∂i∂j within a knot.
+    /// Returns the index of ∂²/∂i∂j among the numbers of a knot.
     pub(super) fn place(self, i: usize, j: usize) -> usize {
         let (i, j) = (i.max(j), i.min(j));
         1 + self.n + i * (i + 1) / 2 + j
@@ -36,7 +37,7 @@ impl Directions {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Expansion {
     directions: Directions,
-    /// Values knot by knot.
+    /// Value and derivatives, knot by knot.
     numbers: Vec<f64>,
 }
 
@@ -112,7 +113,7 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// Reads a result with this number of entries at each of some knots.
+    /// Reads a result that has this number of entries at each knot.
     pub(super) fn read(
         what: &str,
         given: &Bound<'_, PyAny>,
@@ -134,13 +135,13 @@ impl Expansion {
         Ok(all)
     }
 
-    /// Returns the values of knot k.
+    /// Returns the value and the derivatives at knot k.
     pub(super) fn knot(&self, k: usize) -> &[f64] {
         let stride = self.directions.stride();
         &self.numbers[k * stride..(k + 1) * stride]
     }
 
-    /// Applies f at each knot; `f` maps a value to f, f′, f″.
+    /// Applies a function at each knot; `f` returns the function's value and its first two derivatives, f, f′ and f″.
     fn map(&self, f: impl Fn(f64) -> [f64; 3]) -> Self {
         let (d, mut numbers) = (self.directions, self.numbers.clone());
         for knot in numbers.chunks_exact_mut(d.stride()) {
@@ -160,7 +161,8 @@ impl Expansion {
         Self { directions: d, numbers }
     }
 
-    /// Applies f to this and another number at each knot; `f` maps two values to f, f_x, f_y, f_xx, f_xy, f_yy.
+    /// Applies a function of two numbers at each knot; `f` returns the function's value and its derivatives f_x, f_y,
+    /// f_xx, f_xy, f_yy.
     fn combine(&self, other: &Self, f: impl Fn(f64, f64) -> [f64; 6]) -> PyResult<Self> {
         let d = self.directions;
         if d != other.directions || self.numbers.len() != other.numbers.len() {
@@ -184,7 +186,7 @@ impl Expansion {
         Ok(Self { directions: d, numbers })
     }
 
-    /// Returns whether a comparison of two numbers holds; an error if knots differ in it.
+    /// Returns whether a comparison of two numbers is true. It is an error if the comparison differs between knots.
     fn compare(&self, other: &Other<'_>, by: CompareOp) -> PyResult<bool> {
         let stride = self.directions.stride();
         let theirs = |k: usize| match other {
@@ -192,7 +194,7 @@ impl Expansion {
             Other::Expansion(x) => x.get().numbers[k * stride],
         };
         let holds = |(k, x): (usize, &f64)| {
-            let order = x.partial_cmp(&theirs(k)); // `None` if one is NaN
+            let order = x.partial_cmp(&theirs(k)); // `None` if one of the numbers is NaN
             order.map_or(matches!(by, CompareOp::Ne), |order| by.matches(order))
         };
         if matches!(other, Other::Expansion(x) if x.get().numbers.len() != self.numbers.len()) {
@@ -207,18 +209,18 @@ impl Expansion {
     }
 }
 
-/// Returns x y, with its derivatives.
+/// Returns the product x y, with its derivatives.
 fn product(x: f64, y: f64) -> [f64; 6] {
     [x * y, y, x, 0.0, 1.0, 0.0]
 }
 
-/// Returns x / y, with its derivatives.
+/// Returns the quotient x / y, with its derivatives.
 fn quotient(x: f64, y: f64) -> [f64; 6] {
     let r = 1.0 / y;
     [x / y, r, -x * r * r, 0.0, -r * r, 2.0 * x * r * r * r]
 }
 
-/// Returns xᵖ for a constant p, with its derivatives.
+/// Returns the power xᵖ for a constant p, with its derivatives.
 fn power(x: f64, p: f64) -> [f64; 3] {
     let derivative = |factor: f64, p: f64| if factor == 0.0 { 0.0 } else { factor * x.powf(p) };
     [x.powf(p), derivative(p, p - 1.0), derivative(p * (p - 1.0), p - 2.0)]
@@ -231,7 +233,7 @@ fn angle(y: f64, x: f64) -> [f64; 6] {
     [y.atan2(x), x * s, -y * s, -xy, (y * y - x * x) * s * s, xy]
 }
 
-/// Defines the methods of a class: elementary functions, given with two derivatives, and others.
+/// Defines the methods of a class: elementary functions, each given with two derivatives, and other methods.
 macro_rules! methods {
     ($class:ident { $($name:ident: $x:ident => $f:expr;)* } { $($others:tt)* }) => {
         #[pymethods]

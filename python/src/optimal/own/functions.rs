@@ -7,16 +7,17 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// First error raised during a solve by the problem's actions and constraints that are written in Python. After it none
-/// of them is called.
+/// The first error that an action or a constraint written in Python raises during a solve. After this error, no action
+/// or constraint of the problem is called.
 pub(in crate::optimal) type Fault = Arc<Mutex<Option<PyErr>>>;
 
-/// Two Python functions, usually `calc` and `calc_diff`. Their object and its copies in problems share them. Only the
-/// object reports them to Python's garbage collector; a problem reports its objects.
+/// Two Python functions, usually `calc` and `calc_diff`, of an action or a constraint. The object and its copies in
+/// problems share the functions. Only the object reports the functions to Python's garbage collector; a problem reports
+/// the objects.
 #[derive(Clone)]
 pub(in crate::optimal) struct Functions(Arc<Mutex<[Option<Py<PyAny>>; 2]>>);
 
-/// Two values are equal if they share the same functions.
+/// Two pairs are equal if they share the same functions.
 impl PartialEq for Functions {
     fn eq(&self, other: &Self) -> bool {
         self.are(other)
@@ -43,7 +44,7 @@ impl Functions {
         Ok(Self(Arc::new(Mutex::new([Some(first), second]))))
     }
 
-    /// Returns whether both share the same functions.
+    /// Returns whether both pairs share the same functions.
     pub(in crate::optimal) fn are(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
@@ -92,12 +93,12 @@ impl Functions {
 
     pub(in crate::optimal) fn clear(&self) {
         let functions = std::mem::take(&mut *self.both());
-        drop(functions); // dropped after the lock is released, since destructors may call Python code
+        drop(functions); // the functions are dropped after the lock is released, since destructors may call Python code
     }
 }
 
-/// Returns the result of a Python function. An error is stored instead; after the first error of the problem the
-/// function is not called.
+/// Returns the result of a Python function, or `None` after an error, which is stored. After the first error of the
+/// problem the function is not called.
 pub(super) fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
     let kept = || fault.lock().unwrap_or_else(PoisonError::into_inner);
     if kept().is_some() {

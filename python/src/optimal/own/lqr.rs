@@ -8,11 +8,11 @@ use nalgebra::DMatrix;
 use pyo3::prelude::*;
 use rust::{ActionModel, LqNode};
 
-/// An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
-/// u ≤ upper.
+/// An action with linear dynamics x⁺ = A x + B u + f, the quadratic cost ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, and bounds
+/// lower ≤ u ≤ upper.
 ///
-/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. None is zero, or no bound.
-/// Without R and B the action has no controls, as at a terminal knot. nx and nu are at most 4096.
+/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu numbers. None means zero, or no
+/// bounds. Without R and B the action has no controls, as at a terminal knot. nx and nu are at most 4096.
 ///
 /// >>> from condyle.optimal import Lqr
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -107,7 +107,7 @@ impl Unicycle {
     }
 }
 
-/// Writes the part `name` of a node.
+/// Writes the matrix or vector `name` of a node.
 pub(in crate::optimal) fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
     let LqNode { A, B, Q, S, R, f, q, r, lower, upper, .. } = node;
     let vectors = [("f", f), ("q", q), ("r", r), ("lower", lower), ("upper", upper)];

@@ -12,25 +12,25 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::any::Any;
 
-/// Step of central differences, about ε^⅓.
+/// Step of central differences: about ε^⅓, with the rounding error ε of doubles.
 const STEP: f64 = 6e-6;
 
-/// Step of second central differences, about ε^¼.
+/// Step of second central differences: about ε^¼, with the rounding error ε of doubles.
 const SECOND_STEP: f64 = 1e-4;
 
 /// A residual of a robot that is written in Python.
 pub(in crate::optimal) struct OwnFunction {
     pub size: usize,
-    /// Whether it is a scalar cost with a gradient and a Hessian.
+    /// Whether the function is a scalar cost with a gradient and a Hessian.
     pub number: bool,
     pub functions: Functions,
     pub space: Space,
     pub way: Way,
-    /// First error of the function.
+    /// First error that the function raised.
     pub fault: Fault,
 }
 
-/// Returns the error slots of a knot's residuals that are written in Python.
+/// Returns the variables for errors of those residuals of a knot that are written in Python.
 pub(in crate::optimal) fn faults(knot: &Knot) -> Vec<Fault> {
     let costs = knot.costs.iter().chain(knot.costs_at.values().flatten());
     let limits = knot.limits.iter().chain(knot.limits_at.values().flatten());
@@ -89,7 +89,7 @@ impl OwnFunction {
         Ok(())
     }
 
-    /// Computes gradient and Hessian of a scalar cost: q, r, Q, S, R.
+    /// Computes the gradient (q, r) and the Hessian (Q, S, R) of a scalar cost.
     fn try_number(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2]) -> PyResult<LqNode> {
         let (ndx, nu) = (self.space.ndx(), u.len());
         let mut node = LqNode::zeros(ndx, nu);

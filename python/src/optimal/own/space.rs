@@ -18,7 +18,8 @@ pub(in crate::optimal) enum Space {
     Vector(usize),
     /// States (q, v) of a robot.
     Robot(Arc<condyle::Model>),
-    /// User-defined: the sizes of a state and of its changes, with `integrate` and `difference`.
+    /// User-defined space: the sizes of a state and of a change of the state, and the functions `integrate` and
+    /// `difference`.
     Own(usize, usize, Functions),
 }
 
@@ -47,7 +48,7 @@ impl Space {
         ))
     }
 
-    /// Returns the argument that defines the space.
+    /// Returns the space as the argument from which `new` reads it.
     pub(super) fn argument<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         Ok(match self {
             Self::Vector(_) => None,
@@ -67,7 +68,7 @@ impl Space {
         }
     }
 
-    /// Returns whether both are the same space.
+    /// Returns whether both spaces are the same.
     pub(super) fn is(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Vector(a), Self::Vector(b)) => a == b,
@@ -92,7 +93,7 @@ impl Space {
         }
     }
 
-    /// Checks a state; the error describes why it is invalid.
+    /// Checks a state; an error describes why the state is invalid.
     pub(super) fn check(&self, x: &[f64]) -> Result<(), String> {
         match self {
             Self::Robot(model) => model.check_position(&x[..model.nq()]).map_err(|error| error.to_string()),
@@ -100,7 +101,7 @@ impl Space {
         }
     }
 
-    /// Computes x ⊕ δ. Errors of Python functions are stored in `fault`; the result is NaN then.
+    /// Computes x ⊕ δ. Errors of Python functions are stored in `fault`; then the result is NaN.
     pub(super) fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64], fault: &Fault) {
         match self {
             Self::Vector(_) => (0..out.len()).for_each(|k| out[k] = x[k] + dx[k]),
@@ -118,8 +119,8 @@ impl Space {
         }
     }
 
-    /// Returns x ⊕ δ with derivatives in the first directions δ, at several knots; `xs` has the states of the knots one
-    /// after the other.
+    /// Returns x ⊕ δ at several knots, with derivatives with respect to δ, whose entries are the first directions. `xs`
+    /// contains the states of the knots one after the other.
     pub(super) fn expand<'py>(&self, py: Python<'py>, d: Directions, xs: &[f64]) -> PyResult<Bound<'py, PyAny>> {
         let (nx, ndx) = (self.nx(), self.ndx());
         let each = |i: usize| xs.iter().skip(i).step_by(nx).copied();
@@ -141,8 +142,8 @@ impl Space {
         }
     }
 
-    /// Returns the derivatives of x ⊖ x̄ in all directions at each of several knots, ndx × n numbers row by row. x
-    /// varies about its value x̄; `next` has the numbers of x.
+    /// Returns the derivatives of x ⊖ x̄ in all directions at each of several knots, ndx × n numbers row by row. `next`
+    /// contains the numbers of x with their derivatives; x̄ is the value of x.
     pub(super) fn slopes(&self, py: Python<'_>, d: Directions, next: &[Expansion], knots: usize) -> PyResult<Vec<f64>> {
         let row = |y: &Expansion, k: usize| y.knot(k)[1..=d.n].to_vec();
         match self {
@@ -190,8 +191,8 @@ fn robot_difference<S: Scalar>(model: &condyle::Model, x0: &[S], x1: &[S], out: 
     (0..nv).for_each(|k| out[nv + k] = x1[nq + k] - x0[nq + k]);
 }
 
-/// Appends q ⊕ δq, v + δv of one knot, computed by hyper-dual numbers. Only pairs of directions of one joint are
-/// coupled, but all pairs are computed, since the joints are not known here.
+/// Appends q ⊕ δq, v + δv of one knot, computed by hyper-dual numbers. Only two directions of the same joint are
+/// coupled, but all pairs are computed, since this function does not know the joints.
 fn expand_robot(model: &condyle::Model, d: Directions, x: &[f64], numbers: &mut [Vec<f64>]) {
     let (ndx, nv) = (2 * model.nv(), model.nv());
     let start = numbers[0].len();
@@ -220,7 +221,7 @@ fn expand_robot(model: &condyle::Model, d: Directions, x: &[f64], numbers: &mut 
     }
 }
 
-/// Returns the derivatives of x ⊖ x̄ at one knot.
+/// Returns the derivatives of x ⊖ x̄ at one knot, where x̄ is the value of x.
 fn robot_slopes(model: &condyle::Model, d: Directions, next: &[Expansion], k: usize) -> Vec<f64> {
     let ndx = 2 * model.nv();
     let centre: Vec<Hyper> = next.iter().map(|y| Hyper::splat(y.knot(k)[0])).collect();
@@ -254,7 +255,7 @@ pub(super) fn hyper_state<'py>(
     })
 }
 
-/// Returns the derivatives of x ⊖ x̄ in two directions.
+/// Returns the derivatives of x ⊖ x̄ in two directions, where x̄ is the value of x.
 pub(super) fn hyper_slopes(space: &Space, next: &[Hyper]) -> Vec<[f64; 2]> {
     let centre: Vec<Hyper> = next.iter().map(|y| Hyper::splat(y.value())).collect();
     let mut change = vec![Hyper::zero(); space.ndx()];
