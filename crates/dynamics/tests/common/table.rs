@@ -113,16 +113,17 @@ impl<S: Scalar> Output<S> {
     }
 }
 
-/// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move.
+/// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move, or
+/// whose file has removed the frames of a body that the constraints need.
 fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
-    let bodies = model.bodies().len();
-    if bodies == 1 {
+    let last = model.bodies().len() - 1;
+    let frame = |body: usize| model.frames().iter().position(|f| f.body == body).filter(|_| last > 0);
+    let (Some(end), Some(middle)) = (frame(last), frame(last.div_ceil(2))) else {
         return ConstraintSet::new(model, &[]).expect("no constraint is wrong");
-    }
-    let frame = |body: usize| model.frames().iter().position(|f| f.body == body).expect("each body has a frame");
-    let (reference, other) = (ReferenceFrame::LocalWorldAligned, Some(frame(bodies / 2)));
-    let contact = ContactConstraint { reference, kp: 2.0, kd: 3.0, ..ContactConstraint::point(frame(bodies - 1)) };
-    let closure = ContactConstraint { other, kp: 2.0, kd: 3.0, ..ContactConstraint::rigid(frame(bodies - 1)) };
+    };
+    let (reference, other) = (ReferenceFrame::LocalWorldAligned, Some(middle));
+    let contact = ContactConstraint { reference, kp: 2.0, kd: 3.0, ..ContactConstraint::point(end) };
+    let closure = ContactConstraint { other, kp: 2.0, kd: 3.0, ..ContactConstraint::rigid(end) };
     let mut set = ConstraintSet::new(model, &[contact, closure]).expect("the frames are on different bodies");
     set.proximal = ProximalSettings { mu: 1e-6, iterations: 2 };
     set
