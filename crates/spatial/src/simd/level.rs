@@ -37,7 +37,8 @@ pub enum Level {
 }
 
 /// Level with vectors of four numbers, for the architecture that this is compiled for.
-pub(crate) const NARROW: Level = if cfg!(target_arch = "aarch64") {
+#[doc(hidden)]
+pub const NARROW: Level = if cfg!(target_arch = "aarch64") {
     Level::Neon
 } else if cfg!(target_arch = "wasm32") {
     Level::Simd128
@@ -143,8 +144,9 @@ pub fn level() -> Level {
 }
 
 /// Panics if this processor does not have a level. Each function that enters code compiled for a level calls it.
+#[doc(hidden)]
 #[inline(always)]
-pub(crate) fn assert_supported(level: Level) {
+pub fn assert_supported(level: Level) {
     /// Best level of this processor; 0 before the first query. (It includes all lower levels of its architecture.)
     static BEST: AtomicU8 = AtomicU8::new(0);
     #[cold]
