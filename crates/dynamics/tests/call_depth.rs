@@ -1,8 +1,8 @@
 //! Number of function calls between a public function and the recursion that it runs.
 //!
 //! A scalar whose arithmetic captures a backtrace shows the calls. A call with `f64` takes the same path, except that a
-//! kernel runs the function that is compiled for the SIMD level, in place of `Scalar::enter`. Names of inlined functions
-//! need debug information; without it, only functions that the compiler did not inline are counted.
+//! kernel runs the function that is compiled for the SIMD level, in place of `Scalar::enter`. Inlined functions appear
+//! only with debug information.
 #![allow(non_snake_case)]
 
 mod common;
@@ -131,7 +131,7 @@ impl Scalar for Traced {
     }
 }
 
-/// Returns the functions of a backtrace, the innermost first, each with the name of its file. An inlined function has no
+/// Returns the functions of a backtrace, the innermost first, each with the name of its file. Inlined functions have no
 /// other path.
 fn functions(trace: &Backtrace) -> Vec<String> {
     let text = trace.to_string();

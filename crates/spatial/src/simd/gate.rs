@@ -13,7 +13,7 @@
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the vector registers of the
 //! level within one state. [`level_function!`](crate::level_function) is for small functions that are called often,
-//! such as the tiles of dense kernels. All of them pass arguments as those of a function.
+//! such as the tiles of dense kernels.
 #![allow(unsafe_code)]
 
 pub use crate::simd::fused_f64::FusedF64;
