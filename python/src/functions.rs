@@ -24,12 +24,16 @@
 //! result, and the call of the library's `Batch`. Arguments that all states share follow after a semicolon. `batch b,
 //! constraints` instead of `batch b` adds a set of constraints. A function without `Data` has a line that begins with
 //! `each` instead, with the shape of its result; it is called state by state.
+//!
+//! Each part of a declaration has its macro: `function!` the signature, `many!` a line `batch`, `each!` a line `each`,
+//! and `one!` the body. What does not depend on the declaration is in functions.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
 use crate::exceptions::{ModelError, exception, wrong_word};
 use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
+use crate::signals::{SHORT, Signals};
 use condyle::{Force, Model, ReferenceFrame, factors::ForwardDynamicsMethod};
 use nalgebra::DMatrix;
 use numpy::{Ix1, Ix2};
@@ -391,18 +395,55 @@ pub(crate) fn regular(model: &Model) -> PyResult<()> {
     }
 }
 
-/// Declares Python functions of a model, and of a `Data` and other scratch memory if these are given. The module's text
-/// explains the declarations.
+/// Returns whether an argument contains hyper-dual numbers, and the number of states if the arguments are given for
+/// many.
+pub(crate) fn inspect(looks: &[(&str, Look)]) -> PyResult<(bool, Option<usize>)> {
+    Ok((looks.iter().any(|(_, look)| look.dual), batch::agreed(looks)?))
+}
+
+/// Calls a function for the only state, or for each of many states in turn; stacks the results of many states.
+pub(crate) fn call_serially<'py>(
+    py: Python<'py>,
+    states: Option<usize>,
+    out: Option<&Bound<'py, PyAny>>,
+    mut call: impl FnMut(Option<usize>, Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let Some(states) = states else { return call(None, out) };
+    let mut signals = Signals::new(SHORT);
+    let one = |k| {
+        signals.look(py)?;
+        call(Some(k), None)
+    };
+    let results = (0..states).map(one).collect::<PyResult<Vec<_>>>()?;
+    batch::stack(py, results, out)
+}
+
+/// Declares functions; see above. It divides a declaration into its parts and leaves them to `function!`.
 macro_rules! functions {
     ($(
         $(#[$doc:meta])*
-        fn $name:ident($model:ident $(, $data:ident $(, $scratch:ident: $Scratch:ident)?)?;
-            $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?) $body:block
-        $(batch $batch:ident $(, $set:ident)?: $check:ident($($all:ident: $all_kind:ident),*
-            $(; $($shared:ident: $shared_kind:ident),*)?) -> $kind_of:ident $(($class:literal))? $in_lanes:block)?
-        $(each($($of:ident: $of_kind:ident),* $(; $($same:ident: $same_kind:ident),*)?) -> [$($size:ident),*]
-            |$place:ident| $one:block)?
+        fn $name:ident $signature:tt $body:block
+        $(batch $batch:ident $(, $scratch:ident)?: $check:ident $all:tt -> $result:ident $(($class:literal))?
+            $in_lanes:block)?
+        $(each $of:tt -> $shape:tt |$place:ident| $one:block)?
     )*) => {$(
+        $crate::functions::function! {
+            $(#[$doc])* $name $signature $body
+            { $(batch [$batch $($scratch)?] $check $all [$result $(($class))?] $in_lanes)? }
+            { $(each $of $shape $place $one)? }
+        }
+    )*};
+}
+
+/// Declares one function of a model, of a `Data` if `data` follows it, and of other scratch memory after that. It
+/// borrows the scratch memory, inspects the arguments, and computes the results by one of the macros below.
+macro_rules! function {
+    (
+        $(#[$doc:meta])* $name:ident
+        ($model:ident $(, $data:ident $(, $scratch:ident: $Scratch:ident)?)?;
+            $($arg:ident: $kind:ident $(= $default:tt)?),* $(; $out:ident)?)
+        $body:block {$($many:tt)*} {$($each:tt)*}
+    ) => {
         $(#[$doc])*
         #[pyfunction]
         #[pyo3(signature = ($model, $($data, $($scratch,)?)? $($arg $(= $default)?,)* $($out = None)?))]
@@ -416,8 +457,8 @@ macro_rules! functions {
             use $crate::{arrays::Give as _, batch, data::Holds, functions as kinds, functions::Argument};
             let (py, robot) = ($model.py(), $model.get());
             $(
-                let mut data = $crate::data::take(robot, $data)?;
-                $(let mut scratch = $crate::data::take(robot, $scratch)?;)?
+                let mut $data = $crate::data::take(robot, $data)?;
+                $(let mut $scratch = $crate::data::take(robot, $scratch)?;)?
             )?
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
@@ -427,70 +468,98 @@ macro_rules! functions {
             $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
             let at_once = true $(&& $arg.is_read())*;
             let (dual, states) = if at_once { (false, None) } else {
-                let looks: &[(&str, batch::Look)] = &[$((
+                kinds::inspect(&[$((
                     stringify!($arg),
                     <kinds::$kind as Argument<'_, '_>>::look(stringify!($arg), &$arg.given, $model)?,
-                )),*];
-                (looks.iter().any(|(_, look)| look.dual), batch::agreed(looks)?)
+                )),*])?
             };
-            $(if let (Some(states), false) = (states, dual) {
-                $check($model)?;
-                let written = &$crate::arrays::destinations(out);
-                $(let $all = <kinds::$all_kind as Argument>::read_all(
-                    stringify!($all), &$all.given, $model, states, written
-                )?;)*
-                $(let $all = &$all[..];)*
-                $($(let $shared = <kinds::$shared_kind as Argument>::read(
-                    stringify!($shared), $shared.given, $model
-                )?;)*)?
-                let lanes = data.batch($model, states);
-                $(let $set = scratch.side_by_side(lanes, $model)?;)?
-                return batch::run(py, lanes, batch::Kind::$kind_of $(($class))?, states, out, |$batch, some| {
-                    $(let $all = batch::part($all, &some, states);)*
-                    $in_lanes;
-                });
-            })?
-            $(if let (Some(states), false) = (states, dual) {
-                let written = &$crate::arrays::destinations(out);
-                $(let $of = <kinds::$of_kind as Argument>::read_all(
-                    stringify!($of), &$of.given, $model, states, written
-                )?;)*
-                $(let $of = &$of[..];)*
-                $($(let $same = <kinds::$same_kind as Argument>::read(stringify!($same), $same.given, $model)?;)*)?
-                return batch::each(py, states, &[$($model.$size()),*], out, |k, $place| {
-                    $(let $of = batch::part($of, &(k..k + 1), states);)*
-                    $one
-                });
-            })?
-            // the same code is compiled for doubles and for hyper-dual numbers
-            macro_rules! call {
-                ($S:ty, $read:ident, $state:expr, $to:expr) => {{
-                    $(
-                        let $data = Holds::<$S>::held(&mut *data, $model)?;
-                        $(let $scratch = Holds::<$S>::held(&mut *scratch, $model)?;)?
-                    )?
-                    $(let $arg = $arg.$read::<$S>(stringify!($arg), $model, $state, at_once)?;)*
-                    let result = $body;
-                    result.give(py, $to)
-                }};
-            }
-            #[allow(unused_mut, unused_variables)] // unused in functions without a `Data` or without arguments
-            let mut call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| {
-                if dual { call!($crate::hyper_dual::Hyper, duals, state, out) } else { call!(f64, numbers, state, out) }
+            $crate::functions::many! { (py, $model, states, dual, out) [$($data)?] $($many)* }
+            $crate::functions::each! { (py, $model, states, dual, out) $($each)* }
+            #[allow(unused_variables)] // by functions without a `Data` or without arguments
+            let call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| match dual {
+                false => $crate::functions::one! {
+                    f64, numbers, (py, $model, state, out, at_once) [$($data $(, $scratch)?)?] ($($arg),*) $body
+                },
+                true => $crate::functions::one! {
+                    $crate::hyper_dual::Hyper, duals, (py, $model, state, out, at_once)
+                    [$($data $(, $scratch)?)?] ($($arg),*) $body
+                },
             };
-            match states {
-                None => call(None, out),
-                Some(states) => {
-                    let mut signals = $crate::signals::Signals::new($crate::signals::SHORT);
-                    let mut one = |k| {
-                        signals.look(py)?;
-                        call(Some(k), None)
-                    };
-                    let results = (0..states).map(&mut one).collect::<PyResult<Vec<_>>>()?;
-                    batch::stack(py, results, out)
-                }
-            }
+            kinds::call_serially(py, states, out, call)
         }
-    )*};
+    };
 }
-pub(crate) use functions;
+
+/// Reads the arguments of many states, and those that all states share.
+macro_rules! read_all {
+    (
+        ($model:ident, $states:ident, $out:ident)
+        ($($all:ident: $kind:ident),* $(; $($shared:ident: $shared_kind:ident),*)?)
+    ) => {
+        let written = &$crate::arrays::destinations($out);
+        $(let $all = <kinds::$kind as Argument>::read_all(stringify!($all), &$all.given, $model, $states, written)?;)*
+        $(let $all = &$all[..];)*
+        $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared.given, $model)?;)*)?
+    };
+}
+
+/// Returns the results of many states, computed in lanes, if the function has a line `batch`.
+macro_rules! many {
+    ($call:tt $data:tt) => {};
+    (
+        ($py:ident, $model:ident, $states:ident, $dual:ident, $out:ident) [$data:ident]
+        batch [$batch:ident $($scratch:ident)?] $check:ident
+        ($($all:ident: $kind:ident),* $(; $($shared:ident: $shared_kind:ident),*)?)
+        [$result:ident $(($class:literal))?] $in_lanes:block
+    ) => {
+        if let (Some($states), false) = ($states, $dual) {
+            $check($model)?;
+            $crate::functions::read_all! {
+                ($model, $states, $out) ($($all: $kind),* $(; $($shared: $shared_kind),*)?)
+            }
+            let lanes = $data.batch($model, $states);
+            $(let $scratch = $scratch.side_by_side(lanes, $model)?;)?
+            return batch::run($py, lanes, batch::Kind::$result $(($class))?, $states, $out, |$batch, some| {
+                $(let $all = batch::part($all, &some, $states);)*
+                $in_lanes;
+            });
+        }
+    };
+}
+
+/// Returns the results of many states, computed one after the other, if the function has a line `each`.
+macro_rules! each {
+    ($call:tt) => {};
+    (
+        ($py:ident, $model:ident, $states:ident, $dual:ident, $out:ident)
+        each ($($of:ident: $kind:ident),* $(; $($shared:ident: $shared_kind:ident),*)?)
+        [$($size:ident),*] $place:ident $one:block
+    ) => {
+        if let (Some($states), false) = ($states, $dual) {
+            $crate::functions::read_all! {
+                ($model, $states, $out) ($($of: $kind),* $(; $($shared: $shared_kind),*)?)
+            }
+            return batch::each($py, $states, &[$($model.$size()),*], $out, |k, $place| {
+                $(let $of = batch::part($of, &(k..k + 1), $states);)*
+                $one
+            });
+        }
+    };
+}
+
+/// Computes one state with doubles or with hyper-dual numbers, `$S`; `$read` reads the arguments as such numbers.
+macro_rules! one {
+    (
+        $S:ty, $read:ident, ($py:ident, $model:ident, $state:ident, $out:ident, $at_once:ident)
+        [$($data:ident $(, $scratch:ident)?)?] ($($arg:ident),*) $body:block
+    ) => {{
+        $(
+            let $data = Holds::<$S>::held(&mut *$data, $model)?;
+            $(let $scratch = Holds::<$S>::held(&mut *$scratch, $model)?;)?
+        )?
+        $(let $arg = $arg.$read::<$S>(stringify!($arg), $model, $state, $at_once)?;)*
+        let result = $body;
+        result.give($py, $out)
+    }};
+}
+pub(crate) use {each, function, functions, many, one, read_all};

@@ -8,6 +8,7 @@ use crate::passes::kinematics::{Moving, World};
 use crate::passes::{
     aba, all_terms, centroidal, coriolis, crba, energy, factored_dynamics, minv, regressor, rnea, statics,
 };
+use crate::selection::Methods;
 use crate::workspace::{Narrow, Size, Wide};
 use alloc::boxed::Box;
 use condyle_model::Model;
@@ -18,7 +19,7 @@ use condyle_spatial::{Scalar, same_layout};
 /// that it may be read under both names of `f64` ([`same_layout!`]).
 macro_rules! data {
     (
-        $(#[$doc:meta])* ($size:ident, $model:ident)
+        $(#[$doc:meta])* ($size:ident, $model:ident, $minv:ident)
         $($name:ident: $Workspace:ident $(:: $Inner:ident)? = ($($from:ident),*),)*
     ) => {
         $(#[$doc])*
@@ -31,20 +32,23 @@ macro_rules! data {
             $(pub(crate) $name: $Workspace $(:: $Inner)? <S>,)*
             /// Scratch of single calls on robots with limbs.
             pub(crate) limbs: Option<Box<Scratch>>,
+            pub(crate) methods: Methods,
         }
 
-        same_layout!(Data { $($name),* } same { size, tree, limbs });
+        same_layout!(Data { $($name),* } same { size, tree, limbs, methods });
 
         impl<S: Scalar> Data<S> {
             fn allocate<R>($model: &Model<R>) -> Self {
                 let $size = Size::new($model);
                 $(let $name = $Workspace $(:: $Inner)? ::new($($from),*);)*
-                Self { size: $size, tree: $model.tree_hash(), $($name,)* limbs: Scratch::new::<S, R>($model) }
+                let methods = Methods::new::<S, R>($model, $minv.factor.nonzeros());
+                let limbs = Scratch::new::<S, R>($model);
+                Self { size: $size, tree: $model.tree_hash(), $($name,)* limbs, methods }
             }
 
             fn copy(&self) -> Self {
-                let Self { size, tree, $($name,)* limbs } = self;
-                Self { size: *size, tree: *tree, $($name: copied($name),)* limbs: copied(limbs) }
+                let Self { size, tree, $($name,)* limbs, methods } = self;
+                Self { size: *size, tree: *tree, $($name: copied($name),)* limbs: copied(limbs), methods: *methods }
             }
         }
     };
@@ -62,7 +66,7 @@ data! {
     /// let data = Data::<f64>::new(&arm);
     /// # let _ = data;
     /// ```
-    (size, model)
+    (size, model, minv)
     world: World = (size),
     moving: Moving = (size),
     rnea: rnea::Workspace = (size),

@@ -1,13 +1,14 @@
 //! Selection of algorithms: every threshold of this crate, with the measurement on which it is based.
 //!
-//! Choices that depend only on the model are made when [`Data`](crate::Data) is created. The schedule of a robot's
-//! limbs is made when its model is built, if it has any (`condyle_model::limbs`).
+//! Choices that depend only on the model and the scalar are made when [`Data`](crate::Data) is created (`Methods`). The
+//! schedule of a robot's limbs is made when its model is built, if it has any (`condyle_model::limbs`).
 
 use crate::passes::factored_dynamics::ForwardDynamicsMethod;
 use condyle_model::Model;
+use condyle_model::limbs::Plan;
 use condyle_model::tree::Column;
-use condyle_spatial::Scalar;
-use condyle_spatial::gate::{FusedF64, is};
+use condyle_spatial::gate::{FusedF64, Level, is, level};
+use condyle_spatial::{Scalar, same_layout};
 
 /// Maximum mean length of the rows of M's factor for which M⁻¹ is computed from the factor. Measured by
 /// `benches/factorisation.rs`: both methods are equally fast at 12.5 on a chain of 24. The humanoid has 9.7, the arm 4.
@@ -20,6 +21,74 @@ const LONG_WAY: usize = 24;
 /// Mean length of the paths to the root above which ∂τ is computed four columns at a time instead of pair by pair.
 /// Measured by `benches/peers/dynamics.py`.
 const LONG_SUPPORT: usize = 4;
+
+/// Methods of the functions that have several, for one model and one type of scalar.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Methods {
+    pub inverse: InverseMethod,
+    pub aba_derivatives: AbaDerivativesMethod,
+}
+
+impl Methods {
+    /// Selects the methods. The factor of M has `nonzeros` entries.
+    pub(crate) fn new<S: 'static, R>(model: &Model<R>, nonzeros: usize) -> Self {
+        let inverse = InverseMethod::fastest(model, nonzeros);
+        Self { inverse, aba_derivatives: AbaDerivativesMethod::fastest::<S, R>(model, inverse) }
+    }
+}
+
+/// Method by which M⁻¹ is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum InverseMethod {
+    /// Gauss–Jordan elimination of M, for short chains.
+    GaussJordan,
+    /// Sparse factor of M, or the articulated bodies of limbs in parallel lanes.
+    SparseFactor,
+    /// Factors of the articulated bodies, without M.
+    ArticulatedBodies,
+}
+
+same_layout!(InverseMethod);
+
+impl InverseMethod {
+    fn fastest<R>(model: &Model<R>, nonzeros: usize) -> Self {
+        if is_short_chain(model) {
+            Self::GaussJordan
+        } else if inverse_by_factor(model, nonzeros) {
+            Self::SparseFactor
+        } else {
+            Self::ArticulatedBodies
+        }
+    }
+}
+
+/// Method by which the derivatives ∂q̈ = −M⁻¹ ∂τ are computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AbaDerivativesMethod {
+    /// ∂τ and M⁻¹ of limbs in parallel lanes, then their product. Where a call cannot use lanes, it does as `Product`.
+    Limbs,
+    /// ∂τ and M⁻¹ body by body, then their product.
+    Product,
+    /// ∂τ body by body, then a solution with the articulated bodies.
+    TreeSolve,
+}
+
+impl AbaDerivativesMethod {
+    fn fastest<S: 'static, R>(model: &Model<R>, inverse: InverseMethod) -> Self {
+        if solve_by_tree(model.columns(), model.nv()) {
+            Self::TreeSolve
+        } else if inverse != InverseMethod::ArticulatedBodies && limbs::<S, R>(model).is_some() && !model.has_mimic() {
+            Self::Limbs
+        } else {
+            Self::Product
+        }
+    }
+}
+
+/// Returns the plan of a robot's limbs if single calls with this scalar compute them in parallel lanes.
+pub(crate) fn limbs<S: 'static, R>(model: &Model<R>) -> Option<&Plan> {
+    model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)
+}
 
 /// Returns whether M⁻¹ is computed from the factor of M, which has `nonzeros` entries. It is the only method for joints
 /// that share coordinates.

@@ -54,7 +54,7 @@ pub fn minus_block_product<S: Scalar>(
 /// Computes [`neg_product`] for two matrices B and one symmetric A. It is used for lanes, because their matrices are
 /// too large for the L1 cache.
 #[inline(always)]
-fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+fn neg_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let (n, mut j) = (nonzero_rows.len(), 0);
     while j < n {
         let NonzeroRows { rows, same_pattern } = &nonzero_rows[j];
@@ -228,9 +228,12 @@ kernel! {
     /// Computes [`minus_products`] for any scalar, one entry after another.
     fn run_serially<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
         if S::LANES > 1 {
-            minus_product_twice(A, B, X, nonzero_rows);
+            neg_product_twice(A, B, X, nonzero_rows);
         } else {
-            B.into_iter().zip(X).for_each(|(B, X)| neg_product(A, B, X, nonzero_rows));
+            let [X0, X1] = X;
+            for (B, X) in [(B[0], X0), (B[1], X1)] {
+                neg_product(A, B, X, nonzero_rows);
+            }
         }
     }
 }

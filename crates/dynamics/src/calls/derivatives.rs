@@ -4,7 +4,7 @@ use super::differentiated::State;
 use super::forward_dynamics;
 use super::inverse_dynamics::check_arguments;
 use super::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
-use super::limbs::{Task, run as run_limbs};
+use super::limbs;
 use crate::data::{Data, check_forces};
 use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives};
 use crate::derivatives::{aba_derivatives as aba, rnea_derivatives as rnea};
@@ -13,6 +13,7 @@ use crate::lanes::limbs::pass::Arguments;
 use crate::passes::energy::{self, EnergyDerivatives};
 use crate::passes::kinematics::{PlacementCache, positions};
 use crate::passes::{minv, statics};
+use crate::selection::{AbaDerivativesMethod, InverseMethod};
 use condyle_linalg::check;
 use condyle_linalg::tree_product::neg_products;
 use condyle_model::Model;
@@ -119,10 +120,7 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
 ) -> RneaDerivatives<'d, S, R> {
     let arguments = Arguments { q, v, x: a, f_ext };
     check_arguments(model, data, "a", arguments);
-    if run_limbs(Task::RneaDerivatives, model, data, arguments) {
-        data.rnea_derivatives.qd.copy_from_slice(v);
-        data.rnea_derivatives.qdd.copy_from_slice(a);
-    } else {
+    if !limbs::rnea_derivatives(model, data, arguments) {
         run_rnea_serially(model, data, arguments);
     }
     view(model, data)
@@ -137,17 +135,23 @@ pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
 ) {
     let Arguments { q, v, x: a, f_ext } = arguments;
     positions(model, &mut data.world, q);
+    data.rnea_derivatives.qdd.copy_from_slice(a);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
 
-/// Returns a view of the results of `pass`, computed body by body or in the limbs' lanes.
+/// Returns a view of the results of `rnea_derivatives`, computed body by body or in the limbs' lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
+    let state = state(model, data, &d.qdd);
+    RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
+}
+
+/// Returns the state of the last derivatives of τ, given its q̈.
+fn state<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>, qdd: &'d [S]) -> State<'d, S, R> {
     let in_limbs = matches!(data.world.placed, PlacementCache::Limbs(_));
     let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
     let limbs = limbs.map(|(scratch, plan)| LaneView::new(plan, scratch));
-    let state = State { model, world: &data.world, pass: d, limbs };
-    RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
+    State { model, world: &data.world, pass: &data.rnea_derivatives, qdd, limbs }
 }
 
 /// Derivatives of the Coriolis product C(q, v) v, each a full nv × nv matrix.
@@ -235,13 +239,8 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     let arguments = Arguments { q, v, x: tau, f_ext };
     model.check_regular();
     check_arguments(model, data, "tau", arguments);
-    if data.minv.by_factor
-        && !data.aba_derivatives.solve.is_used()
-        && run_limbs(Task::AbaDerivatives, model, data, arguments)
-    {
-        data.aba_derivatives.a.copy_from_slice(&data.aba.qdd);
-        data.rnea_derivatives.qd.copy_from_slice(v);
-        data.rnea_derivatives.qdd.copy_from_slice(&data.aba.qdd);
+    let by_limbs = data.methods.aba_derivatives == AbaDerivativesMethod::Limbs;
+    if by_limbs && limbs::aba_derivatives(model, data, arguments) {
         multiply(model, data);
     } else {
         run_aba_serially(model, data, arguments);
@@ -258,20 +257,19 @@ pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
 ) {
     let Arguments { v, f_ext, .. } = arguments;
     forward_dynamics::run_serially(model, data, arguments);
-    let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
-    a_kept.copy_from_slice(&data.aba.qdd);
-    rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext, &[]);
-    data.aba_derivatives.a = a_kept;
-    if data.minv.by_factor {
-        minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
-    } else {
-        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
+    rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &data.aba.qdd, f_ext, &[]);
+    match data.methods.inverse {
+        InverseMethod::ArticulatedBodies => {
+            minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
+        }
+        method => minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da, method),
     }
-    if data.aba_derivatives.solve.is_used() {
-        let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
-        aba::solves(&data.world, &data.aba, &mut data.aba_derivatives, dtau);
-    } else {
-        multiply(model, data);
+    match data.methods.aba_derivatives {
+        AbaDerivativesMethod::TreeSolve => {
+            let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
+            aba::solves(&data.world, &data.aba, &mut data.aba_derivatives, dtau);
+        }
+        AbaDerivativesMethod::Limbs | AbaDerivativesMethod::Product => multiply(model, data),
     }
 }
 
@@ -320,6 +318,6 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
 
 /// Returns a view of the results of `aba_derivatives`.
 pub(crate) fn view_of_aba<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> AbaDerivatives<'d, S, R> {
-    let aba::Workspace { a, da_dq, da_dv, .. } = &data.aba_derivatives;
-    AbaDerivatives { a, da_dq, da_dv, da_dtau: &data.minv.Minv, state: view(model, data).state }
+    let (a, aba::Workspace { da_dq, da_dv, .. }) = (&data.aba.qdd[..], &data.aba_derivatives);
+    AbaDerivatives { a, da_dq, da_dv, da_dtau: &data.minv.Minv, state: state(model, data, a) }
 }

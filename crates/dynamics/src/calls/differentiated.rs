@@ -14,6 +14,8 @@ pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
+    /// Acceleration coordinates.
+    pub qdd: &'d [S],
     /// Lanes that hold the bodies' quantities; `None` if the bodies were computed one by one.
     pub limbs: Option<LaneView<'d>>,
 }
@@ -21,8 +23,8 @@ pub(crate) struct State<'d, S, R> {
 impl<'d> Rename<State<'d, FusedF64, f64>> for State<'d, f64, f64> {
     #[inline(always)]
     fn renamed(self) -> State<'d, FusedF64, f64> {
-        let Self { model, world, pass, limbs } = self;
-        State { model, world: world.renamed(), pass: pass.renamed(), limbs }
+        let Self { model, world, pass, qdd, limbs } = self;
+        State { model, world: world.renamed(), pass: pass.renamed(), qdd: qdd.renamed(), limbs }
     }
 }
 

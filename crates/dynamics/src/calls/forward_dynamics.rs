@@ -2,7 +2,7 @@
 
 use super::inertia::crba as inertia_matrix;
 use super::inverse_dynamics::{check_arguments, rnea as inverse_dynamics};
-use super::limbs::{Task, run as run_limbs};
+use super::limbs;
 use crate::data::Data;
 use crate::lanes::limbs::pass::Arguments;
 use crate::passes::factored_dynamics::{ForwardDynamicsMethod, run_dense, run_sparse};
@@ -49,7 +49,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     let arguments = Arguments { q, v, x: tau, f_ext };
     model.check_regular();
     check_arguments(model, data, "tau", arguments);
-    if !run_limbs(Task::Aba, model, data, arguments) {
+    if !limbs::aba(model, data, arguments) {
         run_serially(model, data, arguments);
     }
     &data.aba.qdd
@@ -62,9 +62,7 @@ pub(crate) fn run_serially<S: Scalar, R: Constant<S>>(
     arguments: Arguments<'_, S>,
 ) {
     if model.has_mimic() {
-        by_factor(model, data, arguments, ForwardDynamicsMethod::Sparse);
-        data.aba.qdd.copy_from_slice(&data.forward_dynamics.qdd);
-        return;
+        return by_factor(model, data, arguments, ForwardDynamicsMethod::Sparse);
     }
     let Arguments { q, v, x: tau, f_ext } = arguments;
     positions(model, &mut data.world, q);
@@ -128,7 +126,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
         ForwardDynamicsMethod::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
         method => {
             by_factor(model, data, arguments, method);
-            &data.forward_dynamics.qdd
+            &data.aba.qdd
         }
     }
 }
@@ -151,9 +149,9 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
         inertia_matrix(model, data, q);
     }
     data.forward_dynamics.zero = zero;
-    let (d, h, M) = (&mut data.forward_dynamics, &data.rnea.tau, &data.crba.M);
+    let (d, h, M, qdd) = (&mut data.forward_dynamics, &data.rnea.tau, &data.crba.M, &mut data.aba.qdd);
     match method {
-        ForwardDynamicsMethod::Dense => run_dense(d, h, M, tau),
-        _ => run_sparse(d, h, M, tau),
+        ForwardDynamicsMethod::Dense => run_dense(d, h, M, tau, qdd),
+        _ => run_sparse(d, h, M, tau, qdd),
     }
 }

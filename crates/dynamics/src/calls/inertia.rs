@@ -1,10 +1,10 @@
 //! Joint-space inertia matrix and its inverse.
 
-use super::limbs::{Task, run as run_limbs};
+use super::limbs;
 use crate::data::Data;
-use crate::lanes::limbs::pass::Arguments;
 use crate::passes::kinematics::positions;
 use crate::passes::{aba, crba, minv};
+use crate::selection::InverseMethod;
 use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Matrix, Scalar};
@@ -29,11 +29,10 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
     check("q", q.len(), model.nq());
-    if run_limbs(Task::Crba, model, data, Arguments { q, v: &[], x: &[], f_ext: &[] }) {
-        return &data.crba.M;
+    if !limbs::crba(model, data, q) {
+        positions(model, &mut data.world, q);
+        crba::run(model, &data.world, &mut data.crba);
     }
-    positions(model, &mut data.world, q);
-    crba::run(model, &data.world, &mut data.crba);
     &data.crba.M
 }
 
@@ -60,16 +59,18 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     data.check(model);
     model.check_regular();
     check("q", q.len(), model.nq());
-    if data.minv.by_factor {
-        if run_limbs(Task::Minv, model, data, Arguments { q, v: &[], x: &[], f_ext: &[] }) {
-            return &data.minv.Minv;
+    let method = data.methods.inverse;
+    match method {
+        InverseMethod::ArticulatedBodies => {
+            positions(model, &mut data.world, q);
+            aba::factors(model, &data.world, &mut data.aba);
+            minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv);
         }
-        crba(model, data, q);
-        minv::from_matrix(&mut data.minv, &data.crba.M);
-        return &data.minv.Minv;
+        _ if limbs::minv(model, data, q) => {}
+        _ => {
+            crba(model, data, q);
+            minv::from_matrix(&mut data.minv, &data.crba.M, method);
+        }
     }
-    positions(model, &mut data.world, q);
-    aba::factors(model, &data.world, &mut data.aba);
-    minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv);
     &data.minv.Minv
 }

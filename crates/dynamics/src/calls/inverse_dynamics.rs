@@ -1,7 +1,7 @@
 //! Inverse dynamics: efforts that produce a given motion of a robot.
 
 use super::kinematics::{forward_kinematics, forward_velocities};
-use super::limbs::{Task, run as run_limbs};
+use super::limbs;
 use crate::data::{Data, check_forces};
 use crate::lanes::limbs::pass::Arguments;
 use crate::passes::{coriolis, rnea, statics};
@@ -11,7 +11,7 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
 /// Runs RNEA with the limbs in parallel lanes if the robot has limbs, otherwise body by body.
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
-    if !run_limbs(Task::Rnea, model, data, arguments) {
+    if !limbs::rnea(model, data, arguments) {
         let Arguments { q, v, x: a, f_ext } = arguments;
         rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, f_ext);
     }

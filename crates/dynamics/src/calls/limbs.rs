@@ -10,23 +10,12 @@ use crate::lanes::limbs::lanes::Limbs;
 use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
 use crate::lanes::limbs::{LaneView, Plan};
 use crate::passes::kinematics::{PlacementCache, World, place};
-use crate::passes::{aba, crba, free_armature, rnea};
+use crate::passes::{aba, crba, free_armature, minv, rnea};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::gate::{FusedF64, Level, is, level, same};
 use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Scalar};
-
-/// Function to compute.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Task {
-    Rnea,
-    Aba,
-    Crba,
-    Minv,
-    RneaDerivatives,
-    AbaDerivatives,
-}
 
 register_kernel! {
     /// Computes τ by steps.
@@ -129,53 +118,144 @@ pub(crate) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &D
     (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
-/// Runs an algorithm with the limbs in parallel lanes, if the model and `data` have them. Returns whether it ran.
-/// Arguments that the algorithm does not use are empty.
+/// Model, plan, scratch in lanes and other data of a call, all of `f64`.
+struct Call<'a> {
+    model: &'a Model,
+    plan: &'a Plan,
+    s: &'a mut Scratch,
+    world: &'a mut World<f64>,
+    rnea: &'a mut rnea::Workspace<f64>,
+    aba: &'a mut aba::Workspace<f64>,
+    crba: &'a mut crba::Workspace<f64>,
+    minv: &'a mut minv::Workspace<f64>,
+    rnea_derivatives: &'a mut rnea_derivatives::Workspace<f64>,
+}
+
+/// Returns the parts of a call and its arguments, if the model and `data` have limbs in parallel lanes.
 #[inline]
-pub(crate) fn run<S: Scalar, R: Constant<S>>(
-    task: Task,
+fn call<'a, S: Scalar, R: Constant<S>>(
+    model: &'a Model<R>,
+    data: &'a mut Data<S>,
+    arguments: Arguments<'a, S>,
+) -> Option<(Call<'a>, Arguments<'a>)> {
+    let plan = ready(model, data)?;
+    // SAFETY: S and R are f64.
+    let (model, data, arguments): (&Model, &mut Data<f64>, _) = unsafe { (same(model), same(data), arguments.fused()) };
+    let Data { limbs, world, rnea, aba, crba, minv, rnea_derivatives, .. } = data;
+    let call = Call { model, plan, s: limbs.as_deref_mut()?, world, rnea, aba, crba, minv, rnea_derivatives };
+    Some((call, arguments))
+}
+
+/// Does as [`call`], for algorithms that do not support joints that share a coordinate.
+#[inline]
+fn call_without_mimic<'a, S: Scalar, R: Constant<S>>(
+    model: &'a Model<R>,
+    data: &'a mut Data<S>,
+    arguments: Arguments<'a, S>,
+) -> Option<(Call<'a>, Arguments<'a>)> {
+    if model.has_mimic() { None } else { call(model, data, arguments) }
+}
+
+impl Call<'_> {
+    /// Loads the arguments of forward dynamics and computes the placements.
+    fn place_free(&mut self, arguments: Arguments<'_>) {
+        load_free(self.model, self.plan, self.s, self.aba, arguments);
+        self.place();
+    }
+
+    /// Computes the placements of all steps, for arguments that are loaded.
+    fn place(&mut self) {
+        place_steps(self.model, self.plan, self.s);
+        self.world.placed = PlacementCache::Limbs(self.model.geometry_hash());
+    }
+}
+
+/// Computes [`rnea`](crate::rnea) with the limbs in parallel lanes, if the model and `data` have them. Returns whether
+/// it ran. This also holds for the functions below. The arguments must be valid.
+#[inline]
+pub(crate) fn rnea<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
     arguments: Arguments<'_, S>,
 ) -> bool {
-    let Some(plan) = ready(model, data) else { return false };
-    if model.has_mimic() && !matches!(task, Task::Rnea) {
-        return false; // joints that share a coordinate
-    }
-    // SAFETY: S and R are f64.
-    unsafe { enter(task, same(model), plan, same(data), arguments.fused()) }
+    let Some((c, arguments)) = call(model, data, arguments) else { return false };
+    load_steps(c.plan, c.s, arguments);
+    c.world.placed = PlacementCache::Nowhere;
+    let Arguments { v, x: a, f_ext, .. } = arguments;
+    rnea_by_steps(c.model, c.plan, c.s, [v, a], !f_ext.is_empty(), FusedF64::of_mut(&mut c.rnea.tau));
     true
 }
 
-/// Runs a task. The arguments must be valid.
-fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments: Arguments<'_>) {
-    let Some(s) = data.limbs.as_deref_mut() else { return };
-    let f_ext = !arguments.f_ext.is_empty();
-    match task {
-        Task::Aba | Task::AbaDerivatives => load_free(model, plan, s, &mut data.aba, arguments),
-        _ => load_steps(plan, s, arguments),
-    }
-    if let Task::Rnea = task {
-        data.world.placed = PlacementCache::Nowhere;
-        let [v, a] = [arguments.v, arguments.x];
-        return rnea_by_steps(model, plan, s, [v, a], f_ext, FusedF64::of_mut(&mut data.rnea.tau));
-    }
-    place_steps(model, plan, s);
-    data.world.placed = PlacementCache::Limbs(model.geometry_hash());
-    match task {
-        Task::Crba => crba_by_steps(model, plan, s, FusedF64::of_mut(data.crba.M.as_mut_slice())),
-        Task::Minv => factorize_by_steps(model, plan, s),
-        Task::Aba | Task::AbaDerivatives => aba_by_steps(model, plan, s, f_ext, FusedF64::of_mut(&mut data.aba.qdd)),
-        Task::Rnea | Task::RneaDerivatives => {}
-    }
-    if let Task::Minv | Task::AbaDerivatives = task {
-        inverse_by_steps(model, plan, s, FusedF64::of_mut(data.minv.Minv.as_mut_slice()));
-    }
-    if let Task::RneaDerivatives | Task::AbaDerivatives = task {
-        let matrices = data.rnea_derivatives.parts().1.map(FusedF64::of_mut);
-        let after_aba = matches!(task, Task::AbaDerivatives);
-        rnea_derivatives_by_steps(model, plan, s, after_aba, arguments.v, f_ext, matrices);
-    }
+/// Computes [`aba`](crate::aba()).
+#[inline]
+pub(crate) fn aba<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    arguments: Arguments<'_, S>,
+) -> bool {
+    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
+    c.place_free(arguments);
+    aba_by_steps(c.model, c.plan, c.s, !arguments.f_ext.is_empty(), FusedF64::of_mut(&mut c.aba.qdd));
+    true
+}
+
+/// Computes [`crba`](crate::crba()).
+#[inline]
+pub(crate) fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> bool {
+    let arguments = Arguments { q, v: &[], x: &[], f_ext: &[] };
+    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
+    load_steps(c.plan, c.s, arguments);
+    c.place();
+    crba_by_steps(c.model, c.plan, c.s, FusedF64::of_mut(c.crba.M.as_mut_slice()));
+    true
+}
+
+/// Computes [`minv`](crate::minv()).
+#[inline]
+pub(crate) fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> bool {
+    let arguments = Arguments { q, v: &[], x: &[], f_ext: &[] };
+    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
+    load_steps(c.plan, c.s, arguments);
+    c.place();
+    factorize_by_steps(c.model, c.plan, c.s);
+    inverse_by_steps(c.model, c.plan, c.s, FusedF64::of_mut(c.minv.Minv.as_mut_slice()));
+    true
+}
+
+/// Computes [`rnea_derivatives`](crate::rnea_derivatives()).
+#[inline]
+pub(crate) fn rnea_derivatives<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    arguments: Arguments<'_, S>,
+) -> bool {
+    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
+    load_steps(c.plan, c.s, arguments);
+    c.place();
+    let Arguments { v, x: a, f_ext, .. } = arguments;
+    let matrices = c.rnea_derivatives.parts().1.map(FusedF64::of_mut);
+    rnea_derivatives_by_steps(c.model, c.plan, c.s, false, v, !f_ext.is_empty(), matrices);
+    FusedF64::of_mut(&mut c.rnea_derivatives.qd).copy_from_slice(v);
+    FusedF64::of_mut(&mut c.rnea_derivatives.qdd).copy_from_slice(a);
+    true
+}
+
+/// Computes q̈, M⁻¹, and the derivatives of τ at q̈, for [`aba_derivatives`](crate::aba_derivatives()).
+#[inline]
+pub(crate) fn aba_derivatives<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    arguments: Arguments<'_, S>,
+) -> bool {
+    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
+    c.place_free(arguments);
+    let (v, f_ext) = (arguments.v, !arguments.f_ext.is_empty());
+    aba_by_steps(c.model, c.plan, c.s, f_ext, FusedF64::of_mut(&mut c.aba.qdd));
+    inverse_by_steps(c.model, c.plan, c.s, FusedF64::of_mut(c.minv.Minv.as_mut_slice()));
+    let matrices = c.rnea_derivatives.parts().1.map(FusedF64::of_mut);
+    rnea_derivatives_by_steps(c.model, c.plan, c.s, true, v, f_ext, matrices);
+    FusedF64::of_mut(&mut c.rnea_derivatives.qd).copy_from_slice(v);
+    true
 }
 
 /// Loads the arguments of forward dynamics into lanes. The efforts exclude the bias of free joints with armature.

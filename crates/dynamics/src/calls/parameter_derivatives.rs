@@ -140,7 +140,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
             }
             Input::Armature => {
                 for k in 0..model.nv() {
-                    to.add(k, k, pass.qdd[k]);
+                    to.add(k, k, self.qdd[k]);
                 }
                 for node in model.nodes()[1..].iter().filter(|node| node.joint == Joint::FreeFlyer) {
                     let part = |k: usize| Vec3::new(pass.qd[k], pass.qd[k + 1], pass.qd[k + 2]);

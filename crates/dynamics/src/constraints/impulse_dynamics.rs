@@ -24,7 +24,7 @@ use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Cross, Matrix, Motion, Scalar};
+use condyle_spatial::{Array, Cross, Matrix, Motion};
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {

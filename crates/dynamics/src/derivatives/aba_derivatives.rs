@@ -19,18 +19,16 @@
 use crate::derivatives::tree_solve::{self, minus_solve};
 use crate::passes::aba::{self};
 use crate::passes::kinematics::World;
-use crate::workspace::{filled, workspace, zero_matrix};
+use crate::workspace::{workspace, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Matrix, Scalar, Vec3};
+use condyle_spatial::{Matrix, Scalar, Vec3};
 use core::any::Any;
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Joint accelerations. Written by: `aba_derivatives`.
-        pub a: Array<S> = filled(S::zero, size.nv),
         /// ∂q̈/∂q. Written by: `aba_derivatives`.
         pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// ∂q̈/∂v. Written by: `aba_derivatives`.

@@ -55,11 +55,6 @@ impl<S: Scalar> Workspace<S> {
         let x = zeros(if paths.is_empty() { 0 } else { nv });
         Self { x, P: zeros(6 * places), A: zeros(6 * places), paths }
     }
-
-    /// Returns whether this method is used.
-    pub(crate) fn is_used(&self) -> bool {
-        !self.paths.is_empty()
-    }
 }
 
 fn paths(columns: &[Column]) -> Vec<Path> {

@@ -32,7 +32,7 @@ workspace! {
         pub pA: Array<Force<S>> = filled(Force::zero, size.body_depth),
         /// τ − Sᵀ pᴬ. Written by: `inward`.
         pub u: Array<S> = filled(S::zero, size.columns),
-        /// Joint accelerations. Written by: `outward`.
+        /// Joint accelerations. Written by: `outward`, `forward_dynamics`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
         /// τ without the bias of free joints with armature. Written by: `aba`.
         pub effort: Array<S> = filled(S::zero, size.nv),

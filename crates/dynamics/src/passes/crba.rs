@@ -8,7 +8,7 @@ use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Inertia, Matrix, Scalar};
+use condyle_spatial::{Act, Array, Inertia, Matrix};
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {

@@ -27,8 +27,6 @@ workspace! {
         pub sparse: Ltdl<S> = Ltdl::new(model),
         /// Dense factor of M. Written by: `forward_dynamics`.
         pub dense: Cholesky<S> = Cholesky::new(size.nv),
-        /// τ − h, then joint accelerations. Written by: `forward_dynamics`.
-        pub qdd: Array<S> = filled(S::zero, size.nv),
         /// Zeros, never overwritten.
         pub zero: Array<S> = filled(S::zero, model.nv()),
     }
@@ -43,22 +41,22 @@ fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
 }
 
 kernel! {
-    pub(crate) fn run_dense<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S]) {
-        let Workspace { dense, qdd, .. } = d;
+    /// Computes q̈ with the dense factor of M.
+    pub(crate) fn run_dense<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S], qdd: &mut [S]) {
         subtract(tau, h, qdd);
         if qdd.len() <= SHORT_CHAIN {
             return small_solve::<S, SHORT_CHAIN>(M, qdd);
         }
-        dense.factorize(M);
-        dense.solve(qdd); // M q̈ = τ − h
+        d.dense.factorize(M);
+        d.dense.solve(qdd); // M q̈ = τ − h
     }
 }
 
 kernel! {
-    pub(crate) fn run_sparse<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S]) {
-        let Workspace { sparse, qdd, .. } = d;
+    /// Computes q̈ with the sparse factor of M.
+    pub(crate) fn run_sparse<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S], qdd: &mut [S]) {
         subtract(tau, h, qdd);
-        sparse.factorize(M);
-        sparse.solve(qdd); // M q̈ = τ − h
+        d.sparse.factorize(M);
+        d.sparse.solve(qdd); // M q̈ = τ − h
     }
 }

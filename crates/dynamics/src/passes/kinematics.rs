@@ -7,7 +7,7 @@ use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Cross, Motion, Scalar, Se3};
+use condyle_spatial::{Array, Cross, Motion, Se3};
 
 workspace! {
     /// Quantities that depend on the position only, in the world's frame.

@@ -1,4 +1,4 @@
-//! Inverse of the joint-space inertia matrix, by one of three methods.
+//! Inverse of the joint-space inertia matrix, by one of three methods ([`InverseMethod`]).
 //!
 //! 1. Short chains: from M by Gauss–Jordan elimination, which needs no pivots if M is positive definite.
 //! 2. Short rows of the sparse factor ([`Ltdl`]): from M by that factor, in O(n d) operations per column.
@@ -8,7 +8,7 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
-use crate::selection::{SHORT_CHAIN, inverse_by_factor, is_short_chain};
+use crate::selection::{InverseMethod, SHORT_CHAIN};
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
@@ -29,12 +29,6 @@ workspace! {
         pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Sparse factor of M. Written by: `from_matrix`.
         pub factor: Ltdl<S> = Ltdl::new(model),
-    } same {
-        /// Whether M⁻¹ is computed by the sparse factor, the only method for joints that share coordinates. Written by:
-        /// `new`.
-        pub by_factor: bool = inverse_by_factor(model, factor.nonzeros()),
-        /// Whether M is inverted without a factor. Written by: `new`.
-        pub by_gauss_jordan: bool = is_short_chain(model),
     }
 }
 
@@ -90,9 +84,9 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
 }
 
 kernel! {
-    /// Computes M⁻¹ from M.
-    pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &Matrix<S>) {
-        if d.by_gauss_jordan {
+    /// Computes M⁻¹ from M by one of the two methods that need M.
+    pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &Matrix<S>, method: InverseMethod) {
+        if method == InverseMethod::GaussJordan {
             return gauss_jordan::<S, SHORT_CHAIN>(M, &mut d.Minv);
         }
         d.factor.factorize(M);

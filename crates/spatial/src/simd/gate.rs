@@ -16,13 +16,12 @@
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the vector registers of the
 //! SIMD level for a single state. [`level_function!`](crate::level_function) is for small functions that are called
-//! often, such as the tiles of dense kernels. It passes arguments in registers; the two other macros pass them as one
-//! value in memory.
+//! often, such as the tiles of dense kernels.
 #![allow(unsafe_code)]
 
 pub use crate::simd::fused_f64::FusedF64;
 pub use crate::simd::kernel::Kernel;
-pub use crate::simd::level::{Level, level};
+pub use crate::simd::level::{Level, NARROW, assert_supported, level};
 pub use crate::simd::pack::{Real, SimdToken};
 pub use crate::simd::same_layout::{Rename, SameLayout, same};
 use core::any::TypeId;
@@ -73,7 +72,7 @@ macro_rules! kernel {
     ) => {
         $(#[$doc])*
         #[inline]
-        #[allow(unsafe_code, clippy::too_many_arguments)]
+        #[allow(unsafe_code, unused_unsafe, clippy::too_many_arguments)]
         $vis fn $name<$S: $crate::Scalar $(, $R: $crate::Constant<$S>)?>($($arg: $type),*) {
             use $crate::simd::gate::{Kernel, is};
 
@@ -86,45 +85,55 @@ macro_rules! kernel {
                 }
             }
 
-            $crate::kernel!(@call f32, is::<$S, f32>() $(&& is::<$R, f64>())?, $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call f32 [], is::<$S, f32>() $(&& is::<$R, f64>())?, $S $($R)?, ($($arg: $type),*));
             if !$S::COMPILED {
                 return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             $(assert!(is::<$R, f64>(), "model constants for f64 and its lanes are f64");)?
             let f64 = is::<$S, f64>();
             $crate::if_vectors!({
-                use $crate::simd::gate::{FusedF64, Level, level};
+                use $crate::simd::gate::{FusedF64, Level, NARROW, assert_supported, level};
 
                 struct Gate;
-                // SAFETY: the code for each scalar is entered through the scalar's `enter`.
+                // SAFETY: the code for each scalar is entered after the check that the processor has the scalar's instructions.
                 unsafe impl $crate::simd::gate::SimdToken for Gate {}
                 type Narrow = $crate::simd::gate::Narrow<Gate>;
                 type Wide = $crate::simd::gate::Wide<Gate>;
 
                 let fused = f64 && level() > Level::Baseline;
-                $crate::kernel!(@call FusedF64, is::<$S, FusedF64>(), $S $($R)?, ($($arg: $type),*), numbers if fused);
-                $crate::kernel!(@call Narrow, is::<$S, Narrow>(), $S $($R)?, ($($arg: $type),*));
-                $crate::kernel!(@call Wide, is::<$S, Wide>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(
+                    @call FusedF64 ["avx2,fma" NARROW], is::<$S, FusedF64>(), $S $($R)?, ($($arg: $type),*),
+                    numbers if fused
+                );
+                $crate::kernel!(
+                    @call Narrow ["avx2,fma" NARROW], is::<$S, Narrow>(), $S $($R)?, ($($arg: $type),*)
+                );
+                $crate::kernel!(
+                    @call Wide ["avx512f,avx512dq,avx512vl,avx512bw,avx2,fma" Level::Avx512],
+                    is::<$S, Wide>(), $S $($R)?, ($($arg: $type),*)
+                );
             } else {});
-            $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
+            $crate::kernel!(@call f64 [], f64, $S $($R)?, ($($arg: $type),*));
         }
     };
-    // Calls the function that is compiled for one scalar if `$S` is this scalar. With `numbers if`, calls it for `f64`,
-    // too, if the condition holds.
+    // Calls the function that is compiled for one scalar, with its instructions and their level, if `$S` is this
+    // scalar. With `numbers if`, calls it for `f64`, too, if the condition holds.
     (
-        @call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)
-        $(, numbers if $fused:expr)?
+        @call $scalar:ident [$($instructions:literal $level:expr)?], $chosen:expr, $S:ident $($R:ident)?,
+        ($($arg:ident: $type:ty),*) $(, numbers if $fused:expr)?
     ) => {
         let chosen = $chosen;
         {
             type $S = $scalar;
             $(type $R = f64;)?
             #[inline(never)]
+            $(#[cfg_attr(target_arch = "x86_64", target_feature(enable = $instructions))])?
             fn compiled($($arg: $type),*) {
-                $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
+                Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData).run();
             }
             if chosen {
-                // SAFETY: R is f64, and S is this scalar.
+                $(assert_supported($level);)?
+                // SAFETY: R is f64, S is this scalar, and the processor has its instructions.
                 return unsafe { compiled($($crate::simd::gate::same($arg)),*) };
             }
             $crate::kernel!(@renamed ($($fused)?), $S $($R)?, ($($arg: $type),*));
@@ -136,13 +145,11 @@ macro_rules! kernel {
         {
             type $S = f64;
             $(type $R = f64;)?
-            #[inline(always)]
-            fn renamed($($arg: $type),*) {
-                compiled($($crate::simd::gate::Rename::renamed($arg)),*);
-            }
             if fused {
                 // SAFETY: R and S are f64.
-                return unsafe { renamed($($crate::simd::gate::same($arg)),*) };
+                $(let $arg: $type = unsafe { $crate::simd::gate::same($arg) };)*
+                // SAFETY: the processor has vectors, because the level in use is above the baseline.
+                return unsafe { compiled($($crate::simd::gate::Rename::renamed($arg)),*) };
             }
         }
     };
@@ -156,7 +163,7 @@ macro_rules! kernel {
 macro_rules! register_kernel {
     ($(#[$doc:meta])* $vis:vis fn $name:ident<$V:ident>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
         $(#[$doc])*
-        #[allow(unsafe_code, clippy::too_many_arguments)]
+        #[allow(unsafe_code, unused_unsafe, clippy::too_many_arguments)]
         $vis fn $name($($arg: $type),*) {
             use $crate::simd::gate::Kernel;
 
@@ -169,24 +176,40 @@ macro_rules! register_kernel {
                 }
             }
 
-            let work = ($($arg,)*);
             $crate::if_vectors!({
-                use $crate::simd::gate::{Level, level};
+                use $crate::simd::gate::{Level, NARROW, assert_supported, level};
 
                 struct Gate;
-                // SAFETY: the code for a kind of register is entered through the `enter` of these registers.
+                // SAFETY: the code for these registers is entered after the check that the processor has their
+                // instructions.
                 unsafe impl $crate::simd::gate::SimdToken for Gate {}
                 type Narrow = $crate::simd::gate::Narrow<Gate>;
                 type Wide = $crate::simd::gate::Wide<Gate>;
 
+                #[inline(never)]
+                #[cfg_attr(
+                    target_arch = "x86_64",
+                    target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")
+                )]
+                fn wide($($arg: $type),*) {
+                    Work::<_, Wide>(($($arg,)*), ::core::marker::PhantomData).run();
+                }
+                #[inline(never)]
+                #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
+                fn narrow($($arg: $type),*) {
+                    Work::<_, Narrow>(($($arg,)*), ::core::marker::PhantomData).run();
+                }
                 if level() >= Level::Avx512 {
-                    <Wide as $crate::Scalar>::enter(Work::<_, Wide>(work, ::core::marker::PhantomData));
+                    // SAFETY: the processor has the level in use.
+                    unsafe { wide($($arg),*) }
                 } else {
-                    <Narrow as $crate::Scalar>::enter(Work::<_, Narrow>(work, ::core::marker::PhantomData));
+                    assert_supported(NARROW);
+                    // SAFETY: the processor has these instructions.
+                    unsafe { narrow($($arg),*) }
                 }
             } else {
                 // This code is never executed on targets without vectors, but it would be correct.
-                <f64 as $crate::Scalar>::enter(Work::<_, f64>(work, ::core::marker::PhantomData));
+                Work::<_, f64>(($($arg,)*), ::core::marker::PhantomData).run();
             });
         }
     };

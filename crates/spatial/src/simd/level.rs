@@ -38,7 +38,8 @@ pub enum Level {
 }
 
 /// SIMD level with vectors of four numbers, on the architecture for which this crate is compiled.
-pub(crate) const NARROW: Level = if cfg!(target_arch = "aarch64") {
+#[doc(hidden)]
+pub const NARROW: Level = if cfg!(target_arch = "aarch64") {
     Level::Neon
 } else if cfg!(target_arch = "wasm32") {
     Level::Simd128
@@ -146,8 +147,9 @@ pub fn level() -> Level {
 
 /// Panics if this processor does not have a level. Each function that enters code compiled for a level calls
 /// `assert_supported`.
+#[doc(hidden)]
 #[inline(always)]
-pub(crate) fn assert_supported(level: Level) {
+pub fn assert_supported(level: Level) {
     /// Best level of this processor; 0 before the first query. (A processor with this level also has all lower levels
     /// of its architecture.)
     static BEST: AtomicU8 = AtomicU8::new(0);

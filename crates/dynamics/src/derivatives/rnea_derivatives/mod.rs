@@ -31,7 +31,7 @@ use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Vec3};
 use vectorized::Rows;
 
 workspace! {
@@ -61,8 +61,9 @@ workspace! {
 workspace! {
     pub(crate) struct Workspace<S>(size) {
         pub bodies: Bodies<S> = Bodies::new(size),
-        /// Velocity and acceleration coordinates. Written by: `rnea_derivatives`.
+        /// Velocity coordinates. Written by: `run`, `aba_derivatives`, `rnea_derivatives`.
         pub qd: Array<S> = filled(S::zero, size.nv),
+        /// Acceleration coordinates that a caller gave. Written by: `rnea_derivatives`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
         /// Zeros, used as accelerations. Written by: `new`.
         pub still: Array<S> = filled(S::zero, size.nv),
@@ -198,7 +199,6 @@ kernel! {
         let minus_gravity = if world.is_empty() { l.minus_gravity() } else { world[0] };
         let by_rows = pairs_by_rows::<S, R>(model);
         d.qd.copy_from_slice(v);
-        d.qdd.copy_from_slice(a);
         pass(&l, w, d.parts(), v, a, f_ext, minus_gravity, by_rows);
         if by_rows {
             vectorized::pairs(model, w, d);

@@ -7,13 +7,13 @@ use crate::derivatives::rnea_derivatives;
 use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::passes::rnea;
+use crate::selection;
 use crate::workspace::{Size, filled};
 use alloc::boxed::Box;
 use condyle_model::Model;
 use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::lanes;
-use condyle_spatial::gate::{FusedF64, Rename, is, same};
-use condyle_spatial::level::{Level, level};
+use condyle_spatial::gate::{FusedF64, Rename, same};
 use condyle_spatial::{Array, Force, Inertia, Scalar};
 
 /// Scratch and results of passes in lanes.
@@ -38,7 +38,7 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Allocates the scratch for a model with limbs, if the processor supports lanes.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
-        let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
+        let plan = selection::limbs::<S, R>(model)?;
         let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
         let size = Size { bodies: steps, columns: nv + plan.columns.copies.len(), depth: 0, body_depth: steps, nv };
         let zeros = filled(Four::zero, nv);

@@ -4,7 +4,7 @@ use super::kernel::KnotGroup;
 use crate::robot::knot::unpack;
 use condyle_dynamics::{Data, Model, gravity, rnea, rnea_derivatives, static_torque_derivative};
 use condyle_spatial::block::Block;
-use condyle_spatial::{Scalar, kernel};
+use condyle_spatial::kernel;
 use nalgebra::DMatrix;
 
 /// M q̈ + h − g at knots with contacts, else −g.
