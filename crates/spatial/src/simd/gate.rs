@@ -95,7 +95,8 @@ macro_rules! kernel {
                 use $crate::simd::gate::{FusedF64, Level, NARROW, assert_supported, level};
 
                 struct Gate;
-                // SAFETY: the code for each scalar is entered after the check that the processor has the scalar's instructions.
+                // SAFETY: the code for each scalar is entered after the check that the processor has the scalar's
+                // instructions.
                 unsafe impl $crate::simd::gate::SimdToken for Gate {}
                 type Narrow = $crate::simd::gate::Narrow<Gate>;
                 type Wide = $crate::simd::gate::Wide<Gate>;
