@@ -47,7 +47,7 @@ ALIASES = {
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
     "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
-    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | ContactInverseDynamics"
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | FreeInverseDynamics | ContactInverseDynamics"
     " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction",
 }
 
@@ -164,7 +164,7 @@ ARGUMENTS = {
     "_Polynomial": "controls",
     "_Action": "action Problem.terminal",
     "Sequence[_Action]": "models",
-    "Sequence[int] | None": "stages",
+    "Sequence[int] | None": "knot_models",
     "_Controls": "us",
     "Problem": "problem",
     # arrays of floats, or of numbers that carry their derivatives
@@ -173,7 +173,7 @@ ARGUMENTS = {
         Action.calc_diff DifferentialAction.calc_diff Residual.own_cost.calc_diff""",
     "_Space": "space",
     "Callable[[Iteration], object]": "callback",
-    "Sequence[LqNode]": "nodes",
+    "Sequence[LqKnot]": "knots",
     "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
     "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc Residual.own_cost.calc",
     "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
@@ -209,7 +209,7 @@ RESULTS = {
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
-        InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
@@ -296,7 +296,7 @@ RESULTS = {
     "GroundContacts": "Simulation.contacts",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
     "Evaluation": "Problem.evaluate Problem._evaluate",
-    "list[LqNode]": "Problem.derivatives",
+    "list[LqKnot]": "Problem.derivatives",
     "SweepResult": "Sweep.run",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",

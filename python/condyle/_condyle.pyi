@@ -38,7 +38,7 @@ from ._types import (
     ImpulseDerivatives,
     Iteration,
     Limits,
-    LqNode,
+    LqKnot,
     Mimic,
     ModelWarning,
     Outcome,
@@ -79,7 +79,7 @@ __all__ = [
     "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
-    "InverseDynamics",
+    "FreeInverseDynamics",
     "Joint",
     "Limit",
     "Lqr",
@@ -249,7 +249,7 @@ _Action: TypeAlias = (
     FreeDynamics
     | ContactDynamics
     | ImpulseDynamics
-    | InverseDynamics
+    | FreeInverseDynamics
     | ContactInverseDynamics
     | Lqr
     | Unicycle
@@ -3157,7 +3157,7 @@ class ImpulseDynamics:
         """Returns an empty array, since an impact has no controls."""
 
 @final
-class InverseDynamics:
+class FreeInverseDynamics:
     """A knot of a robot whose nv controls are its accelerations: q̈ = u, τ = rnea(q, v, u); otherwise as `FreeDynamics`.
 
     model: the robot.
@@ -3178,9 +3178,9 @@ class InverseDynamics:
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
         controls: _Polynomial = "constant",
-    ) -> InverseDynamics: ...
+    ) -> FreeInverseDynamics: ...
     @staticmethod
-    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> InverseDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> FreeInverseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """Returns the accelerations that hold the robot still: nv zeros."""
 
@@ -3235,10 +3235,10 @@ class Problem:
     """An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
-        `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-    stages: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive knots
-        with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
+        `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+    knot_models: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive
+        knots with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
         differ only in their costs and limits.
     terminal: the model of the terminal knot, without controls.
 
@@ -3248,7 +3248,7 @@ class Problem:
     """
 
     def __new__(
-        cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int] | None, terminal: _Action
+        cls, x0: ArrayLike, models: Sequence[_Action], knot_models: Sequence[int] | None, terminal: _Action
     ) -> Problem: ...
     @property
     def horizon(self) -> int:
@@ -3270,9 +3270,9 @@ class Problem:
         """Computes the evaluation of a solution, unless the horizon was shifted since."""
 
     @staticmethod
-    def _from_parts(x0: ArrayLike, parts: Sequence[Any], stages: Sequence[int] | None) -> Problem: ...
-    def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqNode]:
-        """Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqNode`s, which a `Sweep`
+    def _from_parts(x0: ArrayLike, parts: Sequence[Any], knot_models: Sequence[int] | None) -> Problem: ...
+    def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqKnot]:
+        """Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqKnot`s, which a `Sweep`
         solves.
 
         xs, us: as for `evaluate`.
@@ -3333,8 +3333,8 @@ class Problem:
         """
 
     def to_json(self) -> str:
-        """Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
-        is null.
+        """Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
+        infinite bound is null.
 
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
         different robots.
@@ -3486,7 +3486,7 @@ class Residual:
 class Sweep:
     """The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
 
-    nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
+    knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
     controls.
 
     Raises `ProblemError` if their shapes do not fit together.
@@ -3499,7 +3499,7 @@ class Sweep:
     True
     """
 
-    def __new__(cls, nodes: Sequence[LqNode]) -> Sweep: ...
+    def __new__(cls, knots: Sequence[LqKnot]) -> Sweep: ...
     def run(self, regularisation: float = 0.0) -> SweepResult:
         """Computes the feedback and the value functions, as a `SweepResult`.
 

@@ -661,7 +661,7 @@ class Solution(_Solution):
         return type(self), tuple(self)
 
 
-class LqNode(NamedTuple):
+class LqKnot(NamedTuple):
     """A knot's linear-quadratic problem: δx⁺ = A δx + B δu + f, ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu."""
 
     A: ArrayLike
@@ -817,7 +817,7 @@ _MODULES = {
     "Solution": "optimal",
     "Evaluation": "optimal",
     "SweepResult": "optimal",
-    "LqNode": "optimal",
+    "LqKnot": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
     "Ground": "simulation",

@@ -48,7 +48,7 @@ from ._condyle import (
     ContactInverseDynamics,
     FreeDynamics,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Lqr,
     Model,
     Problem,
@@ -160,7 +160,7 @@ _Knot = (
     | ContactInverseDynamics
     | FreeDynamics
     | ImpulseDynamics
-    | InverseDynamics
+    | FreeInverseDynamics
     | Lqr
     | Problem
     | Unicycle
@@ -183,7 +183,7 @@ def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
 
     First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. The Hessian of a robot's cost
     is Gauss–Newton's, w (∂r)ᵀ a″ ∂r; for an `Lqr` and a `Unicycle` it is exact. The Hessian of the next state is exact
-    for these two, and for `FreeDynamics` and `InverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and
+    for these two, and for `FreeDynamics` and `FreeInverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and
     Runge–Kutta steps are treated as linear in the tangent space of the state. The optimum is the same; an optimiser may
     need more iterations.
 

@@ -39,7 +39,7 @@ from ._condyle import (
     FreeDynamics,
     FrictionCone,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Limit,
     Lqr,
     Problem,
@@ -49,7 +49,7 @@ from ._condyle import (
     Unicycle,
     WrenchCone,
 )
-from ._types import Evaluation, Iteration, LqNode, Outcome, Solution, SweepResult, Timings
+from ._types import Evaluation, Iteration, LqKnot, Outcome, Solution, SweepResult, Timings
 
 __all__ = [
     "Action",
@@ -65,10 +65,10 @@ __all__ = [
     "FreeDynamics",
     "FrictionCone",
     "ImpulseDynamics",
-    "InverseDynamics",
+    "FreeInverseDynamics",
     "Iteration",
     "Limit",
-    "LqNode",
+    "LqKnot",
     "Lqr",
     "Outcome",
     "Problem",

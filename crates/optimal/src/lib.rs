@@ -9,7 +9,7 @@
 //!   knots, or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
 //! - A [`Problem`] is a horizon of action models.
 //! - Around a trajectory, the problem is approximated as linear-quadratic in the changes δx, δu; each knot is then an
-//!   [`LqNode`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
+//!   [`LqKnot`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
 //!   value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
@@ -87,7 +87,7 @@ pub use constrained::{
 };
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
-pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
+pub use lq::{DynamicsStructure, EulerBlock, Hessian, KnotFeedback, LqKnot, Sweep, SweepError};
 pub use nalgebra;
 pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]

@@ -29,10 +29,10 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
 ///
 /// x0: the initial state, nx numbers.
-/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
-///     `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-/// stages: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive knots
-///     with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
+/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
+///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+/// knot_models: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive
+///     knots with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
 ///     differ only in their costs and limits.
 /// terminal: the model of the terminal knot, without controls.
 ///
@@ -63,10 +63,10 @@ impl Problem {
     fn new(
         x0: &Bound<'_, PyAny>,
         models: Vec<Bound<'_, PyAny>>,
-        stages: Option<Vec<usize>>,
+        knot_models: Option<Vec<usize>>,
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let stages = stages.unwrap_or_else(|| (0..models.len()).collect());
+        let knot_models = knot_models.unwrap_or_else(|| (0..models.len()).collect());
         let fault = Fault::default();
         let ends = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
         let all = ends.map(|(model, end)| boxed(model, end, &fault)).collect::<PyResult<Vec<_>>>()?;
@@ -76,7 +76,7 @@ impl Problem {
             Some(_) => None,
         });
         let (objects, written) = (objects.collect(), each.flat_map(residuals).collect());
-        Self::make(numbers("x0", x0)?, all, stages, (objects, written), fault)
+        Self::make(numbers("x0", x0)?, all, knot_models, (objects, written), fault)
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -97,11 +97,11 @@ impl Problem {
         let knots = data.knots.into_iter().chain([data.terminal]);
         let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
         let objects = all.iter().map(|_| None).collect();
-        Self::make(data.x0, all, data.stages, (objects, vec![]), Fault::default())
+        Self::make(data.x0, all, data.knot_models, (objects, vec![]), Fault::default())
     }
 
-    /// Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
-    /// is null.
+    /// Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
+    /// infinite bound is null.
     ///
     /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
     /// different robots.
@@ -133,8 +133,8 @@ impl Problem {
         }
         let terminal = knots.pop().expect("the terminal one is there");
         let model = first.expect("the terminal one is there");
-        let (x0, stages) = (problem.x0().to_vec(), problem.stages().to_vec());
-        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, stages, terminal };
+        let (x0, knot_models) = (problem.x0().to_vec(), problem.knot_models().to_vec());
+        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, knot_models, terminal };
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
@@ -158,12 +158,12 @@ impl Problem {
             parts.push((model, text, written).into_pyobject(py)?.into_any().unbind());
         }
         let problem = lock("problem", &this.inner)?;
-        let arguments = (problem.x0().to_vec(), parts, problem.stages().to_vec());
+        let arguments = (problem.x0().to_vec(), parts, problem.knot_models().to_vec());
         Ok((slf.get_type().getattr("_from_parts")?, arguments).into_pyobject(py)?.into_any())
     }
 
     #[staticmethod]
-    fn _from_parts(x0: Vec<f64>, parts: Vec<Bound<'_, PyAny>>, stages: Vec<usize>) -> PyResult<Self> {
+    fn _from_parts(x0: Vec<f64>, parts: Vec<Bound<'_, PyAny>>, knot_models: Vec<usize>) -> PyResult<Self> {
         let (fault, last) = (Fault::default(), parts.len().saturating_sub(1));
         let (mut all, mut objects, mut kept) = (Vec::new(), Vec::new(), Vec::new());
         for (k, part) in parts.iter().enumerate() {
@@ -181,7 +181,7 @@ impl Problem {
         if all.is_empty() {
             return Err(ProblemError::new_err("parts: expected at least a terminal model"));
         }
-        Self::make(x0, all, stages, (objects, kept), fault)
+        Self::make(x0, all, knot_models, (objects, kept), fault)
     }
 
     /// The number of knots before the terminal one, N.
@@ -246,7 +246,7 @@ impl Problem {
         if knot > horizon {
             return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {horizon}")));
         }
-        let k = problem.stages().get(knot).copied();
+        let k = problem.knot_models().get(knot).copied();
         let mut described = lock("problem", &self.described)?;
         let last = described.len() - 1;
         let described = &mut described[k.unwrap_or(last)];
@@ -315,7 +315,7 @@ impl Problem {
         self.evaluate(py, xs, us)
     }
 
-    /// Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqNode`s, which a `Sweep`
+    /// Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqKnot`s, which a `Sweep`
     /// solves.
     ///
     /// xs, us: as for `evaluate`.
@@ -329,15 +329,15 @@ impl Problem {
         let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
         let xs = matrix("xs", xs, [horizon + 1, nx])?;
         let us = controls(&problem, us)?;
-        let (mut nodes, mut next, mut costs) = (problem.nodes(), vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
+        let (mut lq_knots, mut next, mut costs) = (problem.lq_knots(), vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
         problem.calc(&xs, &us, &mut next, &mut costs);
-        problem.calc_diff(&xs, &us, &mut nodes);
+        problem.calc_diff(&xs, &us, &mut lq_knots);
         self.raise()?;
-        // the gap at the next state is stored in the node of the knot before
-        for (node, gap) in nodes.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
-            node.f.copy_from_slice(gap);
+        // the gap at the next state is stored in the knot of the knot before
+        for (knot, gap) in lq_knots.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
+            knot.f.copy_from_slice(gap);
         }
-        give(py, &nodes)
+        give(py, &lq_knots)
     }
 
     fn __repr__(&self) -> PyResult<String> {
@@ -377,13 +377,13 @@ impl Problem {
     fn make(
         x0: Vec<f64>,
         all: Vec<Boxed>,
-        stages: Vec<usize>,
+        knot_models: Vec<usize>,
         (objects, written): (Vec<Option<Py<PyAny>>>, Vec<Py<PyAny>>),
         fault: Fault,
     ) -> PyResult<Self> {
         let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
         let end = actions.pop().expect("the terminal one is there");
-        let problem = rust::Problem::new(x0, actions, stages, end).map_err(problem_error)?;
+        let problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
         let described: Vec<Option<Arc<Described>>> = described;
         let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
         let (inner, described) = (Mutex::new(problem), Mutex::new(described));

@@ -2,7 +2,7 @@
 
 use super::path_constraint::{self, PathConstraint};
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
 use core::fmt;
 use nalgebra::DMatrix;
@@ -60,7 +60,7 @@ impl Constrained {
 
     /// Adds the gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, …. Here d and D are the
     /// term's first and second derivatives with respect to g.
-    fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
             let Self { action, constraint: g, gx, gu, .. } = self;
@@ -78,21 +78,21 @@ impl Constrained {
             for a in 0..ndx {
                 let ga = self.gx[(i, a)];
                 if ga != 0.0 {
-                    node.q[a] += ga * w;
+                    knot.q[a] += ga * w;
                     for b in 0..ndx {
-                        node.Q[(b, a)] += d * ga * self.gx[(i, b)];
+                        knot.Q[(b, a)] += d * ga * self.gx[(i, b)];
                     }
                     for b in 0..nu {
-                        node.S[(a, b)] += d * ga * self.gu[(i, b)];
+                        knot.S[(a, b)] += d * ga * self.gu[(i, b)];
                     }
                 }
             }
             for a in 0..nu {
                 let ga = self.gu[(i, a)];
                 if ga != 0.0 {
-                    node.r[a] += ga * w;
+                    knot.r[a] += ga * w;
                     for b in 0..nu {
-                        node.R[(b, a)] += d * ga * self.gu[(i, b)];
+                        knot.R[(b, a)] += d * ga * self.gu[(i, b)];
                     }
                 }
             }
@@ -124,8 +124,8 @@ impl ActionModel for Constrained {
         self.action.lanes()
     }
 
-    fn is_end(&self) -> bool {
-        self.action.is_end()
+    fn is_terminal(&self) -> bool {
+        self.action.is_terminal()
     }
 
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
@@ -137,9 +137,9 @@ impl ActionModel for Constrained {
         cost + self.term(t, x, u)
     }
 
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.action.calc_diff(t, x, u, node);
-        self.add_derivatives(t, x, u, node);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.action.calc_diff(t, x, u, knot);
+        self.add_derivatives(t, x, u, knot);
     }
 
     #[track_caller]
@@ -152,12 +152,12 @@ impl ActionModel for Constrained {
     }
 
     #[track_caller]
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         let (nx, nu) = (self.nx(), self.nu());
-        assert_length("nodes", nodes.len(), knots.len());
-        self.action.calc_diff_group(knots, xs, us, nodes);
+        assert_length("lq_knots", lq_knots.len(), knots.len());
+        self.action.calc_diff_group(knots, xs, us, lq_knots);
         for (i, &t) in knots.iter().enumerate() {
-            self.add_derivatives(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+            self.add_derivatives(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut lq_knots[i]);
         }
     }
 
@@ -175,16 +175,16 @@ impl ActionModel for Constrained {
         self.action.outputs(t, x, u, show);
     }
 
-    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
-        self.action.hold(t, x)
+    fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        self.action.quasi_static(t, x)
     }
 
     fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
         Some(&mut *self.action)
     }
 
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        let (action, constraint) = (self.action.fork()?, self.constraint.fork()?);
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
+        let (action, constraint) = (self.action.try_clone()?, self.constraint.try_clone()?);
         let Self { multipliers, g, d, dd, gx, gu, .. } = self;
         let (multipliers, [g, d, dd]) = (multipliers.clone(), [g, d, dd].map(Vec::clone));
         Some(Box::new(Self { action, constraint, multipliers, g, d, dd, gx: gx.clone(), gu: gu.clone() }))

@@ -28,7 +28,7 @@ use std::time::Duration;
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, AugmentedLagrangian, Constrained, LqNode, PathConstraint, Problem, Status};
+/// use condyle_optimal::{ActionModel, AugmentedLagrangian, Constrained, LqKnot, PathConstraint, Problem, Status};
 /// use nalgebra::DMatrix;
 /// # struct Integrator { nu: usize }
 /// # impl ActionModel for Integrator {
@@ -39,14 +39,14 @@ use std::time::Duration;
 /// #         next[0] = x[0] + u;
 /// #         0.5 * u * u
 /// #     }
-/// #     fn calc_diff(&mut self, _: usize, _: &[f64], u: &[f64], node: &mut LqNode) {
-/// #         node.A[0] = 1.0;
-/// #         node.Q.fill(0.0);
-/// #         node.q.fill(0.0);
-/// #         node.B.fill(1.0);
-/// #         node.S.fill(0.0);
-/// #         node.R.fill(1.0);
-/// #         node.r.copy_from_slice(u);
+/// #     fn calc_diff(&mut self, _: usize, _: &[f64], u: &[f64], knot: &mut LqKnot) {
+/// #         knot.A[0] = 1.0;
+/// #         knot.Q.fill(0.0);
+/// #         knot.q.fill(0.0);
+/// #         knot.B.fill(1.0);
+/// #         knot.S.fill(0.0);
+/// #         knot.R.fill(1.0);
+/// #         knot.r.copy_from_slice(u);
 /// #     }
 /// # }
 /// /// x = 3.
@@ -337,10 +337,10 @@ impl AugmentedLagrangian {
         let Self { settings, solver, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
         let Solution { xs, us, gap, cost, .. } = &solver.solution;
-        for node in &mut solver.nodes {
-            node.inverse_dynamics.wanted = false; // r and B are read
+        for knot in &mut solver.lq_knots {
+            knot.inverse_dynamics.wanted = false; // r and B are read
         }
-        problem.calc_diff(xs, us, &mut solver.nodes);
+        problem.calc_diff(xs, us, &mut solver.lq_knots);
         let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
         let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);
         (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - measured.terms, 0.0);
@@ -352,12 +352,12 @@ impl AugmentedLagrangian {
         };
         let primal = larger(*gap, measured.rest);
         let mut slope_of_free = 0.0; // controls that are not pressed against a bound
-        lambda.copy_from(&solver.nodes[horizon].q);
+        lambda.copy_from(&solver.lq_knots[horizon].q);
         for t in (0..horizon).rev() {
-            let node = &solver.nodes[t];
+            let knot = &solver.lq_knots[t];
             let u = &us[problem.control_range(t)];
             for (j, u) in u.iter().enumerate() {
-                let slope = node.r[j] + node.B.column(j).dot(lambda);
+                let slope = knot.r[j] + knot.B.column(j).dot(lambda);
                 let (lower, upper) = match problem.action(t).bounds(t) {
                     Some((lower, upper)) => (lower[j], upper[j]),
                     None => (f64::NEG_INFINITY, f64::INFINITY),
@@ -369,8 +369,8 @@ impl AugmentedLagrangian {
                     slope_of_free = larger(slope_of_free, slope.abs());
                 }
             }
-            before.copy_from(&node.q);
-            before.gemv_tr(1.0, &node.A, lambda, 1.0);
+            before.copy_from(&knot.q);
+            before.gemv_tr(1.0, &knot.A, lambda, 1.0);
             std::mem::swap(lambda, before);
         }
         for number in [&mut outcome.cost, &mut outcome.primal, &mut outcome.dual] {

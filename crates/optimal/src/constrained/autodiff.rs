@@ -114,7 +114,7 @@ impl<C: GenericConstraint> PathConstraint for AutoDiffConstraint<C> {
         true
     }
 
-    fn fork(&self) -> Option<Box<dyn PathConstraint>> {
+    fn try_clone(&self) -> Option<Box<dyn PathConstraint>> {
         Some(Box::new(self.clone()))
     }
 }

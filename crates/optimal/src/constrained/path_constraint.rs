@@ -48,8 +48,8 @@ pub trait PathConstraint: Any + Send + Sync {
         false
     }
 
-    /// Returns a copy that computes the same, as [`ActionModel::fork`] does; `None` by default.
-    fn fork(&self) -> Option<Box<dyn PathConstraint>> {
+    /// Returns a copy that computes the same, as [`ActionModel::try_clone`] does; `None` by default.
+    fn try_clone(&self) -> Option<Box<dyn PathConstraint>> {
         None
     }
 }

@@ -127,9 +127,9 @@ impl Fddp {
         if !now.swept {
             return; // keep the gains of the previous solve, shifted or not
         }
-        for ((K, k), knot) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.knots()) {
-            K.copy_from(&knot.K);
-            k.copy_from(&knot.k);
+        for ((K, k), feedback) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.feedback()) {
+            K.copy_from(&feedback.K);
+            k.copy_from(&feedback.k);
         }
     }
 }

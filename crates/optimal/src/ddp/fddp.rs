@@ -10,7 +10,7 @@ use super::search::LineSearch;
 use super::settings::Settings;
 use super::solution::{Solution, Timings};
 use crate::error::Error;
-use crate::lq::{Hessian, LqNode, Sweep, SweepError};
+use crate::lq::{Hessian, LqKnot, Sweep, SweepError};
 use crate::problem::{ActionModel, Problem};
 use crate::time::Instant;
 use condyle_linalg::max_abs;
@@ -45,7 +45,7 @@ use std::time::Duration;
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, Fddp, LqNode, Problem, Status};
+/// use condyle_optimal::{ActionModel, Fddp, LqKnot, Problem, Status};
 /// # struct Integrator { nu: usize }
 /// # impl ActionModel for Integrator {
 /// #     fn nx(&self) -> usize { 1 }
@@ -55,12 +55,12 @@ use std::time::Duration;
 /// #         next[0] = x[0] + u;
 /// #         0.5 * (x[0] * x[0] + u * u)
 /// #     }
-/// #     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-/// #         (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[0]);
-/// #         node.B.fill(1.0);
-/// #         node.S.fill(0.0);
-/// #         node.R.fill(1.0);
-/// #         node.r.copy_from_slice(u);
+/// #     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+/// #         (knot.A[0], knot.Q[0], knot.q[0]) = (1.0, 1.0, x[0]);
+/// #         knot.B.fill(1.0);
+/// #         knot.S.fill(0.0);
+/// #         knot.R.fill(1.0);
+/// #         knot.r.copy_from_slice(u);
 /// #     }
 /// # }
 /// // x⁺ = x + u, ℓ = ½ (x² + u²): linear and quadratic, so the first step is the last.
@@ -79,14 +79,14 @@ use std::time::Duration;
 pub struct Fddp {
     /// Settings; may be changed between solves.
     pub settings: Settings,
-    pub(crate) nodes: Vec<LqNode>,
+    pub(crate) lq_knots: Vec<LqKnot>,
     pub(super) sweep: Sweep,
     pub(super) line_search: LineSearch,
     /// Solution, whose trajectory is the iterate.
     pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
     pub(super) next: Vec<f64>,
-    /// Accelerations and forces of the iterate, N equal parts, for nodes in inverse-dynamics form.
+    /// Accelerations and forces of the iterate, N equal parts, for knots in inverse-dynamics form.
     pub(super) motions: Vec<f64>,
     /// Whether `motions` belongs to the iterate.
     pub(super) knows_motions: bool,
@@ -124,13 +124,13 @@ const FORESEEN: usize = 10_000;
 impl Fddp {
     /// Creates a solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
-        let (mut nodes, shape) = (problem.nodes(), problem.shape());
-        problem.reserve_inverse_dynamics(&mut nodes);
+        let (mut lq_knots, shape) = (problem.lq_knots(), problem.shape());
+        problem.reserve_inverse_dynamics(&mut lq_knots);
         let horizon = problem.horizon();
         Self {
             settings: Settings::default(),
-            sweep: Sweep::new(&nodes),
-            nodes,
+            sweep: Sweep::new(&lq_knots),
+            lq_knots,
             line_search: LineSearch::new(problem),
             solution: Solution::new(problem),
             next: vec![0.0; horizon * shape.nx],
@@ -222,8 +222,8 @@ impl Fddp {
         }
         self.settings.check()?;
         self.solution.shape().check(problem.shape())?;
-        if self.nodes[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.nodes) {
-            self.sweep = Sweep::new(&self.nodes); // the problem given to `new` did not have this form
+        if self.lq_knots[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.lq_knots) {
+            self.sweep = Sweep::new(&self.lq_knots); // the problem given to `new` did not have this form
         }
         let bounded = problem.check_bounds()?;
         self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
@@ -317,56 +317,56 @@ impl Fddp {
         regularisation: f64,
     ) -> Option<Result<(), SweepError>> {
         let clock = Instant::now();
-        for node in &mut self.nodes {
-            node.inverse_dynamics.wanted = self.inverse_dynamics;
-            node.inverse_dynamics.knows_motion = self.knows_motions;
+        for knot in &mut self.lq_knots {
+            knot.inverse_dynamics.wanted = self.inverse_dynamics;
+            knot.inverse_dynamics.knows_motion = self.knows_motions;
         }
         let size = self.motions.len() / problem.horizon();
-        for (node, motion) in self.nodes.iter_mut().zip(self.motions.chunks_exact(size.max(1))) {
-            node.inverse_dynamics.motion.resize(size, 0.0);
-            node.inverse_dynamics.motion.copy_from_slice(motion);
+        for (knot, motion) in self.lq_knots.iter_mut().zip(self.motions.chunks_exact(size.max(1))) {
+            knot.inverse_dynamics.motion.resize(size, 0.0);
+            knot.inverse_dynamics.motion.copy_from_slice(motion);
         }
         let follows = self.follows();
-        let Self { solution, gaps, nodes, sweep, settings, .. } = self;
+        let Self { solution, gaps, lq_knots, sweep, settings, .. } = self;
         let (Solution { xs, us, .. }, threads) = (&*solution, settings.threads);
-        let complete = |model: &dyn ActionModel, first: usize, nodes: &mut [LqNode]| {
-            for (t, node) in (first..).zip(nodes) {
+        let complete = |model: &dyn ActionModel, first: usize, lq_knots: &mut [LqKnot]| {
+            for (t, knot) in (first..).zip(lq_knots) {
                 match gaps.get(solution.shape().dx(t + 1)) {
-                    Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),
-                    _ => node.f.fill(0.0),
+                    Some(gap) if !feasible => knot.f.as_mut_slice().copy_from_slice(gap),
+                    _ => knot.f.fill(0.0),
                 }
                 match model.bounds(t) {
                     Some((lower, upper)) if feasible => {
                         for (i, u) in us[solution.shape().u(t)].iter().enumerate() {
-                            node.lower[i] = lower[i] - u;
-                            node.upper[i] = upper[i] - u;
+                            knot.lower[i] = lower[i] - u;
+                            knot.upper[i] = upper[i] - u;
                         }
                     }
                     _ => {
-                        node.lower.fill(f64::NEG_INFINITY);
-                        node.upper.fill(f64::INFINITY);
+                        knot.lower.fill(f64::NEG_INFINITY);
+                        knot.upper.fill(f64::INFINITY);
                     }
                 }
             }
         };
         let (mut outcome, mut sweeping) = (Ok(()), Duration::ZERO);
         if threads == 1 {
-            problem.calc_diff(xs, us, nodes);
-            for (t, node) in nodes.chunks_exact_mut(1).enumerate() {
-                complete(problem.action(t), t, node);
+            problem.calc_diff(xs, us, lq_knots);
+            for (t, knot) in lq_knots.chunks_exact_mut(1).enumerate() {
+                complete(problem.action(t), t, knot);
             }
         } else {
             let horizon = problem.horizon();
-            let (step, knots, gains) = sweep.parts(threads);
-            problem.calc_diff_on([xs, us], nodes, knots, gains, |model, first, nodes, knots| {
-                complete(model, first, nodes);
+            let (step, feedback, gains) = sweep.parts(threads);
+            problem.calc_diff_on([xs, us], lq_knots, feedback, gains, |model, first, lq_knots, feedback| {
+                complete(model, first, lq_knots);
                 if !(follows && outcome.is_ok()) {
                     return;
                 }
                 let (clock, linear) = (Instant::now(), &mut |_: usize, _: &[f64], _: &mut Hessian| false);
                 outcome = match first == horizon {
-                    true => step.run(first, nodes, knots, regularisation, linear),
-                    false => step.back(first, nodes, knots, regularisation, linear),
+                    true => step.run(first, lq_knots, feedback, regularisation, linear),
+                    false => step.back(first, lq_knots, feedback, regularisation, linear),
                 };
                 sweeping += clock.elapsed();
             });
@@ -391,12 +391,12 @@ impl Fddp {
         let result = if self.settings.second_order {
             let Solution { xs, us, .. } = &self.solution;
             let shape = self.solution.shape();
-            self.sweep.run_with(&self.nodes, regularisation, |t, lambda, hessian| {
+            self.sweep.run_with(&self.lq_knots, regularisation, |t, lambda, hessian| {
                 let (x, u) = (&xs[shape.x(t)], &us[shape.u(t)]);
                 problem.action_mut(t).dynamics_hessian(t, x, u, lambda, hessian)
             })
         } else {
-            self.sweep.run(&self.nodes, regularisation)
+            self.sweep.run(&self.lq_knots, regularisation)
         };
         self.solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
         result

@@ -56,10 +56,10 @@ impl Fddp {
             }
             now.swept = true;
             let Self { line_search, solution, next, motions, gaps, best, sweep, settings, clock, .. } = self;
-            let (knots, feasible) = (sweep.knots(), now.feasible);
+            let (feedback, feasible) = (sweep.feedback(), now.feasible);
             let value = now.value(gap, solution.cost);
             let iterate =
-                Iterate { solution, next, motions, value, best, gaps, knots, feasible, settings, clock, watch };
+                Iterate { solution, next, motions, value, best, gaps, feedback, feasible, settings, clock, watch };
             search = line_search.run(problem, iterate, search);
             if let Some(status) = search.stopped {
                 return status;

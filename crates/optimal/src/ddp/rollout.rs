@@ -1,7 +1,7 @@
 //! Rollouts of several step lengths side by side.
 
-use crate::lq::{DIVERGED, LqKnot};
-use crate::problem::{Actors, Problem, Shape};
+use crate::lq::{DIVERGED, KnotFeedback};
+use crate::problem::{ActionView, Problem, Shape};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
 
@@ -59,7 +59,7 @@ pub(crate) struct Nominal<'a> {
     pub(crate) us: &'a [f64],
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
     pub(crate) gaps: Option<&'a [f64]>,
-    pub(crate) knots: &'a [LqKnot],
+    pub(crate) feedback: &'a [KnotFeedback],
 }
 
 impl Trials {
@@ -109,7 +109,7 @@ impl Trials {
     /// with uₜ moved into its bounds. The knots begin the horizon or follow the knots of the last call.
     pub(crate) fn run(
         &mut self,
-        actors: &mut Actors<'_>,
+        action_view: &mut ActionView<'_>,
         nominal: &Nominal<'_>,
         steps: &[f64],
         knots: RangeInclusive<usize>,
@@ -135,8 +135,8 @@ impl Trials {
                     x.copy_from_slice(x_nominal); // a valid state: the group call evaluates the action there
                     continue;
                 }
-                let action = actors.action(t);
-                let predicted = if t == 0 { actors.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
+                let action = action_view.action(t);
+                let predicted = if t == 0 { action_view.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
                 match nominal.gaps {
                     Some(gaps) if step != 1.0 => {
                         for (dx, f) in dx.iter_mut().zip(&gaps[shape.dx(t)]) {
@@ -147,7 +147,7 @@ impl Trials {
                     _ => x.copy_from_slice(predicted),
                 }
                 action.difference(x_nominal, x, dx);
-                let gains = &nominal.knots[t];
+                let gains = &nominal.feedback[t];
                 add_scaled_product(u, step, View::new(gains.k.as_slice(), nu), &[1.0]); // u += α k + K δx
                 add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
                 if let Some((lower, upper)) = action.bounds(t) {
@@ -159,7 +159,7 @@ impl Trials {
             }
             knot[..count].fill(t);
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
-            let action = actors.action_mut(t);
+            let action = action_view.action_mut(t);
             let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
             match size {
                 _ if t == horizon => action.calc_group(knot, x_all, u_all, next_all, costs_all),
@@ -184,11 +184,11 @@ impl Trials {
     }
 
     /// Computes −Σ bᵀ (x ⊖ x_trial) for trial `i`, summed over the states x and the vectors b of all knots, both flat.
-    pub(crate) fn distance(&mut self, actors: &Actors<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
+    pub(crate) fn distance(&mut self, action_view: &ActionView<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
         let mut dx = std::mem::take(&mut self.dx);
         let mut sum = 0.0;
         for t in 0..=self.shape.horizon() {
-            actors.action(t).difference(self.x(i, t), &xs[self.shape.x(t)], &mut dx);
+            action_view.action(t).difference(self.x(i, t), &xs[self.shape.x(t)], &mut dx);
             sum -= dot(&b[self.shape.dx(t)], &dx);
         }
         self.dx = dx;

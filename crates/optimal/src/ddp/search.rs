@@ -8,8 +8,8 @@ use super::progress::Value;
 use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};
-use crate::lq::LqKnot;
-use crate::problem::{Actors, Problem};
+use crate::lq::KnotFeedback;
+use crate::problem::{ActionView, Problem};
 use crate::time::Instant;
 use condyle_linalg::threads::join;
 use condyle_linalg::{View, add_scaled_product, dot};
@@ -53,7 +53,7 @@ pub(super) struct Iterate<'a, 'o> {
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
     pub(super) gaps: &'a [f64],
     /// Feedback and value functions.
-    pub(super) knots: &'a [LqKnot],
+    pub(super) feedback: &'a [KnotFeedback],
     /// Whether the iterate counts as feasible.
     pub(super) feasible: bool,
     pub(super) settings: &'a Settings,
@@ -120,7 +120,7 @@ impl LineSearch {
     pub(super) fn run(&mut self, problem: &mut Problem, iterate: Iterate<'_, '_>, last: Search) -> Search {
         self.expect(&iterate);
         let Self { trials, ahead, wary, steps, curved_gaps, expected } = self;
-        let Iterate { solution, next, motions, value, best, knots, feasible, settings, clock, watch, .. } = iterate;
+        let Iterate { solution, next, motions, value, best, feedback, feasible, settings, clock, watch, .. } = iterate;
         let mut search = Search { accepted: false, left_best: false, ..last };
         if settings.method == DdpMethod::Ddp {
             [search.d1, search.d2] = *expected;
@@ -146,14 +146,14 @@ impl LineSearch {
             }
             let start = Instant::now();
             let Solution { xs, us, cost, .. } = &*solution;
-            let nominal = Nominal { xs, us, gaps, knots };
+            let nominal = Nominal { xs, us, gaps, feedback };
             let rule = Rule { settings, feasible, expected: *expected, curved_gaps, xs, cost: *cost };
             let trying = some_from(tried);
             let lengths = &steps[trying.clone()];
             match (ahead.as_mut(), problem.two()) {
                 (Some(ahead), _) if ready => {
                     std::mem::swap(trials, ahead);
-                    trials.run(&mut problem.actors(), &nominal, lengths, horizon..=horizon);
+                    trials.run(&mut problem.action_view(), &nominal, lengths, horizon..=horizon);
                     ready = false;
                 }
                 (Some(ahead), Some([mut own, mut copies])) if beside && tried == 0 => {
@@ -172,13 +172,13 @@ impl LineSearch {
                         },
                     );
                 }
-                _ => trials.run(&mut problem.actors(), &nominal, lengths, 0..=horizon),
+                _ => trials.run(&mut problem.action_view(), &nominal, lengths, 0..=horizon),
             }
-            let actors = problem.actors();
+            let action_view = problem.action_view();
             let good = lengths
                 .iter()
                 .enumerate()
-                .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &actors).map(|cost| (i, cost)));
+                .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &action_view).map(|cost| (i, cost)));
             solution.timings.rollout += clock.ran(Phase::Rollout, start);
             if let Some((i, cost)) = good {
                 search.left_best = best.leave(solution, next, value);
@@ -197,16 +197,16 @@ impl LineSearch {
     fn expect(&mut self, iterate: &Iterate<'_, '_>) {
         let (mut dg, mut dq) = (0.0, 0.0);
         let gaps = iterate.settings.counts_gaps(iterate.feasible);
-        for (t, knot) in iterate.knots.iter().enumerate() {
-            dg -= knot.expected[0];
-            dq -= knot.expected[1];
+        for (t, feedback) in iterate.feedback.iter().enumerate() {
+            dg -= feedback.expected[0];
+            dq -= feedback.expected[1];
             if gaps {
                 let place = iterate.solution.shape().dx(t);
                 let (f, curved) = (&iterate.gaps[place.clone()], &mut self.curved_gaps[place]);
                 curved.fill(0.0);
-                add_scaled_product(curved, 1.0, View::new(knot.Vxx.as_slice(), f.len()), f); // Vxx f
+                add_scaled_product(curved, 1.0, View::new(feedback.Vxx.as_slice(), f.len()), f); // Vxx f
                 let curvature = dot(f, curved);
-                dg -= dot(knot.Vx.as_slice(), f) + curvature;
+                dg -= dot(feedback.Vx.as_slice(), f) + curvature;
                 dq += curvature;
             }
         }
@@ -234,10 +234,17 @@ impl Rule<'_> {
     /// ```text
     /// d₁ = dg + dv,   d₂ = dq − 2 dv,   dv = −Σ fᵀVxx (x ⊖ x_trial),   expected decrease α (d₁ + ½ α d₂)
     /// ```
-    fn judge(&self, search: &mut Search, trials: &mut Trials, i: usize, step: f64, actors: &Actors<'_>) -> Option<f64> {
+    fn judge(
+        &self,
+        search: &mut Search,
+        trials: &mut Trials,
+        i: usize,
+        step: f64,
+        action_view: &ActionView<'_>,
+    ) -> Option<f64> {
         search.step = step;
         let cost = trials.cost(i)?;
-        let dv = self.curved_gaps.map_or(0.0, |curved| trials.distance(actors, i, self.xs, curved));
+        let dv = self.curved_gaps.map_or(0.0, |curved| trials.distance(action_view, i, self.xs, curved));
         search.d1 = self.expected[0] + dv;
         search.d2 = self.expected[1] - 2.0 * dv;
         search.expected_decrease = step * (search.d1 + 0.5 * step * search.d2);

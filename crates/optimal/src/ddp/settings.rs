@@ -87,9 +87,10 @@ pub struct Settings {
     /// Number of threads that share an iteration, at most 1024. They belong to the rayon pool in which a solve is
     /// called, otherwise to the global one. They compute derivatives and gains while the calling thread sweeps, and try
     /// a second step length when the first is often too long. The result is the same to the last bit for any number.
-    /// More than 1 needs copies of the actions ([`fork`]), which are made when they are missing or a model has changed.
+    /// More than 1 needs copies of the actions ([`try_clone`]), which are made when they are missing or a model has
+    /// changed.
     ///
-    /// [`fork`]: crate::ActionModel::fork
+    /// [`try_clone`]: crate::ActionModel::try_clone
     pub threads: usize,
     /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,

@@ -2,7 +2,7 @@
 
 use super::fddp::Fddp;
 use crate::error::Error;
-use crate::lq::{LqNode, Sweep};
+use crate::lq::{LqKnot, Sweep};
 use crate::problem::Problem;
 
 impl Fddp {
@@ -21,24 +21,24 @@ impl Fddp {
         let (old, new) = (self.solution.shape(), problem.shape());
         let (horizon, ndx) = (new.horizon(), new.ndx);
         if old.horizon() != horizon {
-            return Err(Error::Length { name: "stages", expected: old.horizon(), found: horizon });
+            return Err(Error::Length { name: "knot_models", expected: old.horizon(), found: horizon });
         }
         for t in 0..horizon - 1 {
             if old.nu(t + 1) != new.nu(t) {
-                return Err(Error::Dimension { node: t, name: "nu", expected: old.nu(t + 1), found: new.nu(t) });
+                return Err(Error::Dimension { knot: t, name: "nu", expected: old.nu(t + 1), found: new.nu(t) });
             }
         }
         for (name, expected, found) in [("nx", old.nx, new.nx), ("ndx", old.ndx, new.ndx)] {
             if expected != found {
-                return Err(Error::Dimension { node: 0, name, expected, found });
+                return Err(Error::Dimension { knot: 0, name, expected, found });
             }
         }
         self.solution.shift(new);
-        if (0..horizon).any(|t| self.nodes[t].nu() != new.nu(t)) {
-            self.nodes[..horizon].rotate_left(1);
-            self.nodes[horizon - 1] = LqNode::zeros(ndx, new.nu(horizon - 1));
-            problem.reserve_inverse_dynamics(&mut self.nodes);
-            self.sweep = Sweep::new(&self.nodes);
+        if (0..horizon).any(|t| self.lq_knots[t].nu() != new.nu(t)) {
+            self.lq_knots[..horizon].rotate_left(1);
+            self.lq_knots[horizon - 1] = LqKnot::zeros(ndx, new.nu(horizon - 1));
+            problem.reserve_inverse_dynamics(&mut self.lq_knots);
+            self.sweep = Sweep::new(&self.lq_knots);
         }
         self.line_search.reshape(problem);
         self.best.reshape(problem);

@@ -1,7 +1,7 @@
 //! Gains of knots in inverse-dynamics form, from the result of the elimination of their unknowns.
 #![allow(non_snake_case)] // the names of the literature, and Y, U
 
-use super::node::{LqKnot, LqNode};
+use super::knot::{KnotFeedback, LqKnot};
 use condyle_linalg::{SLACK, View, add_product_vector, copy_matrix, eliminate_rows, transpose};
 
 /// Computation of gains, with its scratch. Its input is [L; X; yᵀ], the eliminated columns of the unknowns w, and the
@@ -34,33 +34,33 @@ impl Gains {
     }
 
     /// Writes the gains of a knot, from [L; X; yᵀ].
-    pub(super) fn write(&mut self, left: View<'_>, node: &LqNode, knot: &mut LqKnot) {
-        let (n, m, efforts) = (node.ndx(), node.nu(), &node.inverse_dynamics.efforts.numbers);
+    pub(super) fn write(&mut self, left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
+        let (n, m, efforts) = (knot.ndx(), knot.nu(), &knot.inverse_dynamics.efforts.numbers);
         let (Self { rows, y, .. }, ld, all) = (self, m + SLACK, m + n);
-        transpose(rows, ld, View::new(efforts, node.inverse_dynamics.stride), [all, m]);
+        transpose(rows, ld, View::new(efforts, knot.inverse_dynamics.stride), [all, m]);
         eliminate_rows(rows, ld, [m, all, m], left);
-        take_gains(View::new(rows, ld), left.at(all, 0), node, knot, y);
+        take_gains(View::new(rows, ld), left.at(all, 0), knot, feedback, y);
     }
 
     /// Stores [L; X; yᵀ] in the knot, for [`finish`](Self::finish).
-    pub(super) fn put_off(left: View<'_>, node: &LqNode, knot: &mut LqKnot) {
-        let (n, m) = (node.ndx(), node.nu());
-        copy_matrix(knot.Quu.as_mut_slice(), m, left, [m, m]);
-        copy_matrix(knot.K.as_mut_slice(), n, left.at(m, 0), [n, m]);
-        copy_matrix(knot.Qu.as_mut_slice(), 1, left.at(m + n, 0), [1, m]);
+    pub(super) fn put_off(left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
+        let (n, m) = (knot.ndx(), knot.nu());
+        copy_matrix(feedback.Quu.as_mut_slice(), m, left, [m, m]);
+        copy_matrix(feedback.K.as_mut_slice(), n, left.at(m, 0), [n, m]);
+        copy_matrix(feedback.Qu.as_mut_slice(), 1, left.at(m + n, 0), [1, m]);
     }
 
     /// Writes the gains of all knots whose gains were deferred.
-    pub(crate) fn finish(&mut self, nodes: &[LqNode], knots: &mut [LqKnot]) {
+    pub(crate) fn finish(&mut self, knots: &[LqKnot], feedback: &mut [KnotFeedback]) {
         let mut left = core::mem::take(&mut self.left);
-        for (node, knot) in nodes.iter().zip(knots).filter(|(_, knot)| knot.is_put_off) {
-            let (n, m) = (node.ndx(), node.nu());
+        for (knot, feedback) in knots.iter().zip(feedback).filter(|(_, feedback)| feedback.is_put_off) {
+            let (n, m) = (knot.ndx(), knot.nu());
             let ld = m + n + 1 + SLACK;
-            copy_matrix(&mut left, ld, View::new(knot.Quu.as_slice(), m), [m, m]);
-            copy_matrix(&mut left[m..], ld, View::new(knot.K.as_slice(), n), [n, m]);
-            copy_matrix(&mut left[m + n..], ld, View::new(knot.Qu.as_slice(), 1), [1, m]);
-            self.write(View::new(&left, ld), node, knot);
-            knot.is_put_off = false;
+            copy_matrix(&mut left, ld, View::new(feedback.Quu.as_slice(), m), [m, m]);
+            copy_matrix(&mut left[m..], ld, View::new(feedback.K.as_slice(), n), [n, m]);
+            copy_matrix(&mut left[m + n..], ld, View::new(feedback.Qu.as_slice(), 1), [1, m]);
+            self.write(View::new(&left, ld), knot, feedback);
+            feedback.is_put_off = false;
         }
         self.left = left;
     }
@@ -68,9 +68,15 @@ impl Gains {
 
 /// Computes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from rows [Y K] over (w, δv, δq) and yᵀ. The length of `scratch`
 /// is twice the number of controls, plus padding.
-pub(super) fn take_gains(rows: View<'_>, yt: View<'_>, node: &LqNode, knot: &mut LqKnot, scratch: &mut [f64]) {
-    let (n, m) = (node.ndx(), node.nu());
-    let (nv, K) = (n / 2, knot.K.as_mut_slice());
+pub(super) fn take_gains(
+    rows: View<'_>,
+    yt: View<'_>,
+    knot: &LqKnot,
+    feedback: &mut KnotFeedback,
+    scratch: &mut [f64],
+) {
+    let (n, m) = (knot.ndx(), knot.nu());
+    let (nv, K) = (n / 2, feedback.K.as_mut_slice());
     copy_matrix(K, m, rows.at(0, m + nv), [m, nv]);
     copy_matrix(&mut K[nv * m..], m, rows.at(0, m), [m, nv]);
     let ((k, y), mut square) = (scratch.split_at_mut(m + SLACK), 0.0);
@@ -80,6 +86,6 @@ pub(super) fn take_gains(rows: View<'_>, yt: View<'_>, node: &LqNode, knot: &mut
         square += y[j] * y[j];
     }
     add_product_vector(k, m, rows, &y[..m]);
-    knot.k.as_mut_slice().copy_from_slice(&k[..m]);
-    knot.expected = [-square, square];
+    feedback.k.as_mut_slice().copy_from_slice(&k[..m]);
+    feedback.expected = [-square, square];
 }

@@ -3,7 +3,7 @@
 use condyle_linalg::{SLACK, SparseRows};
 
 /// Rows of a knot over (w, δv, δq); see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the block of
-/// `Q` for δq are taken from the node; its `A`, `B`, `S` and `R` are not used.
+/// `Q` for δq are taken from the knot; its `A`, `B`, `S` and `R` are not used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
     /// Whether the solver can use the equations.
@@ -33,7 +33,7 @@ pub(crate) struct InverseDynamicsForm {
 }
 
 impl InverseDynamicsForm {
-    /// Allocates the form for a node of nv coordinates and nu controls, with a maximum number of dependent coordinates
+    /// Allocates the form for a knot of nv coordinates and nu controls, with a maximum number of dependent coordinates
     /// and of rows of costs.
     pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
         self.stride = nu + 2 * nv + SLACK;

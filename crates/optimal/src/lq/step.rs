@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // the names of the literature: H, L, X, Vxx
 
 use super::forms::{Controls, Curvature, Driven, Forms, InverseDynamics};
-use super::node::{Hessian, LqKnot, LqNode};
+use super::knot::{Hessian, KnotFeedback, LqKnot};
 use super::workspace::Workspace;
 
 /// Reason why a sweep stopped before the first knot.
@@ -28,7 +28,7 @@ pub enum SweepError {
     },
 }
 
-/// Largest numbers of states and controls of some nodes, and their requirements for inverse dynamics.
+/// Largest numbers of states and controls of some knots, and their requirements for inverse dynamics.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
     /// Number of states.
@@ -40,12 +40,12 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    /// Returns the sizes of some nodes.
-    pub(super) fn of(nodes: &[LqNode]) -> Self {
+    /// Returns the sizes of some knots.
+    pub(super) fn of(knots: &[LqKnot]) -> Self {
         Self {
-            n: nodes.last().map_or(0, LqNode::ndx),
-            m: nodes.iter().map(LqNode::nu).max().unwrap_or(0),
-            inverse_dynamics: InverseDynamics::room(nodes),
+            n: knots.last().map_or(0, LqKnot::ndx),
+            m: knots.iter().map(LqKnot::nu).max().unwrap_or(0),
+            inverse_dynamics: InverseDynamics::room(knots),
         }
     }
 
@@ -65,13 +65,13 @@ pub(crate) struct Step {
     pub(super) puts_off: bool,
     forms: Forms,
     controls: Controls,
-    /// Curvature of the dynamics, one entry for each number of controls that occurs at nodes with curvature.
+    /// Curvature of the dynamics, one entry for each number of controls that occurs at knots with curvature.
     hessians: Vec<Hessian>,
 }
 
 impl Step {
-    /// Allocates the workspace for nodes of the given sizes, with `below` additional rows in H. The dynamics may be
-    /// curved at nodes whose number of controls is in `curved`.
+    /// Allocates the workspace for knots of the given sizes, with `below` additional rows in H. The dynamics may be
+    /// curved at knots whose number of controls is in `curved`.
     pub(super) fn new(sizes: Sizes, below: usize, mut curved: Vec<usize>) -> Self {
         let Sizes { n, m, inverse_dynamics } = sizes;
         curved.sort_unstable();
@@ -86,34 +86,34 @@ impl Step {
         }
     }
 
-    /// Sweeps the end of a horizon. The first node is knot `first`, and the last node is the terminal one.
+    /// Sweeps the end of a horizon. The first knot is knot `first`, and the last knot is the terminal one.
     pub(crate) fn run(
         &mut self,
         first: usize,
-        nodes: &[LqNode],
-        knots: &mut [LqKnot],
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
         regularisation: f64,
         curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
-        let last = nodes.len() - 1;
-        self.work.start(&nodes[last]);
-        self.finish(first + last, &mut knots[last], regularisation)?;
-        self.back(first, &nodes[..last], knots, regularisation, curvature)
+        let last = knots.len() - 1;
+        self.work.start(&knots[last]);
+        self.finish(first + last, &mut feedback[last], regularisation)?;
+        self.back(first, &knots[..last], feedback, regularisation, curvature)
     }
 
-    /// Makes the steps at `nodes`, whose first is knot `first`, from P, p of the knot after them.
+    /// Makes the steps at `knots`, whose first is knot `first`, from P, p of the knot after them.
     pub(crate) fn back(
         &mut self,
         first: usize,
-        nodes: &[LqNode],
-        knots: &mut [LqKnot],
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
         regularisation: f64,
         curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
-        for i in (0..nodes.len()).rev() {
-            let (t, knot) = (first + i, &mut knots[i]);
-            self.step(t, &nodes[i], knot, regularisation, curvature)?;
-            self.finish(t, knot, regularisation)?;
+        for i in (0..knots.len()).rev() {
+            let (t, feedback) = (first + i, &mut feedback[i]);
+            self.step(t, &knots[i], feedback, regularisation, curvature)?;
+            self.finish(t, feedback, regularisation)?;
         }
         Ok(())
     }
@@ -122,52 +122,52 @@ impl Step {
     fn step(
         &mut self,
         t: usize,
-        node: &LqNode,
-        knot: &mut LqKnot,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
         regularisation: f64,
         ask: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
         let Self { work, forms, controls, hessians, puts_off, .. } = self;
-        let form = forms.of_step(node, regularisation);
-        work.move_by(node.f.as_slice());
-        form.write(work, node, regularisation, &mut Curvature { knot: t, ask, hessians });
+        let form = forms.of_step(knot, regularisation);
+        work.move_by(knot.f.as_slice());
+        form.write(work, knot, regularisation, &mut Curvature { knot: t, ask, hessians });
         let eliminated =
-            form.eliminate(work, controls, node, knot).map_err(|(row, pivot)| match pivot.is_finite() {
+            form.eliminate(work, controls, knot, feedback).map_err(|(row, pivot)| match pivot.is_finite() {
                 true => SweepError::NotPositive { knot: t, row, pivot },
                 false => SweepError::NotFinite { knot: t },
             })?;
-        work.take_value(work.stride(node.nu()), eliminated, form.turn(node.ndx()));
-        knot.is_put_off = *puts_off && node.nu() > 0 && form.put_off_gains(work, node, knot);
-        if !knot.is_put_off {
-            form.recover_gains(work, controls, node, knot);
+        work.take_value(work.stride(knot.nu()), eliminated, form.turn(knot.ndx()));
+        feedback.is_put_off = *puts_off && knot.nu() > 0 && form.put_off_gains(work, knot, feedback);
+        if !feedback.is_put_off {
+            form.recover_gains(work, controls, knot, feedback);
         }
         Ok(())
     }
 
-    /// Writes H of a node, and below it the product of Θ and the map to δx⁺. Returns the workspace that contains it,
+    /// Writes H of a knot, and below it the product of Θ and the map to δx⁺. Returns the workspace that contains it,
     /// and the rotation of the states there.
     pub(super) fn write_with_rows_below(
         &mut self,
-        node: &LqNode,
+        knot: &LqKnot,
         regularisation: f64,
         Theta: &[f64],
     ) -> (&mut Workspace, usize) {
         let Self { work, forms, .. } = self;
-        let form = forms.of(node);
-        work.move_by(node.f.as_slice());
+        let form = forms.of(knot);
+        work.move_by(knot.f.as_slice());
         form.write(
             work,
-            node,
+            knot,
             regularisation,
             &mut Curvature { knot: 0, ask: &mut |_, _, _| false, hessians: &mut [] },
         );
-        form.write_below(work, node, Theta);
-        (work, form.turn(node.ndx()))
+        form.write_below(work, knot, Theta);
+        (work, form.turn(knot.ndx()))
     }
 
     /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to knot t.
-    fn finish(&mut self, t: usize, knot: &mut LqKnot, regularisation: f64) -> Result<(), SweepError> {
-        match self.work.finish_value(knot, regularisation, self.keep) {
+    fn finish(&mut self, t: usize, feedback: &mut KnotFeedback, regularisation: f64) -> Result<(), SweepError> {
+        match self.work.finish_value(feedback, regularisation, self.keep) {
             true => Ok(()),
             false => Err(SweepError::NotFinite { knot: t }),
         }

@@ -7,7 +7,7 @@ use std::ops::Range;
 /// Maximum number of rows of a block, needed by a free joint.
 pub(crate) const LARGEST_BLOCK: usize = 6;
 
-/// Structure of the A and B of an [`LqNode`](crate::LqNode).
+/// Structure of the A and B of an [`LqKnot`](crate::LqKnot).
 ///
 /// The structure is unknown unless the action sets it, each time that it differentiates. Let x = (q, v), with nv
 /// numbers each for a change of q and of v. The next state follows by semi-implicit Euler from an acceleration a(x, u):
@@ -25,22 +25,22 @@ pub(crate) const LARGEST_BLOCK: usize = 6;
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::LqNode;
+/// use condyle_optimal::LqKnot;
 ///
 /// // One joint: v⁺ = v + 0.1 (u − q), q⁺ = q + 0.1 v⁺.
-/// let mut node = LqNode::zeros(2, 1);
-/// node.A.copy_from_slice(&[0.99, -0.1, 0.1, 1.0]); // column after column
-/// node.B.copy_from_slice(&[0.01, 0.1]);
-/// node.structure.set_euler(0.1, &[]);
+/// let mut knot = LqKnot::zeros(2, 1);
+/// knot.A.copy_from_slice(&[0.99, -0.1, 0.1, 1.0]); // column after column
+/// knot.B.copy_from_slice(&[0.01, 0.1]);
+/// knot.structure.set_euler(0.1, &[]);
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Structure {
+pub struct DynamicsStructure {
     /// Δt, if the structure is known.
     dt: Option<f64>,
     blocks: Vec<EulerBlock>,
 }
 
-/// Blocks of T and E of one joint; see [`Structure`].
+/// Blocks of T and E of one joint; see [`DynamicsStructure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EulerBlock {
     /// First row and column of the block.
@@ -51,7 +51,7 @@ pub struct EulerBlock {
     pub E: DMatrix<f64>,
 }
 
-impl Structure {
+impl DynamicsStructure {
     /// Sets the structure to unknown. Keeps the memory of blocks.
     pub fn set_dense(&mut self) {
         self.dt = None;

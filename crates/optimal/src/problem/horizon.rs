@@ -1,12 +1,12 @@
 //! Optimal control problem over a horizon of knots.
 
 use super::action::ActionModel;
-use super::actors::{Actions, Actors};
+use super::action_view::{ActionView, Actions};
 use super::models::{Models, check};
 use super::shape::Shape;
 use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
-use crate::lq::{Gains, LqKnot, LqNode};
+use crate::lq::{Gains, KnotFeedback, LqKnot};
 use std::any::Any;
 use std::ops::{ControlFlow, Range};
 
@@ -26,7 +26,7 @@ use std::ops::{ControlFlow, Range};
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, LqNode, Problem};
+/// use condyle_optimal::{ActionModel, LqKnot, Problem};
 ///
 /// /// x⁺ = x + u, ℓ = ½ (x² + u²); as a terminal action (nu = 0): ℓ = ½ x².
 /// struct Integrator { nu: usize }
@@ -38,12 +38,12 @@ use std::ops::{ControlFlow, Range};
 ///         next[0] = x[0] + u;
 ///         0.5 * (x[0] * x[0] + u * u)
 ///     }
-///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-///         (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[0]);
-///         node.B.fill(1.0);
-///         node.S.fill(0.0);
-///         node.R.fill(1.0);
-///         node.r.copy_from_slice(u);
+///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+///         (knot.A[0], knot.Q[0], knot.q[0]) = (1.0, 1.0, x[0]);
+///         knot.B.fill(1.0);
+///         knot.S.fill(0.0);
+///         knot.R.fill(1.0);
+///         knot.r.copy_from_slice(u);
 ///     }
 /// }
 ///
@@ -55,7 +55,7 @@ use std::ops::{ControlFlow, Range};
 pub struct Problem {
     x0: Vec<f64>,
     models: Models,
-    stages: Vec<usize>,
+    knot_models: Vec<usize>,
     terminal: Box<dyn ActionModel>,
     shape: Shape,
     /// Maximal runs of knots with one action: (action, knots).
@@ -69,45 +69,45 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Creates a problem that starts at x̂₀. Knot t is served by `models[stages[t]]`, t = 0 … N − 1, and the end by
+    /// Creates a problem that starts at x̂₀. Knot t is served by `models[knot_models[t]]`, t = 0 … N − 1, and the end by
     /// `terminal`.
     ///
     /// # Errors
     /// [`Error`] if
     /// - the horizon or the state is empty, an index has no model, or nx or ndx differ,
-    /// - the terminal model has controls, or a model that has [no next state](ActionModel::is_end) serves a knot,
+    /// - the terminal model has controls, or a model that has [no next state](ActionModel::is_terminal) serves a knot,
     /// - x̂₀ has a wrong length, has an entry that is not finite, or is an invalid state,
     /// - a state or the controls of a knot have more than 4096 entries, or
     /// - there are more than 2²⁰ knots, or 2²⁸ numbers in the matrices \[A B\] of all knots.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
-        stages: Vec<usize>,
+        knot_models: Vec<usize>,
         mut terminal: Box<dyn ActionModel>,
     ) -> Result<Self, Error> {
-        let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
-        check(&models, &stages, &*terminal)?;
+        let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), knot_models.len());
+        check(&models, &knot_models, &*terminal)?;
         Error::check("x0", &x0, nx)?;
         terminal.check_state(&x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
         let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
         terminal.reserve();
-        let mut problem = Self { x0, models, stages, terminal, shape, runs, knots, copies, unread };
+        let mut problem = Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread };
         problem.arrange();
         Ok(problem)
     }
 
-    /// Computes the offsets of the controls and the runs of knots from the stages.
+    /// Computes the offsets of the controls and the runs of knots from the knot_models.
     fn arrange(&mut self) {
-        let Self { models, stages, shape: Shape { offsets, .. }, runs, copies, .. } = self;
+        let Self { models, knot_models, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
         offsets.clear();
         offsets.push(0);
-        for (knot, &index) in stages.iter().enumerate() {
+        for (knot, &index) in knot_models.iter().enumerate() {
             let [action, own] = models.place(index);
-            models.actions[action].serve(knot, stages.len(), own);
-            copies.serve(action, knot, stages.len(), own);
+            models.actions[action].serve(knot, knot_models.len(), own);
+            copies.serve(action, knot, knot_models.len(), own);
             offsets.push(offsets[knot] + models.actions[action].nu());
             match runs.last_mut() {
                 Some((last, knots)) if *last == action => knots.end = knot + 1,
@@ -131,11 +131,11 @@ impl Problem {
         if last >= self.models.len() {
             return Err(Error::UnknownModel { knot: horizon - 1, index: last, models: self.models.len() });
         }
-        if self.models.of(last).is_end() {
+        if self.models.of(last).is_terminal() {
             return Err(Error::NoNextState { knot: horizon - 1, index: last });
         }
-        self.stages.rotate_left(1);
-        self.stages[horizon - 1] = last;
+        self.knot_models.rotate_left(1);
+        self.knot_models[horizon - 1] = last;
         self.models.actions.iter_mut().for_each(|action| action.shift());
         self.copies.shift();
         self.arrange();
@@ -143,13 +143,13 @@ impl Problem {
     }
 
     /// Returns the index of the model of each knot.
-    pub fn stages(&self) -> &[usize] {
-        &self.stages
+    pub fn knot_models(&self) -> &[usize] {
+        &self.knot_models
     }
 
     /// Returns the number of knots before the terminal one, N.
     pub fn horizon(&self) -> usize {
-        self.stages.len()
+        self.knot_models.len()
     }
 
     /// Returns the number of entries of a state.
@@ -221,21 +221,22 @@ impl Problem {
     /// Copies the problem, with all current costs, limits, references and weights, so that another thread can solve it.
     /// The robot's [`Model`](condyle_dynamics::Model) and user-defined functions are shared. Allocates.
     ///
-    /// A problem is not [`Clone`]: a user-defined action can be copied only if its [`fork`](ActionModel::fork) returns
-    /// a copy. All actions of this crate can be copied, except [`NumDiff`](crate::NumDiff).
-    /// [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied if their parts can.
+    /// A problem is not [`Clone`]: a user-defined action can be copied only if its
+    /// [`try_clone`](ActionModel::try_clone) returns a copy. All actions of this crate can be copied, except
+    /// [`NumDiff`](crate::NumDiff). [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied
+    /// if their parts can.
     ///
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
     pub fn try_clone(&self) -> Result<Self, Error> {
-        let Self { x0, models, stages, terminal, shape, runs: own_runs, knots, unread, .. } = self;
-        let (x0, models, stages, shape) = (x0.clone(), models.try_clone()?, stages.clone(), shape.clone());
-        let mut terminal = terminal.fork().ok_or(Error::NoCopy { model: None })?;
+        let Self { x0, models, knot_models, terminal, shape, runs: own_runs, knots, unread, .. } = self;
+        let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
+        let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
         terminal.reserve();
-        let mut runs = Vec::with_capacity(stages.len()); // capacity that a shift may need
+        let mut runs = Vec::with_capacity(knot_models.len()); // capacity that a shift may need
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
-        Ok(Self { x0, models, stages, terminal, shape, runs, knots, copies, unread })
+        Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread })
     }
 
     /// Returns the terminal model as a `T`, if it has that type.
@@ -269,7 +270,7 @@ impl Problem {
             }
             let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
             let u = &us[self.shape.u(t)];
-            self.models.of_mut(self.stages[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
+            self.models.of_mut(self.knot_models[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
         }
         Error::check("xs", &xs, xs.len())?;
         Ok(xs)
@@ -315,28 +316,29 @@ impl Problem {
         self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
     }
 
-    /// Computes the derivatives at all knots of a trajectory into `nodes` (N + 1, the terminal one last). Allocates
+    /// Computes the derivatives at all knots of a trajectory into `knots` (N + 1, the terminal one last). Allocates
     /// nothing.
     ///
     /// # Panics
     /// If a length is wrong.
     #[track_caller]
-    pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         let horizon = self.horizon();
-        self.begin_derivatives(xs, us, nodes);
+        self.begin_derivatives(xs, us, lq_knots);
         for (model, knots) in &self.runs {
             let (x, u) = self.places(knots);
-            let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
-            self.models.actions[*model].calc_diff_group(t, &xs[x], &us[u], nodes);
+            let (t, lq_knots) = (&self.knots[knots.clone()], &mut lq_knots[knots.clone()]);
+            self.models.actions[*model].calc_diff_group(t, &xs[x], &us[u], lq_knots);
         }
         let x = &xs[self.shape.x(horizon)];
-        self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
+        self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut lq_knots[horizon..]);
     }
 
     /// Computes [`calc_diff`](Self::calc_diff) on `gains.len()` threads of the rayon pool in which it is called, or
     /// else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
-    /// group (model, first index, nodes, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
-    /// are written afterwards. Models that cannot be [copied](ActionModel::fork) are evaluated on the calling thread.
+    /// group (model, first index, knots, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
+    /// are written afterwards. Models that cannot be [copied](ActionModel::try_clone) are evaluated on the calling
+    /// thread.
     ///
     /// # Panics
     /// If a length is wrong.
@@ -344,19 +346,19 @@ impl Problem {
     pub(crate) fn calc_diff_on(
         &mut self,
         [xs, us]: [&[f64]; 2],
-        nodes: &mut [LqNode],
-        found: &mut [LqKnot],
+        lq_knots: &mut [LqKnot],
+        found: &mut [KnotFeedback],
         gains: &mut [Gains],
-        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqNode], &mut [LqKnot]) + Send,
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqKnot], &mut [KnotFeedback]) + Send,
     ) {
-        self.begin_derivatives(xs, us, nodes);
+        self.begin_derivatives(xs, us, lq_knots);
         let Self { models, runs, copies, knots, shape, terminal, .. } = self;
         let t = shape.horizon();
-        let ((nodes, end), (found, found_there)) = (nodes.split_at_mut(t), found.split_at_mut(t));
+        let ((lq_knots, end), (found, found_there)) = (lq_knots.split_at_mut(t), found.split_at_mut(t));
         terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
         sweep(&**terminal, t, end, found_there);
         let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
-        copies.calc_diff(&mut models.actions, runs, all, nodes, found, gains, sweep);
+        copies.calc_diff(&mut models.actions, runs, all, lq_knots, found, gains, sweep);
     }
 
     /// Copies the multipliers of models to the copies that other threads use.
@@ -367,18 +369,18 @@ impl Problem {
     /// Checks the lengths, and resets the structures of A and B, which the action sets. Requests the equations of
     /// inverse dynamics only from actions that support them.
     #[track_caller]
-    fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         self.assert_trajectory(xs, us);
-        assert_length("nodes", nodes.len(), self.horizon() + 1);
-        for (t, node) in nodes.iter_mut().enumerate() {
-            node.structure.set_dense();
-            node.inverse_dynamics.active = false;
-            node.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
+        assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
+        for (t, knot) in lq_knots.iter_mut().enumerate() {
+            knot.structure.set_dense();
+            knot.inverse_dynamics.active = false;
+            knot.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
         }
     }
 
     /// Computes for each knot by itself the controls that hold its state still, as far as that is possible: see
-    /// [`hold`](ActionModel::hold). Allocates.
+    /// [`quasi_static`](ActionModel::quasi_static). Allocates.
     ///
     /// # Errors
     /// [`Error`] if the length of `xs` is not (N + 1)·nx, or an entry is not finite.
@@ -386,7 +388,7 @@ impl Problem {
         Error::check("xs", xs, (self.horizon() + 1) * self.nx())?;
         let mut us = Vec::with_capacity(self.shape.offsets[self.horizon()]);
         for t in 0..self.horizon() {
-            us.extend(self.models.of_mut(self.stages[t]).hold(t, &xs[self.shape.x(t)]));
+            us.extend(self.models.of_mut(self.knot_models[t]).quasi_static(t, &xs[self.shape.x(t)]));
         }
         Ok(us)
     }
@@ -417,9 +419,9 @@ impl Problem {
         self.action_mut(t).outputs(t, x, u, show);
     }
 
-    /// Creates nodes of zeros with the dimensions of the knots, the terminal one last.
-    pub fn nodes(&self) -> Vec<LqNode> {
-        (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
+    /// Creates knots of zeros with the dimensions of the knots, the terminal one last.
+    pub fn lq_knots(&self) -> Vec<LqKnot> {
+        (0..=self.horizon()).map(|t| LqKnot::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
     /// Returns the maximum number of entries of a knot's motion that a rollout stores for the derivatives.
@@ -427,16 +429,16 @@ impl Problem {
         self.models.actions.iter().map(|model| model.motion_size()).max().unwrap_or(0)
     }
 
-    /// Allocates memory in nodes for the equations of inverse dynamics, for any order of the actions in the horizon.
+    /// Allocates memory in knots for the equations of inverse dynamics, for any order of the actions in the horizon.
     /// Returns whether an action supports them.
-    pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) -> bool {
+    pub(crate) fn reserve_inverse_dynamics(&self, lq_knots: &mut [LqKnot]) -> bool {
         let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
         let (nv, horizon, motion) = (self.ndx() / 2, self.horizon(), self.motion_size());
-        for node in &mut nodes[..horizon] {
-            let nu = node.nu();
-            node.inverse_dynamics.reserve(nv, nu, most);
-            node.inverse_dynamics.motion.resize(motion, 0.0);
+        for knot in &mut lq_knots[..horizon] {
+            let nu = knot.nu();
+            knot.inverse_dynamics.reserve(nv, nu, most);
+            knot.inverse_dynamics.motion.resize(motion, 0.0);
         }
         true
     }
@@ -447,28 +449,28 @@ impl Problem {
 
     /// Returns the model of knot t; the terminal one for t = N.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
-        self.stages.get(t).map_or(&*self.terminal, |&stage| self.models.of(stage))
+        self.knot_models.get(t).map_or(&*self.terminal, |&model| self.models.of(model))
     }
 
     /// Returns the model of knot t, for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
-        self.stages.get(t).map_or(&mut *self.terminal, |&stage| self.models.of_mut(stage))
+        self.knot_models.get(t).map_or(&mut *self.terminal, |&model| self.models.of_mut(model))
     }
 
     /// Returns the actions of all knots.
-    pub(crate) fn actors(&mut self) -> Actors<'_> {
-        let Self { x0, models, stages, terminal, .. } = self;
+    pub(crate) fn action_view(&mut self) -> ActionView<'_> {
+        let Self { x0, models, knot_models, terminal, .. } = self;
         let (actions, places) = models.parts();
-        Actors { x0, stages, places, actions: Actions::Own(actions, &mut **terminal) }
+        ActionView { x0, knot_models, places, actions: Actions::Own(actions, &mut **terminal) }
     }
 
     /// Returns the actions of all knots, and copies of all but the terminal one, which compute the same on another
     /// thread. Returns `None` if an action cannot be copied, or no copies exist yet.
-    pub(crate) fn two(&mut self) -> Option<[Actors<'_>; 2]> {
-        let Self { x0, models, stages, terminal, copies, .. } = self;
+    pub(crate) fn two(&mut self) -> Option<[ActionView<'_>; 2]> {
+        let Self { x0, models, knot_models, terminal, copies, .. } = self;
         let copies = copies.first().filter(|copies| copies.iter().all(Option::is_some))?;
         let (actions, places) = models.parts();
-        let with = |actions| Actors { x0, stages, places, actions };
+        let with = |actions| ActionView { x0, knot_models, places, actions };
         Some([with(Actions::Own(actions, &mut **terminal)), with(Actions::Copied(copies))])
     }
 
@@ -483,7 +485,7 @@ impl Problem {
             let expected = self.shape.nu(knot);
             for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
                 if found != expected {
-                    return Err(Error::Dimension { node: knot, name, expected, found });
+                    return Err(Error::Dimension { knot: knot, name, expected, found });
                 }
             }
             for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
@@ -525,7 +527,7 @@ impl std::fmt::Debug for Problem {
         f.debug_struct("Problem")
             .field("x0", &self.x0)
             .field("models", &self.models.len())
-            .field("stages", &self.stages)
+            .field("knot_models", &self.knot_models)
             .field("shape", &self.shape)
             .finish()
     }

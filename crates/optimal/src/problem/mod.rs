@@ -1,7 +1,7 @@
 //! Optimal control problem: actions, horizons of actions, and derivatives for actions without their own.
 
 mod action;
-mod actors;
+mod action_view;
 mod autodiff;
 mod horizon;
 mod lqr;
@@ -13,8 +13,8 @@ mod threads;
 mod unicycle;
 
 pub use action::ActionModel;
-pub(crate) use action::{differences, hold};
-pub(crate) use actors::Actors;
+pub(crate) use action::{differences, quasi_static};
+pub(crate) use action_view::ActionView;
 pub use autodiff::{AutoDiff, GenericAction};
 pub use horizon::Problem;
 pub use lqr::Lqr;

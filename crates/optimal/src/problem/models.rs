@@ -87,7 +87,7 @@ impl Models {
         let model = |k: usize| self.places.iter().position(|place| place[0] == k);
         let mut actions = Vec::with_capacity(self.actions.len());
         for (k, action) in self.actions.iter().enumerate() {
-            let mut copy = action.fork().ok_or(Error::NoCopy { model: model(k) })?;
+            let mut copy = action.try_clone().ok_or(Error::NoCopy { model: model(k) })?;
             copy.reserve();
             actions.push(copy);
         }
@@ -98,26 +98,26 @@ impl Models {
 /// Checks that the models fit together in one problem.
 pub(crate) fn check(
     models: &[Box<dyn ActionModel>],
-    stages: &[usize],
+    knot_models: &[usize],
     terminal: &dyn ActionModel,
 ) -> Result<(), Error> {
-    if stages.is_empty() {
+    if knot_models.is_empty() {
         return Err(Error::EmptyHorizon);
     }
-    let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
+    let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), knot_models.len());
     Error::check_size("knots", horizon, MOST_KNOTS)?;
     for (name, found) in [("nx", nx), ("ndx", ndx)] {
         Error::check_size(name, found, MOST_ENTRIES)?;
     }
     let mut numbers = 0;
-    for (knot, &index) in stages.iter().enumerate() {
+    for (knot, &index) in knot_models.iter().enumerate() {
         let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
-        if model.is_end() {
+        if model.is_terminal() {
             return Err(Error::NoNextState { knot, index });
         }
         for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
             if expected != found {
-                return Err(Error::Dimension { node: knot, name, expected, found });
+                return Err(Error::Dimension { knot: knot, name, expected, found });
             }
         }
         Error::check_size("nu", model.nu(), MOST_ENTRIES)?;

@@ -5,12 +5,12 @@
 //! derivatives it needs are missing, it computes derivatives itself. An idle thread computes the group's gains.
 
 use super::action::ActionModel;
-use crate::lq::{Gains, LqKnot, LqNode};
+use crate::lq::{Gains, KnotFeedback, LqKnot};
 use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
 use core::sync::atomic::AtomicU8;
 
-/// Stages of a group.
+/// Steps of the work on a group.
 const DERIVE: u8 = 0;
 const SWEEP: u8 = 1;
 const FINISH: u8 = 2;
@@ -63,7 +63,7 @@ impl Copies {
         for copies in &mut self.of {
             for (copy, model) in copies.iter_mut().zip(models) {
                 if copy.is_none() {
-                    *copy = model.fork();
+                    *copy = model.try_clone();
                     copy.iter_mut().for_each(|copy| copy.reserve());
                 }
             }
@@ -112,23 +112,23 @@ impl Copies {
         models: &mut [Box<dyn ActionModel>],
         runs: &[(usize, Range<usize>)],
         knots: Knots<'_>,
-        nodes: &mut [LqNode],
-        found: &mut [LqKnot],
+        lq_knots: &mut [LqKnot],
+        found: &mut [KnotFeedback],
         gains: &mut [Gains],
-        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqNode], &mut [LqKnot]) + Send,
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqKnot], &mut [KnotFeedback]) + Send,
     ) {
         self.renew(gains.len(), models);
         self.group(models, runs);
         let Self { of, cuts, owners, states } = self;
-        let groups = Groups { parts: &Parts::new(nodes, found, cuts, states), owners, knots };
+        let groups = Groups { parts: &Parts::new(lq_knots, found, cuts, states), owners, knots };
         let (own, gains) = gains.split_at_mut(1);
         join(
             || {
                 let parts = groups.parts;
                 let mut tried = parts.count(); // this thread has tried to derive all groups from this index on
                 for group in (0..parts.count()).rev() {
-                    while !parts.work(group, SWEEP, |first, nodes, found| {
-                        sweep(&*models[owners[group]], first, nodes, found);
+                    while !parts.work(group, SWEEP, |first, lq_knots, found| {
+                        sweep(&*models[owners[group]], first, lq_knots, found);
                     }) {
                         if parts.is_abandoned() {
                             return; // another thread has panicked, and so will this one
@@ -164,7 +164,7 @@ pub(super) struct Knots<'a> {
 /// Groups of knots, as used by all threads.
 #[derive(Clone, Copy)]
 struct Groups<'a> {
-    parts: &'a Parts<'a, LqNode, LqKnot>,
+    parts: &'a Parts<'a, LqKnot, KnotFeedback>,
     owners: &'a [usize],
     knots: Knots<'a>,
 }
@@ -173,16 +173,16 @@ impl Groups<'_> {
     /// Computes the derivatives at the knots of a group, by its model or a copy of it, unless another thread does.
     fn derive(self, group: usize, model: &mut dyn ActionModel) {
         let Knots { knots, xs, us, nx, offsets } = self.knots;
-        self.parts.work(group, DERIVE, |first, nodes, _| {
-            let end = first + nodes.len();
+        self.parts.work(group, DERIVE, |first, lq_knots, _| {
+            let end = first + lq_knots.len();
             let (xs, us) = (&xs[first * nx..end * nx], &us[offsets[first]..offsets[end]]);
-            model.calc_diff_group(&knots[first..end], xs, us, nodes);
+            model.calc_diff_group(&knots[first..end], xs, us, lq_knots);
         });
     }
 
     /// Writes the deferred gains of a group, if it has been swept and no other thread does; returns whether it did so.
     fn finish(self, group: usize, gains: &mut Gains) -> bool {
-        self.parts.work(group, FINISH, |_, nodes, found| gains.finish(nodes, found))
+        self.parts.work(group, FINISH, |_, lq_knots, found| gains.finish(lq_knots, found))
     }
 
     /// Distributes the groups over threads, each with its own copies, until no group is left.

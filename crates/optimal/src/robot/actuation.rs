@@ -189,7 +189,7 @@ impl Actuation {
     }
 
     /// The smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
-    pub(super) fn hold(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
+    pub(super) fn quasi_static(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
         let nu = self.nu();
         let mut map = DMatrix::zeros(self.nv, nu + J.nrows());
         for j in 0..nu {

@@ -1,7 +1,7 @@
 //! Dynamics in continuous time: what an integrator makes a knot of.
 
 use super::limits::Limits;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 ///
 /// ```
 /// use condyle_optimal::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};
-/// use condyle_optimal::{ActionModel, LqNode};
+/// use condyle_optimal::{ActionModel, LqKnot};
 /// use nalgebra::DMatrix;
 ///
 /// /// A mass on a spring, q̈ = u − q, with the cost ½ (q² + u²) per second.
@@ -27,12 +27,12 @@ use nalgebra::DMatrix;
 ///         self.a = [u[0] - x[0]];
 ///         (&self.a, 0.5 * (x[0] * x[0] + u[0] * u[0]))
 ///     }
-///     fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
+///     fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_> {
 ///         let KnotInput { x, u, .. } = input;
 ///         self.a = [u[0] - x[0]];
-///         node.Q.copy_from_slice(&[scale, 0.0, 0.0, 0.0]);
-///         (node.q[0], node.q[1], node.r[0], node.R[0]) = (scale * x[0], 0.0, scale * u[0], scale);
-///         node.S.fill(0.0);
+///         knot.Q.copy_from_slice(&[scale, 0.0, 0.0, 0.0]);
+///         (knot.q[0], knot.q[1], knot.r[0], knot.R[0]) = (scale * x[0], 0.0, scale * u[0], scale);
+///         knot.S.fill(0.0);
 ///         Derivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_du: &[1.0] }
 ///     }
 /// }
@@ -62,16 +62,16 @@ pub trait ContinuousModel: Send + Sync + 'static {
     /// Computes the dynamics of a group of states at these knots, at least one and at most [`lanes`](Self::lanes), so that
     /// [`calc`](Self::calc) or [`calc_diff`](Self::calc_diff), which an integrator then calls for each of them, need not.
     /// Nothing by default.
-    fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
-        let _ = (knots, xs, us, wanted);
+    fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation) {
+        let _ = (knots, xs, us, what);
     }
 
     /// a(x, u) (nv numbers) and ℓ(x, u), for a state of the group that was [prepared](Self::prepare).
     fn calc(&mut self, input: KnotInput<'_>) -> (&[f64], f64);
 
-    /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the node, which are overwritten; for a state of
+    /// The derivatives of a, and those of `scale` · ℓ into q, r, Q, S, R of the knot, which are overwritten; for a state of
     /// the group that was [prepared](Self::prepare).
-    fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_>;
+    fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_>;
 
     /// The second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, for nv numbers `mu`; returns the first
     /// ones of a. `None` by default: a then counts as linear, whatever
@@ -88,7 +88,7 @@ pub trait ContinuousModel: Send + Sync + 'static {
         None
     }
 
-    /// The number of accelerations and forces that [`Wanted::Equations`] starts from.
+    /// The number of accelerations and forces that [`Evaluation::Equations`] starts from.
     #[doc(hidden)]
     fn motion_size(&self) -> usize {
         0
@@ -100,7 +100,7 @@ pub trait ContinuousModel: Send + Sync + 'static {
         let _ = (lane, to);
     }
 
-    /// Sets them, of a state of the group that is to be prepared for [`Wanted::Equations`].
+    /// Sets them, of a state of the group that is to be prepared for [`Evaluation::Equations`].
     #[doc(hidden)]
     fn set_motion(&mut self, lane: usize, from: &[f64]) {
         let _ = (lane, from);
@@ -122,7 +122,7 @@ pub trait ContinuousModel: Send + Sync + 'static {
     }
 
     /// The controls that hold a state still, from statics. `None` by default: then they are found by steps of Newton.
-    fn hold(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+    fn quasi_static(&mut self, x: &[f64]) -> Option<Vec<f64>> {
         let _ = x;
         None
     }
@@ -153,9 +153,9 @@ pub trait ContinuousModel: Send + Sync + 'static {
         let _ = (t, horizon, model);
     }
 
-    /// A copy that computes the same, for another thread: see [`ActionModel::fork`](crate::ActionModel::fork). `None` by
+    /// A copy that computes the same, for another thread: see [`ActionModel::try_clone`](crate::ActionModel::try_clone). `None` by
     /// default.
-    fn fork(&self) -> Option<Self>
+    fn try_clone(&self) -> Option<Self>
     where
         Self: Sized,
     {
@@ -219,18 +219,18 @@ pub struct KnotInput<'a> {
 /// What [`ContinuousModel::prepare`] computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Wanted {
+pub enum Evaluation {
     /// Accelerations.
     Motion,
     /// Accelerations and their derivatives.
     Derivatives,
     /// The equations of motion, differentiated at accelerations and forces that are known: those of the
-    /// [motion](Self::Motion) of the same group, or others that were set. For nodes in inverse-dynamics form.
+    /// [motion](Self::Motion) of the same group, or others that were set. For knots in inverse-dynamics form.
     #[doc(hidden)]
     Equations,
 }
 
-/// What [`ContinuousModel::calc_diff`] gives. Of a node in inverse-dynamics form only `a` is read.
+/// What [`ContinuousModel::calc_diff`] gives. Of a knot in inverse-dynamics form only `a` is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives<'d> {
     /// a itself, nv numbers.

@@ -112,7 +112,7 @@ impl Problem {
     #[track_caller]
     pub fn cost_at_mut(&mut self, t: usize, name: &str) -> Option<CostMut<'_>> {
         self.assert_knot(t);
-        let action = match self.stages().get(t) {
+        let action = match self.knot_models().get(t) {
             Some(&index) => self.chosen(index)?,
             None => self.action_mut(t),
         };

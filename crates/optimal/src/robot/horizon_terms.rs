@@ -10,7 +10,7 @@ use super::residuals::layout::KnotLayout;
 use super::residuals::terms::{KinematicTerms, KnotTerms};
 use super::residuals::view::{ResidualView, Scratch};
 use crate::Error;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use crate::problem::MOST_KNOTS;
 use condyle_dynamics::Model;
 use std::sync::Arc;
@@ -168,7 +168,7 @@ impl HorizonTerms {
         state: KnotState<'_>,
         sensitivities: &dyn Sensitivities,
         scale: f64,
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) {
         self.reserve();
         let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
@@ -183,11 +183,11 @@ impl HorizonTerms {
         for diagonal in [false, true] {
             view.kinematics = first;
             let costs = &costs.at(t).at(t).terms;
-            costs.differentiate(&mut view, sensitivities, &mut WeightedActivations(scale), diagonal, node);
+            costs.differentiate(&mut view, sensitivities, &mut WeightedActivations(scale), diagonal, knot);
             view.kinematics = second;
-            limits.differentiate(&mut view, sensitivities, &mut objective, diagonal, node);
+            limits.differentiate(&mut view, sensitivities, &mut objective, diagonal, knot);
             if !diagonal {
-                view.scratch.write(node);
+                view.scratch.write(knot);
             }
         }
     }

@@ -29,8 +29,8 @@ pub(crate) struct KnotData {
     pub dcontact_acceleration: [DMatrix<f64>; 3],
     /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
-    /// How many stages are solved in it: none, the limbs, the base as well; those that the robot has.
-    pub stages: usize,
+    /// How many eliminations are solved in it: none, the limbs, the base as well; those that the robot has.
+    pub eliminations: usize,
     pub residuals: ResidualData,
 }
 
@@ -54,7 +54,7 @@ impl KnotData {
             contact_acceleration: vec![0.0; controlled],
             dcontact_acceleration: [(); 3].map(|()| DMatrix::zeros(controlled, nv)),
             equations: Vec::new(),
-            stages: 0,
+            eliminations: 0,
             residuals: ResidualData::default(),
         }
     }

@@ -95,7 +95,7 @@ impl PathConstraint for OwnConstraint {
         true
     }
 
-    fn fork(&self) -> Option<Box<dyn PathConstraint>> {
+    fn try_clone(&self) -> Option<Box<dyn PathConstraint>> {
         Some(Box::new(self.clone()))
     }
 }

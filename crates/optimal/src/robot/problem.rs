@@ -33,8 +33,8 @@ use std::sync::Arc;
 ///     model: robots::arm7(),
 ///     x0: vec![0.1; 14],
 ///     knots: vec![Knot::new(step, vec![rest.clone()])],
-///     stages: vec![0; 20],
-///     terminal: Knot::new(Dynamics::End, vec![rest]),
+///     knot_models: vec![0; 20],
+///     terminal: Knot::new(Dynamics::Terminal, vec![rest]),
 /// };
 /// let text = serde_json::to_string(&data)?;
 /// let problem = serde_json::from_str::<RobotProblem>(&text)?.build()?;
@@ -52,7 +52,8 @@ pub struct RobotProblem {
     /// The kinds of knots.
     pub knots: Vec<Knot>,
     /// The index of one of them for each knot of the horizon.
-    pub stages: Vec<usize>,
+    #[cfg_attr(feature = "serde", serde(alias = "stages"))]
+    pub knot_models: Vec<usize>,
     /// The knot after the last one: the end, or an impact.
     pub terminal: Knot,
 }
@@ -137,7 +138,7 @@ pub enum Dynamics {
         /// μ (1/kg).
         damping: f64,
     },
-    /// [`InverseDynamics`](super::InverseDynamics).
+    /// [`FreeInverseDynamics`](super::FreeInverseDynamics).
     Inverse {
         /// The integrator.
         integrator: Integrator,
@@ -158,7 +159,8 @@ pub enum Dynamics {
         dt: f64,
     },
     /// [`FreeDynamics::terminal`], after the last knot.
-    End,
+    #[cfg_attr(feature = "serde", serde(alias = "end"))]
+    Terminal,
 }
 
 impl Dynamics {
@@ -169,7 +171,7 @@ impl Dynamics {
             | Self::Contact { dt, .. }
             | Self::Inverse { dt, .. }
             | Self::ContactInverse { dt, .. } => Some(dt),
-            Self::Impulse { .. } | Self::End => None,
+            Self::Impulse { .. } | Self::Terminal => None,
         }
     }
 }
@@ -182,7 +184,7 @@ impl RobotProblem {
     pub fn build(&self) -> Result<Problem, Error> {
         let model = Arc::new(self.model.clone());
         let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
-        Problem::new(self.x0.clone(), knots, self.stages.clone(), self.terminal.build(&model)?)
+        Problem::new(self.x0.clone(), knots, self.knot_models.clone(), self.terminal.build(&model)?)
     }
 }
 
@@ -228,7 +230,7 @@ impl Knot {
                 self.check_no_controls()?;
                 Ok(Box::new(self.complete(action)?))
             }
-            Dynamics::End => {
+            Dynamics::Terminal => {
                 self.check_bounds(0)?;
                 self.check_no_controls()?;
                 Ok(Box::new(self.complete(FreeDynamics::terminal(model, costs)?)?))

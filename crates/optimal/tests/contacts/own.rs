@@ -102,10 +102,10 @@ fn compare(what: &str, mut a: impl ActionModel, mut b: impl ActionModel, model: 
     let (ndx, nx, nu, knots) = (a.ndx(), a.nx(), a.nu(), [0, 1, 2, 3, 4]);
     let xs: Vec<_> = knots.iter().flat_map(|_| random_state(model, rng)).collect();
     let us = random(nu * knots.len(), 1.0, rng);
-    let mut nodes = [(); 2].map(|()| knots.map(|_| LqNode::zeros(ndx, nu)));
+    let mut lq_knots = [(); 2].map(|()| knots.map(|_| LqKnot::zeros(ndx, nu)));
     let mut next = vec![0.0; nx * knots.len()];
     let mut costs = [[0.0; 5]; 2];
-    let [by_a, by_b] = &mut nodes;
+    let [by_a, by_b] = &mut lq_knots;
     a.calc_group(&knots, &xs, &us, &mut next, &mut costs[0]);
     b.calc_group(&knots, &xs, &us, &mut next, &mut costs[1]);
     a.calc_diff_group(&knots, &xs, &us, by_a);

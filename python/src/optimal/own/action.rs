@@ -13,7 +13,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rust::{ActionModel, LqNode};
+use rust::{ActionModel, LqKnot};
 use std::any::Any;
 use std::sync::Arc;
 
@@ -190,7 +190,7 @@ impl Own {
         read().map_err(|error| named(py, "calc", knots, error))
     }
 
-    fn try_calc_diff(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], nodes: &mut [LqNode]) -> PyResult<()> {
+    fn try_calc_diff(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], lq_knots: &mut [LqKnot]) -> PyResult<()> {
         let result = self.written.functions.call(py, 1, self.arguments(py, knots, at)?)?;
         let mut read = || {
             let given = result.cast::<PyDict>().map_err(|_| {
@@ -202,9 +202,9 @@ impl Own {
                 if !["A", "B", "Q", "S", "R", "q", "r"].contains(&name.as_str()) {
                     return Err(PyValueError::new_err(format!("expected A, B, Q, S, R, q or r, found '{name}'")));
                 }
-                for (k, node) in nodes.iter_mut().enumerate() {
+                for (k, knot) in lq_knots.iter_mut().enumerate() {
                     let entry = if self.written.batch { &entry.get_item(k)? } else { &entry };
-                    write(node, &name, entry)?;
+                    write(knot, &name, entry)?;
                 }
             }
             Ok(())
@@ -218,20 +218,20 @@ impl Own {
         py: Python<'_>,
         knots: &[usize],
         [xs, us]: [&[f64]; 2],
-        nodes: &mut [LqNode],
+        lq_knots: &mut [LqKnot],
     ) -> PyResult<bool> {
         let Written { space, nu, functions, batch, way, .. } = &self.written;
         if !functions.has(1) {
             let all = Differentiated { functions, space, nu: *nu, batch: *batch, terminal: self.terminal };
-            return all.action(py, way, knots, [xs, us], nodes);
+            return all.action(py, way, knots, [xs, us], lq_knots);
         }
         if *batch {
-            return self.try_calc_diff(py, knots, [xs, us], nodes).map(|()| true);
+            return self.try_calc_diff(py, knots, [xs, us], lq_knots).map(|()| true);
         }
         let nx = space.nx();
         for (k, t) in knots.iter().enumerate() {
             let at = [&xs[k * nx..][..nx], &us[k * nu..][..*nu]];
-            self.try_calc_diff(py, &[*t], at, &mut nodes[k..=k])?;
+            self.try_calc_diff(py, &[*t], at, &mut lq_knots[k..=k])?;
         }
         Ok(true)
     }
@@ -285,27 +285,27 @@ impl ActionModel for Own {
         }
     }
 
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.calc_diff_group(&[t], x, u, std::slice::from_mut(node));
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.calc_diff_group(&[t], x, u, std::slice::from_mut(knot));
     }
 
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        for node in nodes.iter_mut() {
-            for field in [&mut node.A, &mut node.B, &mut node.Q, &mut node.S, &mut node.R] {
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        for knot in lq_knots.iter_mut() {
+            for field in [&mut knot.A, &mut knot.B, &mut knot.Q, &mut knot.S, &mut knot.R] {
                 field.fill(0.0);
             }
-            node.q.fill(0.0);
-            node.r.fill(0.0);
+            knot.q.fill(0.0);
+            knot.r.fill(0.0);
         }
-        match unless_failed(&self.fault, |py| self.try_derivatives(py, knots, [xs, us], nodes)) {
+        match unless_failed(&self.fault, |py| self.try_derivatives(py, knots, [xs, us], lq_knots)) {
             Some(true) => {}
             Some(false) => {
                 let (nx, nu, mut by_differences) = (self.nx(), self.nu(), rust::NumDiff(self.clone()));
                 for (i, &t) in knots.iter().enumerate() {
-                    by_differences.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+                    by_differences.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut lq_knots[i]);
                 }
             }
-            None => nodes.iter_mut().for_each(|node| node.q.fill(f64::NAN)),
+            None => lq_knots.iter_mut().for_each(|knot| knot.q.fill(f64::NAN)),
         }
     }
 

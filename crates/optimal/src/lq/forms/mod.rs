@@ -2,7 +2,7 @@
 //!
 //! Each knot is a quadratic form H in some unknowns and in the change of its state; the unknowns are eliminated. The
 //! forms differ in how A and B enter H, whether the unknowns are the controls, and the order of the states. Only
-//! [`Forms::of`] selects the form of a node.
+//! [`Forms::of`] selects the form of a knot.
 #![allow(non_snake_case)] // the names of the literature
 
 mod controls;
@@ -11,7 +11,7 @@ mod driven;
 mod euler;
 mod inverse_dynamics;
 
-use super::node::{Hessian, LqKnot, LqNode};
+use super::knot::{Hessian, KnotFeedback, LqKnot};
 use super::workspace::Workspace;
 pub(super) use controls::Controls;
 use dense::Dense;
@@ -23,16 +23,16 @@ pub(super) use inverse_dynamics::InverseDynamics;
 const EULER_FROM: usize = 16;
 
 /// Form of a knot. The matrices that it reads and writes belong to the [`Workspace`].
-pub(super) trait Form {
+pub(super) trait KnotForm {
     /// Returns the rotation of the n states in H: state i of H is state (i + turn) mod n of x.
     fn turn(&self, n: usize) -> usize;
 
-    /// Writes H, including ϱ, from the node, from P, and from p at the predicted state.
-    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>);
+    /// Writes H, including ϱ, from the knot, from P, and from p at the predicted state.
+    fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>);
 
     /// After `write`: writes the product of Θ and the map from the unknowns and δx to δx⁺ below H. Θ has n rows (stride
     /// n + SLACK).
-    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]);
+    fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]);
 
     /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns. By
     /// default, they are the controls that are not at a bound.
@@ -43,21 +43,27 @@ pub(super) trait Form {
         &self,
         work: &mut Workspace,
         controls: &mut Controls,
-        node: &LqNode,
-        knot: &mut LqKnot,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
     ) -> Result<usize, (usize, f64)> {
-        controls.eliminate(work, node, knot)
+        controls.eliminate(work, knot, feedback)
     }
 
     /// Writes the gains of the knot, from the result of `eliminate` in H.
-    fn recover_gains(&mut self, work: &mut Workspace, controls: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        let turn = self.turn(node.ndx());
-        controls.recover_gains(work, node, knot, turn);
+    fn recover_gains(
+        &mut self,
+        work: &mut Workspace,
+        controls: &mut Controls,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+    ) {
+        let turn = self.turn(knot.ndx());
+        controls.recover_gains(work, knot, feedback, turn);
     }
 
     /// Stores in the knot the data from which [`Gains::finish`](super::gains::Gains::finish) computes its gains;
     /// returns whether it did so.
-    fn put_off_gains(&self, _: &Workspace, _: &LqNode, _: &mut LqKnot) -> bool {
+    fn put_off_gains(&self, _: &Workspace, _: &LqKnot, _: &mut KnotFeedback) -> bool {
         false
     }
 }
@@ -79,19 +85,19 @@ impl Forms {
         Self { dense: Dense, euler, inverse_dynamics, driven: Driven::new(n) }
     }
 
-    /// Returns the form for a step at a node.
-    pub(super) fn of_step(&mut self, node: &LqNode, regularisation: f64) -> &mut dyn Form {
-        match node.inverse_dynamics.active && Driven::takes(node, regularisation) {
+    /// Returns the form for a step at a knot.
+    pub(super) fn of_step(&mut self, knot: &LqKnot, regularisation: f64) -> &mut dyn KnotForm {
+        match knot.inverse_dynamics.active && Driven::takes(knot, regularisation) {
             true => &mut self.driven,
-            false => self.of(node),
+            false => self.of(knot),
         }
     }
 
-    /// Returns the form of a node, among the forms that support rows below H.
-    pub(super) fn of(&mut self, node: &LqNode) -> &mut dyn Form {
-        if node.inverse_dynamics.active {
+    /// Returns the form of a knot, among the forms that support rows below H.
+    pub(super) fn of(&mut self, knot: &LqKnot) -> &mut dyn KnotForm {
+        if knot.inverse_dynamics.active {
             &mut self.inverse_dynamics
-        } else if node.structure.euler().is_some() && node.ndx() >= EULER_FROM {
+        } else if knot.structure.euler().is_some() && knot.ndx() >= EULER_FROM {
             &mut self.euler
         } else {
             &mut self.dense

@@ -1,11 +1,11 @@
 //! Dynamics and cost of one knot, evaluated for many knots at a time.
 
 pub(crate) mod differences;
-pub(crate) mod hold;
+pub(crate) mod quasi_static;
 
 use super::multipliers::Visit;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 use std::any::Any;
 
 /// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of the knots t that the action serves.
@@ -32,7 +32,7 @@ use std::any::Any;
 /// # Examples
 /// The double integrator x⁺ = x + Δt (v, u) with the cost ½ Δt (‖x‖² + u²):
 /// ```
-/// use condyle_optimal::{ActionModel, LqNode};
+/// use condyle_optimal::{ActionModel, LqKnot};
 ///
 /// struct DoubleIntegrator { dt: f64 }
 ///
@@ -44,14 +44,14 @@ use std::any::Any;
 ///         next[1] = x[1] + self.dt * u[0];
 ///         0.5 * self.dt * (x[0] * x[0] + x[1] * x[1] + u[0] * u[0])
 ///     }
-///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-///         node.A.copy_from_slice(&[1.0, 0.0, self.dt, 1.0]); // column after column
-///         node.B.copy_from_slice(&[0.0, self.dt]);
-///         node.Q.copy_from_slice(&[self.dt, 0.0, 0.0, self.dt]);
-///         node.S.fill(0.0);
-///         node.R[0] = self.dt;
-///         node.q.copy_from_slice(&[self.dt * x[0], self.dt * x[1]]);
-///         node.r[0] = self.dt * u[0];
+///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+///         knot.A.copy_from_slice(&[1.0, 0.0, self.dt, 1.0]); // column after column
+///         knot.B.copy_from_slice(&[0.0, self.dt]);
+///         knot.Q.copy_from_slice(&[self.dt, 0.0, 0.0, self.dt]);
+///         knot.S.fill(0.0);
+///         knot.R[0] = self.dt;
+///         knot.q.copy_from_slice(&[self.dt * x[0], self.dt * x[1]]);
+///         knot.r[0] = self.dt * u[0];
 ///     }
 /// }
 ///
@@ -75,7 +75,7 @@ pub trait ActionModel: Any + Send + Sync {
 
     /// Returns whether the action has no next state, so that it may only serve the end of a horizon. By default false:
     /// an action may serve both.
-    fn is_end(&self) -> bool {
+    fn is_terminal(&self) -> bool {
         false
     }
 
@@ -149,8 +149,8 @@ pub trait ActionModel: Any + Send + Sync {
     /// The default takes central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff) does: slow,
     /// allocating, and accurate to about 1e-9 (the Hessian to 1e-7). [`AutoDiff`](crate::AutoDiff) computes exact
     /// derivatives of functions that are written for any scalar.
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        differences::calc_diff(self, t, x, u, node);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        differences::calc_diff(self, t, x, u, knot);
     }
 
     /// Computes the second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for
@@ -208,13 +208,13 @@ pub trait ActionModel: Any + Send + Sync {
     /// # Panics
     /// If the lengths differ from knots.len() times nx, nu and 1.
     #[track_caller]
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         let (nx, nu) = (self.nx(), self.nu());
         assert_length("xs", xs.len(), knots.len() * nx);
         assert_length("us", us.len(), knots.len() * nu);
-        assert_length("nodes", nodes.len(), knots.len());
+        assert_length("lq_knots", lq_knots.len(), knots.len());
         for (i, &t) in knots.iter().enumerate() {
-            self.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+            self.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut lq_knots[i]);
         }
     }
 
@@ -228,8 +228,8 @@ pub trait ActionModel: Any + Send + Sync {
     /// Returns the controls that hold the state x of knot t still, if the state can stand still: φ(x, u) = x, as nearly
     /// as controls can reach. By default at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as in Crocoddyl; a robot's
     /// controls follow from statics. Allocates.
-    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
-        hold::newton(self, t, x)
+    fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        quasi_static::newton(self, t, x)
     }
 
     /// Notifies the action that the horizon has [moved](crate::Problem::shift) by one knot: data of knot t now belong
@@ -239,7 +239,7 @@ pub trait ActionModel: Any + Send + Sync {
     /// Returns a copy that computes the same, for another thread or another problem; `None` by default. An action
     /// without a copy is differentiated on one thread, whatever the setting [`threads`](crate::Settings::threads). A
     /// problem with such an action cannot be copied ([`Problem::try_clone`](crate::Problem::try_clone)).
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         None
     }
 

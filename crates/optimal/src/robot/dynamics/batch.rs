@@ -11,11 +11,11 @@ use super::limb_elimination::{
 };
 use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, SHARED, constraint_set};
-use crate::robot::continuous::Wanted;
+use crate::robot::continuous::Evaluation;
 use crate::robot::horizon_terms::HorizonTerms;
 use crate::robot::knot::{KnotData, WIDEST, unpack};
+use crate::robot::residuals::gravity_residual::GravityResidual;
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
-use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_equations_at, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
@@ -28,7 +28,7 @@ use std::sync::Arc;
 
 /// The law from which accelerations follow.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Law {
+pub(crate) enum DynamicsKind {
     /// Nowhere: time stands still, or the state jumps.
     None,
     /// q̈ = M⁻¹ (τ − h).
@@ -58,7 +58,7 @@ pub(crate) enum Pass<S> {
 pub(crate) struct KnotBatch<S> {
     pub data: Data<S>,
     pub pass: Pass<S>,
-    surplus: Surplus<S>,
+    gravity_residual: GravityResidual<S>,
     residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
@@ -74,34 +74,34 @@ pub(crate) struct KnotBatch<S> {
 impl<S: Block<Number = f64>> KnotBatch<S> {
     /// Scratch for a robot whose accelerations obey a law that was checked.
     #[inline(never)]
-    pub(crate) fn new(model: &Model, law: &Law) -> Self {
+    pub(crate) fn new(model: &Model, kind: &DynamicsKind) -> Self {
         let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
-        let pass = match law {
-            Law::None => Pass::None,
-            Law::Free => Pass::Free,
-            Law::Contact(contacts, damping) => {
+        let pass = match kind {
+            DynamicsKind::None => Pass::None,
+            DynamicsKind::Free => Pass::Free,
+            DynamicsKind::Contact(contacts, damping) => {
                 let set = Box::new(constraint_set(model, contacts, *damping).expect("was checked when it was given"));
                 let J = matrix(set.rows(), nv, S::zero());
                 Pass::Contact(set, J)
             }
-            Law::Inverse => Pass::Inverse,
-            Law::ContactInverse(contacts, _) => {
+            DynamicsKind::Inverse => Pass::Inverse,
+            DynamicsKind::ContactInverse(contacts, _) => {
                 let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
                 let J = matrix(set.rows(), nv, S::zero());
                 Pass::ContactInverse(set, J)
             }
         };
-        let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
+        let (data, gravity_residual, residuals) = (Data::new(model), GravityResidual::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
         let lambda = zeros(rows);
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Vec::new());
-        Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
+        Self { data, pass, gravity_residual, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
-    pub(crate) fn reserve(&mut self, tableau: Tableau, stages: Vec<Arc<LimbElimination>>) {
-        self.linear = LinearEquations::new(tableau, stages);
+    pub(crate) fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
+        self.linear = LinearEquations::new(tableau, eliminations);
     }
 
     /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
@@ -112,16 +112,16 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         knots: &[usize],
         xs: &[f64],
         terms: &HorizonTerms,
-        wanted: Wanted,
+        what: Evaluation,
         to: &mut [KnotData],
     ) {
         self.pack(model, xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
-        match wanted {
-            Wanted::Equations => self.run_equations(model, to),
-            _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
+        match what {
+            Evaluation::Equations => self.run_equations(model, to),
+            _ => self.run_pass(model, what == Evaluation::Derivatives, terms.layout().forces, to),
         }
-        self.run_residuals(model, knots, terms, wanted != Wanted::Motion, to);
+        self.run_residuals(model, knots, terms, what != Evaluation::Motion, to);
     }
 
     /// Sets the states of some knots.
@@ -255,11 +255,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 each[k] = own;
             }
         }
-        let Self { data, surplus, residuals, q, v, a, visited, .. } = self;
+        let Self { data, gravity_residual, residuals, q, v, a, visited, .. } = self;
         let requirements = first.layout().requirements;
         let mut group = KnotGroup { terms: &each[..to.len()], data: to, slopes, visited: *visited };
         if requirements.gravity {
-            surplus.run(model, data, [q, v, a], requirements.inertia, &mut group);
+            gravity_residual.run(model, data, [q, v, a], requirements.inertia, &mut group);
             group.visited = true;
         }
         if requirements.placements || requirements.velocities {
@@ -273,39 +273,41 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 struct LinearEquations<S> {
     size: Tableau,
     /// What is solved, one after the other: the limbs, and the base.
-    stages: Vec<Arc<LimbElimination>>,
+    eliminations: Vec<Arc<LimbElimination>>,
     tableau: Vec<S>,
-    /// The tableau before a stage.
+    /// The tableau before an elimination.
     before: Vec<S>,
-    /// B⁻¹ of each block of a stage, and Y of one.
+    /// B⁻¹ of each block of an elimination, and Y of one.
     inverses: Vec<S>,
     Y: Vec<S>,
 }
 
 impl<S: Block<Number = f64>> LinearEquations<S> {
-    fn new(size: Tableau, stages: Vec<Arc<LimbElimination>>) -> Self {
-        let most = |room: fn(&LimbElimination) -> usize| stages.iter().map(|stage| room(stage)).max().unwrap_or(0);
+    fn new(size: Tableau, eliminations: Vec<Arc<LimbElimination>>) -> Self {
+        let most = |room: fn(&LimbElimination) -> usize| {
+            eliminations.iter().map(|elimination| room(elimination)).max().unwrap_or(0)
+        };
         let zeros = |n| vec![S::zero(); n];
         let (inverses, Y) = (zeros(most(LimbElimination::room)), zeros(most(LimbElimination::columns)));
-        Self { size, stages, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
+        Self { size, eliminations, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
     }
 
     /// Solves the limbs and the base of the knots where that can be, and writes the equations to the data of each.
     fn solve(&mut self, to: &mut [KnotData]) {
-        let Self { size, stages, tableau, before, inverses, Y } = self;
+        let Self { size, eliminations, tableau, before, inverses, Y } = self;
         let mut singular = S::zero();
-        to.iter_mut().for_each(|to| to.stages = 0);
-        for stage in stages {
+        to.iter_mut().for_each(|to| to.eliminations = 0);
+        for elimination in eliminations {
             let mut each = [0.0; WIDEST];
-            invert_blocks(stage, *size, tableau, inverses, &mut singular);
+            invert_blocks(elimination, *size, tableau, inverses, &mut singular);
             scatter(core::slice::from_ref(&singular), to.len(), &mut each);
             let each = &each[..to.len()];
-            to.iter_mut().zip(each).for_each(|(to, singular)| to.stages += usize::from(*singular == 0.0));
+            to.iter_mut().zip(each).for_each(|(to, singular)| to.eliminations += usize::from(*singular == 0.0));
             let all = each.iter().all(|singular| *singular == 0.0);
             if !all {
                 before.copy_from_slice(tableau);
             }
-            solve_blocks(stage, *size, tableau, inverses, Y);
+            solve_blocks(elimination, *size, tableau, inverses, Y);
             if !all {
                 restore(singular, before, tableau);
             }

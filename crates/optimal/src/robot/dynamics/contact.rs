@@ -1,6 +1,6 @@
 //! Dynamics of a robot in contact with the world.
 
-use super::batch::Law;
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
@@ -59,8 +59,8 @@ impl ContactAcceleration {
     ) -> Result<Self, Error> {
         let nu = actuation.nu();
         let capabilities = Capabilities { nu, effort: true, contacts: rows_of(contacts), ..Capabilities::default() };
-        let law = Law::Contact(contacts.to_vec(), damping);
-        RobotDynamics::new(model, actuation, capabilities, law, costs).map(Self)
+        let kind = DynamicsKind::Contact(contacts.to_vec(), damping);
+        RobotDynamics::new(model, actuation, capabilities, kind, costs).map(Self)
     }
 }
 
@@ -82,6 +82,6 @@ impl ContactDynamics {
     /// If `x` has not nq + nv numbers.
     #[track_caller]
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.hold(x)
+        self.inner_mut().0.quasi_static(x)
     }
 }

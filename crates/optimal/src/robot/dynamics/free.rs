@@ -1,6 +1,6 @@
 //! Dynamics of a robot that touches nothing.
 
-use super::batch::Law;
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
@@ -45,7 +45,7 @@ impl FreeAcceleration {
     /// joints that move no mass.
     pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
         let capabilities = Capabilities { nu: actuation.nu(), effort: true, ..Capabilities::default() };
-        RobotDynamics::new(model, actuation, capabilities, Law::Free, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Free, costs).map(Self)
     }
 }
 
@@ -67,7 +67,13 @@ impl FreeDynamics {
     /// [`Error::Cost`] for a term that does not fit.
     pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
         let none = Actuation::none(&model);
-        Ok(Self::end(FreeAcceleration(RobotDynamics::new(model, none, Capabilities::default(), Law::None, costs)?)))
+        Ok(Self::without_time(FreeAcceleration(RobotDynamics::new(
+            model,
+            none,
+            Capabilities::default(),
+            DynamicsKind::None,
+            costs,
+        )?)))
     }
 
     /// The efforts that hold the robot still at a state, u = S⁺ g(q): the smallest ones that come nearest to it. Allocates.
@@ -76,6 +82,6 @@ impl FreeDynamics {
     /// If `x` has not nq + nv numbers.
     #[track_caller]
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.hold(x)
+        self.inner_mut().0.quasi_static(x)
     }
 }

@@ -1,12 +1,12 @@
 //! Impacts: knots without time and controls, at which velocities jump.
 
-use super::batch::Law;
+use super::batch::DynamicsKind;
 use super::robot::{Parts, RobotDynamics, Work};
 use super::sensitivities::DynamicsSensitivities;
 use crate::ActionModel;
 use crate::Error;
 use crate::error::assert_length;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use crate::problem::Visit;
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::{Capabilities, Output};
@@ -77,7 +77,7 @@ impl ImpulseDynamics {
         check_contacts(&model, contacts, damping)?;
         let capabilities = Capabilities { impulse: true, contacts: rows_of(contacts), ..Capabilities::default() };
         let (none, zero) = (Actuation::none(&model), vec![0.0; model.nv()]);
-        let robot = RobotDynamics::new(model, none, capabilities, Law::None, costs)?;
+        let robot = RobotDynamics::new(model, none, capabilities, DynamicsKind::None, costs)?;
         Ok(Self { robot, contacts: contacts.to_vec(), restitution, damping, set: OnDemand::default(), zero })
     }
 
@@ -180,7 +180,7 @@ impl ActionModel for ImpulseDynamics {
         self.robot.terms.limits.visit(t, visit);
     }
 
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         Some(Box::new(self.clone()))
     }
 
@@ -196,17 +196,17 @@ impl ActionModel for ImpulseDynamics {
     }
 
     #[track_caller]
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.evaluate(t, x, true);
         let Parts { model, actuation, terms, work: Work { data, .. }, .. } = self.robot.parts();
         let (nv, data) = (model.nv(), &data[0]);
         let sensitivities = DynamicsSensitivities { given: Output::Effort, data, actuation };
-        terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, 1.0, node);
+        terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, 1.0, knot);
         // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v]: that of an Euler step that takes no time
-        node.structure.set_euler(0.0, &[]);
-        node.A.fill_with_identity();
+        knot.structure.set_euler(0.0, &[]);
+        knot.A.fill_with_identity();
         let [by_q, by_v, _] = &data.da;
-        let mut below = node.A.rows_mut(nv, nv);
+        let mut below = knot.A.rows_mut(nv, nv);
         below.columns_mut(0, nv).copy_from(by_q);
         below.columns_mut(nv, nv).zip_apply(by_v, |a, change| *a += change);
     }

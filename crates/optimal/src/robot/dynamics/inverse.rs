@@ -1,6 +1,6 @@
 //! Dynamics of a robot whose accelerations are the controls, and whose efforts follow by inverse dynamics.
 
-use super::batch::Law;
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
@@ -29,17 +29,17 @@ pub struct ControlledAcceleration(pub(super) RobotDynamics);
 /// ```
 /// use condyle_dynamics::robots;
 /// use condyle_optimal::ActionModel;
-/// use condyle_optimal::robot::{Activation, Cost, InverseDynamics, Residual};
+/// use condyle_optimal::robot::{Activation, Cost, FreeInverseDynamics, Residual};
 /// use std::sync::Arc;
 /// let effort = Residual::JointEffort { reference: vec![0.0; 7] };
 /// let costs = vec![Cost::new("effort", 1.0, effort, Activation::Quadratic)];
-/// let mut knot = InverseDynamics::running(Arc::new(robots::arm7()), 0.1, costs)?;
+/// let mut knot = FreeInverseDynamics::running(Arc::new(robots::arm7()), 0.1, costs)?;
 /// let mut next = [0.0; 14];
 /// knot.calc(0, &[0.0; 14], &[1.0; 7], &mut next);
 /// assert!((next[7] - 0.1).abs() < 1e-15 && (next[0] - 0.01).abs() < 1e-15);
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-pub type InverseDynamics = Integrated<ControlledAcceleration>;
+pub type FreeInverseDynamics = Integrated<ControlledAcceleration>;
 
 impl ControlledAcceleration {
     /// A robot that is driven at every coordinate.
@@ -50,11 +50,11 @@ impl ControlledAcceleration {
         let (nu, undriven) = (model.nv(), Actuation::joints(&model).undriven());
         let capabilities = Capabilities { nu, effort: true, inverse: true, undriven, ..Capabilities::default() };
         let actuation = Actuation::all(&model);
-        RobotDynamics::new(model, actuation, capabilities, Law::Inverse, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Inverse, costs).map(Self)
     }
 }
 
-impl InverseDynamics {
+impl FreeInverseDynamics {
     /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`] and
     /// [`Integrated::new`].
     ///

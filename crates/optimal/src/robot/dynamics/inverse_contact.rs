@@ -1,6 +1,6 @@
 //! Dynamics of a robot in contact whose accelerations and forces are the controls, and whose efforts follow.
 
-use super::batch::Law;
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
@@ -30,7 +30,7 @@ pub struct ControlledContactAcceleration(pub(super) RobotDynamics);
 /// given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they are costs.
 /// Nothing is inverted, so that contacts may be redundant and M singular. Solutions are those of
 /// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations where it serves. Without contacts it is
-/// [`InverseDynamics`](crate::robot::InverseDynamics) with drives. These are Crocoddyl's rules
+/// [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with drives. These are Crocoddyl's rules
 /// (`DifferentialActionModelContactInvDynamics`, and `DifferentialActionModelFreeInvDynamics` without contacts).
 ///
 /// ```
@@ -66,8 +66,8 @@ impl ControlledContactAcceleration {
         let nu = model.nv() + named.last().map_or(0, |(_, rows)| rows.end);
         let capabilities =
             Capabilities { nu, effort: true, inverse: true, undriven, contacts: named, ..Capabilities::default() };
-        let law = Law::ContactInverse(contacts.to_vec(), actuation);
-        let mut robot = RobotDynamics::new(model, all, capabilities, law, costs)?;
+        let kind = DynamicsKind::ContactInverse(contacts.to_vec(), actuation);
+        let mut robot = RobotDynamics::new(model, all, capabilities, kind, costs)?;
         robot.terms.require(limits)?;
         Ok(Self(robot))
     }
@@ -92,6 +92,6 @@ impl ContactInverseDynamics {
     /// If `x` has not nq + nv numbers.
     #[track_caller]
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.hold(x)
+        self.inner_mut().0.quasi_static(x)
     }
 }

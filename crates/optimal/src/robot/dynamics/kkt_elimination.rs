@@ -58,7 +58,7 @@ pub(crate) struct KktElimination {
     passive: usize,
     /// The coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
-    /// The rows that are solved before, stage after stage, each with its column.
+    /// The rows that are solved before, elimination after elimination, each with its column.
     before: Vec<Vec<(usize, usize)>>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
@@ -129,11 +129,17 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau of which so many stages are solved; says whether there were pivots.
+    /// Writes U and D for steps of Δt, from a tableau of which so many eliminations are solved; says whether there were pivots.
     /// Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], stages: usize, dt: f64, form: &mut InverseDynamicsForm) -> bool {
+    pub(crate) fn run(
+        &mut self,
+        tableau: &mut [f64],
+        eliminations: usize,
+        dt: f64,
+        form: &mut InverseDynamicsForm,
+    ) -> bool {
         let mut done = false;
-        at_level(Run { elimination: self, T: tableau, stages, dt, form, done: &mut done });
+        at_level(Run { elimination: self, T: tableau, eliminations, dt, form, done: &mut done });
         done
     }
 
@@ -262,7 +268,7 @@ impl KktElimination {
 struct Run<'a> {
     elimination: &'a mut KktElimination,
     T: &'a mut [f64],
-    stages: usize,
+    eliminations: usize,
     dt: f64,
     form: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
@@ -271,12 +277,12 @@ struct Run<'a> {
 impl Vectorized for Run<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { elimination: e, T, stages, dt, form, done } = self;
+        let Self { elimination: e, T, eliminations, dt, form, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let solved = rows + e.passive;
         e.pivots.clear();
         e.pivots.resize(solved, usize::MAX);
-        e.before[..stages].iter().flatten().for_each(|(r, k)| e.pivots[*r] = *k);
+        e.before[..eliminations].iter().flatten().for_each(|(r, k)| e.pivots[*r] = *k);
         let (T, motion) = T.split_at_mut(solved * stride);
         if e.pivots.contains(&usize::MAX) && !e.eliminate::<V>(T, motion) {
             return;

@@ -3,14 +3,14 @@
 use super::contact::{ContactAcceleration, ContactDynamics};
 use super::free::{FreeAcceleration, FreeDynamics};
 use super::impulse::ImpulseDynamics;
-use super::inverse::{ControlledAcceleration, InverseDynamics};
+use super::inverse::{ControlledAcceleration, FreeInverseDynamics};
 use super::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
 use super::robot::RobotDynamics;
 use crate::ActionModel;
 use crate::Error;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 use crate::robot::contact::Contact;
-use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
+use crate::robot::continuous::{ContinuousModel, Derivatives, Evaluation, KnotInput};
 use crate::robot::costs::{Cost, Costs};
 use crate::robot::integrators::Integrated;
 use crate::robot::limits::{Limit, Limits};
@@ -42,7 +42,7 @@ pub(crate) fn knot_of(action: &mut dyn ActionModel) -> Option<&mut dyn HasRobot>
             }
         })*};
     }
-    find!(FreeDynamics, ContactDynamics, InverseDynamics, ContactInverseDynamics, ImpulseDynamics);
+    find!(FreeDynamics, ContactDynamics, FreeInverseDynamics, ContactInverseDynamics, ImpulseDynamics);
     knot_of(action.inner_mut()?)
 }
 
@@ -125,7 +125,7 @@ macro_rules! robot_knots {
         }
     )*};
 }
-robot_knots!(FreeDynamics, ContactDynamics, InverseDynamics, ContactInverseDynamics, ImpulseDynamics);
+robot_knots!(FreeDynamics, ContactDynamics, FreeInverseDynamics, ContactInverseDynamics, ImpulseDynamics);
 
 /// Continuous models of a robot.
 macro_rules! robot_models {
@@ -157,16 +157,16 @@ macro_rules! robot_models {
                 self.0.lanes()
             }
 
-            fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
-                self.0.prepare(knots, xs, us, wanted);
+            fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation) {
+                self.0.prepare(knots, xs, us, what);
             }
 
             fn calc(&mut self, input: KnotInput<'_>) -> (&[f64], f64) {
                 self.0.calc(input)
             }
 
-            fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
-                self.0.calc_diff(input, scale, node)
+            fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_> {
+                self.0.calc_diff(input, scale, knot)
             }
 
             fn hessian(&mut self, input: KnotInput<'_>, mu: &[f64], hessian: &mut Hessian) -> Option<Derivatives<'_>> {
@@ -201,8 +201,8 @@ macro_rules! robot_models {
                 self.0.outputs(input.lane, show);
             }
 
-            fn hold(&mut self, x: &[f64]) -> Option<Vec<f64>> {
-                Some(self.0.hold(x))
+            fn quasi_static(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+                Some(self.0.quasi_static(x))
             }
 
             fn reserve(&mut self) {
@@ -221,7 +221,7 @@ macro_rules! robot_models {
                 self.0.terms.serve(t, horizon, model);
             }
 
-            fn fork(&self) -> Option<Self> {
+            fn try_clone(&self) -> Option<Self> {
                 Some(self.clone())
             }
 

@@ -149,7 +149,7 @@ impl LimbElimination {
         };
         let base = base.map(|(solved, compared, least)| pattern.solve(rows..rows + passive, solved, compared, least));
         let base = Arc::new(Self { blocks: base.into_iter().collect() });
-        [limbs, base].into_iter().filter(|stage| !stage.blocks.is_empty()).collect()
+        [limbs, base].into_iter().filter(|elimination| !elimination.blocks.is_empty()).collect()
     }
 
     /// The column that each row of a tableau was solved for, if it was.

@@ -1,17 +1,17 @@
 //! Dynamics of a robot: what its knots of all kinds share.
 #![allow(non_snake_case)] // J
 
-use super::batch::{KnotBatch, Law, Pass};
+use super::batch::{DynamicsKind, KnotBatch, Pass};
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use super::sensitivities::DynamicsSensitivities;
 use crate::Error;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 use crate::robot::actuation::Actuation;
 use crate::robot::capabilities::{Capabilities, Output};
 use crate::robot::contact::{Contact, SHARED, check_contacts, constraint_set, moved_by};
-use crate::robot::continuous::{Derivatives, KnotInput, Wanted};
+use crate::robot::continuous::{Derivatives, Evaluation, KnotInput};
 use crate::robot::costs::Cost;
 use crate::robot::horizon_terms::HorizonTerms;
 use crate::robot::knot::{KnotData, KnotState};
@@ -49,7 +49,7 @@ pub(crate) struct RobotDynamics {
     pub model: Arc<Model>,
     pub actuation: Actuation,
     pub terms: HorizonTerms,
-    law: Law,
+    kind: DynamicsKind,
     /// The output that the controls drive.
     given: Output,
     capabilities: Capabilities,
@@ -76,7 +76,7 @@ pub(crate) struct Work {
     vectors: Option<VectorBatches>,
     /// The knots of the group that was prepared, and what was computed of them.
     pub data: Vec<KnotData>,
-    prepared: Wanted,
+    prepared: Evaluation,
     elimination: Option<KktElimination>,
     group_hessian: GroupHessian,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
@@ -92,9 +92,9 @@ struct VectorBatches {
 }
 
 /// The number of knots that are computed side by side.
-fn lanes(law: &Law) -> usize {
-    match (law, level()) {
-        (Law::None, _) | (_, Level::Baseline) => 1,
+fn lanes(kind: &DynamicsKind) -> usize {
+    match (kind, level()) {
+        (DynamicsKind::None, _) | (_, Level::Baseline) => 1,
         (_, Level::Simd128 | Level::Neon | Level::Avx2) => Short::LANES,
         (_, Level::Avx512) => Long::LANES,
     }
@@ -102,10 +102,10 @@ fn lanes(law: &Law) -> usize {
 
 impl VectorBatches {
     /// Makes room for the equations of knots in inverse-dynamics form, in the widest lanes: they are for derivatives.
-    fn reserve(&mut self, tableau: Tableau, stages: Vec<Arc<LimbElimination>>) {
+    fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         match &mut self.long {
-            Some(long) => long.reserve(tableau, stages),
-            None => self.short.reserve(tableau, stages),
+            Some(long) => long.reserve(tableau, eliminations),
+            None => self.short.reserve(tableau, eliminations),
         }
     }
 
@@ -120,7 +120,7 @@ impl VectorBatches {
                 Some(long) => long.run_equations_at(model, &x, to),
                 None => self.short.run_equations_at(model, &x, to),
             }
-            (at.stages > 0).then_some(at.equations)
+            (at.eliminations > 0).then_some(at.equations)
         })
     }
 }
@@ -130,43 +130,43 @@ impl Work {
     fn new(
         model: &Model,
         actuation: &Actuation,
-        law: &Law,
+        kind: &DynamicsKind,
         given: Output,
         capabilities: &Capabilities,
         groups: &[Range<usize>],
     ) -> Self {
-        let (nv, lanes) = (model.nv(), lanes(law));
+        let (nv, lanes) = (model.nv(), lanes(kind));
         let mut vectors = (lanes > 1).then(|| {
-            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, law));
-            VectorBatches { short: KnotBatch::new(model, law), long }
+            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, kind));
+            VectorBatches { short: KnotBatch::new(model, kind), long }
         });
-        let moved_by = match law {
-            Law::Free => Some(Vec::new()),
-            Law::Contact(contacts, _) => Some(moved_by(model, contacts)),
+        let moved_by = match kind {
+            DynamicsKind::Free => Some(Vec::new()),
+            DynamicsKind::Contact(contacts, _) => Some(moved_by(model, contacts)),
             _ => None,
         };
         // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
         let mut data = KnotData::new(nv, capabilities, given);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
-            let damped = matches!(law, Law::Contact(_, damping) if *damping != 0.0);
+            let damped = matches!(kind, DynamicsKind::Contact(_, damping) if *damping != 0.0);
             let tableau = Tableau { nv, rows: capabilities.rows() };
             data.equations.resize(tableau.len(), 0.0);
             let mut elimination = KktElimination::new(nv, passive, &moved_by);
-            let stages = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
+            let eliminations = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
                 elimination.follow(vec![limbs.solved()]);
                 vectors.reserve(tableau, vec![limbs.clone()]);
                 elimination.base_pivots(&mut vectors.some_equations(model, &data)?)
             });
-            elimination.follow(stages.iter().map(|stage| stage.solved()).collect());
-            vectors.reserve(tableau, stages);
+            elimination.follow(eliminations.iter().map(|elimination| elimination.solved()).collect());
+            vectors.reserve(tableau, eliminations);
             elimination
         });
         Self {
-            single: KnotBatch::new(model, law),
+            single: KnotBatch::new(model, kind),
             vectors,
             data: vec![data; lanes],
-            prepared: Wanted::Motion,
+            prepared: Evaluation::Motion,
             elimination,
             group_hessian: GroupHessian::new(nv, groups),
             da_du: actuation.scratch(),
@@ -179,19 +179,19 @@ impl Work {
         terms: &mut HorizonTerms,
         KnotInput { lane, t, x, u }: KnotInput<'_>,
         scale: f64,
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) -> bool {
         let Self { data, elimination: Some(elimination), .. } = self else { return false };
-        let form = &mut node.inverse_dynamics;
-        let KnotData { equations, stages, .. } = &mut data[lane];
-        if !elimination.run(equations, *stages, scale, form) {
+        let form = &mut knot.inverse_dynamics;
+        let KnotData { equations, eliminations, .. } = &mut data[lane];
+        if !elimination.run(equations, *eliminations, scale, form) {
             return false;
         }
         form.active = true;
         let lent = form.lend();
         let state = KnotState { x, u, data: &data[lane] };
-        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, node);
-        node.inverse_dynamics.take_back(lent);
+        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, knot);
+        knot.inverse_dynamics.take_back(lent);
         true
     }
 }
@@ -206,18 +206,20 @@ impl RobotDynamics {
         model: Arc<Model>,
         actuation: Actuation,
         capabilities: Capabilities,
-        law: Law,
+        kind: DynamicsKind,
         costs: Vec<Cost>,
     ) -> Result<Self, Error> {
-        match &law {
-            Law::Contact(contacts, damping) => check_contacts(&model, contacts, *damping)?,
-            Law::ContactInverse(contacts, _) => check_contacts(&model, contacts, SHARED)?,
+        match &kind {
+            DynamicsKind::Contact(contacts, damping) => check_contacts(&model, contacts, *damping)?,
+            DynamicsKind::ContactInverse(contacts, _) => check_contacts(&model, contacts, SHARED)?,
             _ => {}
         }
         actuation.check(&model)?;
         let terms = HorizonTerms::new(model.clone(), capabilities.clone(), costs)?;
         let singular = model.singular_joints();
-        if !singular.is_empty() && (capabilities.impulse || matches!(law, Law::Free | Law::Contact(..))) {
+        if !singular.is_empty()
+            && (capabilities.impulse || matches!(kind, DynamicsKind::Free | DynamicsKind::Contact(..)))
+        {
             let why = "nothing with a mass moves with the joints";
             let names: Vec<_> = singular.iter().map(|&i| format!("`{}`", model.bodies()[i].joint_name)).collect();
             let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
@@ -225,13 +227,13 @@ impl RobotDynamics {
         }
         let given = if capabilities.inverse { Output::Acceleration } else { Output::Effort };
         let groups = groups(&model);
-        Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: OnDemand::default() })
+        Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
     }
 
     /// The contacts of its law, in the order of their forces.
     pub(crate) fn contacts(&self) -> &[Contact] {
-        match &self.law {
-            Law::Contact(contacts, _) | Law::ContactInverse(contacts, _) => contacts,
+        match &self.kind {
+            DynamicsKind::Contact(contacts, _) | DynamicsKind::ContactInverse(contacts, _) => contacts,
             _ => &[],
         }
     }
@@ -253,16 +255,17 @@ impl RobotDynamics {
 
     /// The robot, its drives, the terms of its knots, and the memory in which they are computed.
     pub(crate) fn parts(&mut self) -> Parts<'_> {
-        let Self { model, actuation, terms, law, given, capabilities, groups, work } = self;
+        let Self { model, actuation, terms, kind, given, capabilities, groups, work } = self;
         terms.reserve();
-        let work = work.get(|| Work::new(model, actuation, law, *given, capabilities, groups));
+        let work = work.get(|| Work::new(model, actuation, kind, *given, capabilities, groups));
         Parts { model, actuation, terms, capabilities, groups, work }
     }
 
     /// As [`ActionModel::merge`](crate::ActionModel::merge).
     pub(crate) fn merge(&mut self, other: &mut Self) -> bool {
         let same = Arc::ptr_eq(&self.model, &other.model)
-            && (&self.law, &self.actuation, &self.capabilities) == (&other.law, &other.actuation, &other.capabilities);
+            && (&self.kind, &self.actuation, &self.capabilities)
+                == (&other.kind, &other.actuation, &other.capabilities);
         if same {
             self.terms.append(&mut other.terms);
         }
@@ -271,11 +274,11 @@ impl RobotDynamics {
 
     /// As [`ContinuousModel::lanes`](crate::robot::ContinuousModel::lanes).
     pub(crate) fn lanes(&self) -> usize {
-        lanes(&self.law)
+        lanes(&self.kind)
     }
 
     /// As [`ContinuousModel::prepare`](crate::robot::ContinuousModel::prepare): side by side where that is worthwhile.
-    pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
+    pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation) {
         let Parts { model, actuation, terms, capabilities, work, .. } = self.parts();
         let Work { single, vectors, data, prepared, .. } = work;
         let (nu, nx, count) = (capabilities.nu, model.nq() + model.nv(), knots.len());
@@ -287,22 +290,22 @@ impl RobotDynamics {
                 data.lambda.copy_from_slice(forces);
             }
         }
-        match vectors.as_mut().filter(|_| count >= WORTHWHILE || wanted == Wanted::Equations) {
-            Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || wanted != Wanted::Motion => {
-                long.run(model, knots, xs, terms, wanted, data);
+        match vectors.as_mut().filter(|_| count >= WORTHWHILE || what == Evaluation::Equations) {
+            Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || what != Evaluation::Motion => {
+                long.run(model, knots, xs, terms, what, data);
             }
-            Some(VectorBatches { short, .. }) => short.run(model, knots, xs, terms, wanted, data),
+            Some(VectorBatches { short, .. }) => short.run(model, knots, xs, terms, what, data),
             None => {
                 for (k, data) in data.chunks_exact_mut(1).enumerate() {
-                    single.run(model, &knots[k..=k], &xs[k * nx..][..nx], terms, wanted, data);
+                    single.run(model, &knots[k..=k], &xs[k * nx..][..nx], terms, what, data);
                 }
             }
         }
         for (k, data) in data.iter_mut().enumerate().filter(|(_, data)| !data.residuals.is_written) {
-            let slopes = wanted != Wanted::Motion;
+            let slopes = what != Evaluation::Motion;
             single.run_residuals_at(model, knots[k], &xs[k * nx..][..nx], terms, slopes, data);
         }
-        *prepared = wanted;
+        *prepared = what;
     }
 
     /// As [`ContinuousModel::calc`](crate::robot::ContinuousModel::calc).
@@ -313,22 +316,22 @@ impl RobotDynamics {
     }
 
     /// As [`ContinuousModel::calc_diff`](crate::robot::ContinuousModel::calc_diff).
-    pub(crate) fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
+    pub(crate) fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_> {
         let given = self.given;
         let Parts { model, actuation, terms, work, .. } = self.parts();
-        let in_equations = work.prepared == Wanted::Equations;
-        let inverse = in_equations && work.write_inverse_dynamics_form(terms, input, scale, node);
+        let in_equations = work.prepared == Evaluation::Equations;
+        let inverse = in_equations && work.write_inverse_dynamics_form(terms, input, scale, knot);
         let Work { single, data, da_du, .. } = work;
         if in_equations && !inverse {
             let data = &mut data[input.lane..=input.lane];
-            single.run(model, &[input.t], input.x, terms, Wanted::Derivatives, data);
+            single.run(model, &[input.t], input.x, terms, Evaluation::Derivatives, data);
         }
         let KnotInput { lane, t, x, u } = input;
         let data = &data[lane];
         let [da_dq, da_dv, da_dtau] = &data.da;
         if !inverse {
             let sensitivities = DynamicsSensitivities { given, data, actuation };
-            terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, scale, node);
+            terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, scale, knot);
         }
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
@@ -382,17 +385,17 @@ impl RobotDynamics {
     /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q); and
     /// where accelerations are controls, none of these.
     #[track_caller]
-    pub(crate) fn hold(&mut self, x: &[f64]) -> Vec<f64> {
+    pub(crate) fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         assert_length("x", x.len(), nq + nv);
         // one state does not need the memory of many knots, which may not be there
-        let Self { model, actuation, law, .. } = &*self;
+        let Self { model, actuation, kind, .. } = &*self;
         let (data, zero, mut J) = (&mut Data::new(model), vec![0.0; nv], DMatrix::zeros(0, nv));
-        let (contacts, drives): (&[Contact], _) = match law {
-            Law::Inverse => return zero, // q̈ = u
-            Law::Contact(contacts, _) => (contacts, actuation),
-            Law::ContactInverse(contacts, drives) => (contacts, drives),
-            Law::None | Law::Free => (&[], actuation),
+        let (contacts, drives): (&[Contact], _) = match kind {
+            DynamicsKind::Inverse => return zero, // q̈ = u
+            DynamicsKind::Contact(contacts, _) => (contacts, actuation),
+            DynamicsKind::ContactInverse(contacts, drives) => (contacts, drives),
+            DynamicsKind::None | DynamicsKind::Free => (&[], actuation),
         };
         if !contacts.is_empty() {
             let mut set = constraint_set(model, contacts, SHARED).expect("was checked when it was given");
@@ -401,9 +404,9 @@ impl RobotDynamics {
             J = DMatrix::zeros(set.rows(), nv);
             set.jacobian(&mut J);
         }
-        let mut both = drives.hold(gravity(model, data, &x[..nq]), &J);
+        let mut both = drives.quasi_static(gravity(model, data, &x[..nq]), &J);
         let forces = both.split_off(drives.nu());
-        if matches!(law, Law::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ) = u, or τ = S u
+        if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ) = u, or τ = S u
     }
 
     /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // B, S, R
 
 use super::Integrator;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 
 /// The polynomial u(s) that the controls of a knot follow, at the time s of its Δt, from 0 to 1.
 ///
@@ -66,9 +66,9 @@ impl ControlPolynomial {
 }
 
 /// Writes the derivatives of a step by u = w₀ as those by all w, the others zero.
-pub(super) fn widen(from: &LqNode, node: &mut LqNode) {
+pub(super) fn widen(from: &LqKnot, knot: &mut LqKnot) {
     let (n, nu) = (from.ndx(), from.nu());
-    let LqNode { A, B, Q, S, R, q, r, .. } = node;
+    let LqKnot { A, B, Q, S, R, q, r, .. } = knot;
     for part in [&mut *B, &mut *S, &mut *R] {
         part.fill(0.0);
     }

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // A, B
 
 use super::retraction::Retraction;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, limit_term};
 use condyle_linalg::{Vector, Vectorized, at_level};
 
@@ -35,23 +35,23 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     input: KnotInput<'_>,
     dt: f64,
     step: &mut Retraction,
-    node: &mut LqNode,
+    knot: &mut LqKnot,
 ) {
     let (nv, v) = (model.nv(), &input.x[model.nq()..]);
-    let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, dt, node);
+    let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, dt, knot);
     step.set_euler(v, a, dt);
-    let inverse = node.inverse_dynamics.active;
+    let inverse = knot.inverse_dynamics.active;
     if !inverse {
-        let (by_q, by_v) = node.A.as_mut_slice().split_at_mut(2 * nv * nv);
-        let parts = [(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, node.B.as_mut_slice())];
+        let (by_q, by_v) = knot.A.as_mut_slice().split_at_mut(2 * nv * nv);
+        let parts = [(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, knot.B.as_mut_slice())];
         at_level(Steps(parts, nv, dt));
-        (0..nv).for_each(|k| node.A[(k, nv + k)] += dt);
+        (0..nv).for_each(|k| knot.A[(k, nv + k)] += dt);
     }
     step.differentiate(model);
-    step.write_blocks(model.groups(), node.structure.set_euler(dt, model.groups()));
+    step.write_blocks(model.groups(), knot.structure.set_euler(dt, model.groups()));
     if !inverse {
-        step.chain(model.groups(), &mut node.A);
-        step.multiply(model.groups(), &mut node.B);
+        step.chain(model.groups(), &mut knot.A);
+        step.multiply(model.groups(), &mut knot.B);
     }
 }
 

@@ -7,13 +7,13 @@ mod integrator;
 mod retraction;
 mod runge_kutta;
 
-use super::continuous::{ContinuousModel, KnotInput, Wanted, limit_term};
+use super::continuous::{ContinuousModel, Evaluation, KnotInput, limit_term};
 use super::on_demand::OnDemand;
 use crate::ActionModel;
 use crate::Error;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
-use crate::problem::{Visit, hold};
+use crate::lq::{Hessian, LqKnot};
+use crate::problem::{Visit, quasi_static};
 pub use controls::ControlPolynomial;
 use controls::widen;
 use curvature::Curvature;
@@ -36,7 +36,7 @@ pub struct Integrated<M> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Method {
     /// The end of a horizon, where time stands still.
-    Still,
+    Terminal,
     /// A semi-implicit Euler step of Δt.
     Euler(f64),
     /// A Runge–Kutta step of Δt, of so many stages.
@@ -50,7 +50,7 @@ struct Work {
     curvature: Curvature,
     runge_kutta: Option<RungeKutta>,
     /// A step by its first controls, where there are others.
-    first: Option<Box<LqNode>>,
+    first: Option<Box<LqKnot>>,
 }
 
 impl<M: ContinuousModel> Integrated<M> {
@@ -77,10 +77,10 @@ impl<M: ContinuousModel> Integrated<M> {
     /// # Panics
     /// If the model has controls.
     #[track_caller]
-    pub fn end(model: M) -> Self {
+    pub fn without_time(model: M) -> Self {
         assert!(model.nu() == 0, "`model` has {} controls, expected 0 at the end", model.nu());
         let (controls, work) = (ControlPolynomial::Constant, OnDemand::default());
-        Self { inner: model, method: Method::Still, controls, bounds: None, work }
+        Self { inner: model, method: Method::Terminal, controls, bounds: None, work }
     }
 
     /// The model, the rule of a step, and its memory.
@@ -93,7 +93,7 @@ impl<M: ContinuousModel> Integrated<M> {
             };
             let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(inner));
             let first = (!controls.is_constant() && runge_kutta.is_none())
-                .then(|| Box::new(LqNode::zeros(2 * inner.nv(), inner.nu())));
+                .then(|| Box::new(LqKnot::zeros(2 * inner.nv(), inner.nu())));
             Work { retraction, curvature, runge_kutta, first }
         });
         (inner, *method, work)
@@ -103,7 +103,7 @@ impl<M: ContinuousModel> Integrated<M> {
     /// Bounds, also those given before, hold at each node of the polynomial.
     #[must_use]
     pub fn with_controls(mut self, controls: ControlPolynomial) -> Self {
-        if self.method != Method::Still {
+        if self.method != Method::Terminal {
             (self.controls, self.work) = (controls, OnDemand::default());
         }
         let (nu, nodes) = (self.inner.nu(), self.controls.nodes());
@@ -143,7 +143,7 @@ impl<M: ContinuousModel> Integrated<M> {
         knots: &[usize],
         xs: &[f64],
         us: &[f64],
-        wanted: Wanted,
+        what: Evaluation,
         mut visit: impl FnMut(&mut Self, KnotInput<'_>, usize),
     ) {
         let (nx, nu, lanes) = (self.nx(), self.nu(), self.lanes());
@@ -153,7 +153,7 @@ impl<M: ContinuousModel> Integrated<M> {
             let to = (from + lanes).min(knots.len());
             if !matches!(self.method, Method::RungeKutta(..)) {
                 let controls = &us[from * nu..][..(to - from) * self.inner.nu()]; // one knot, unless they are constant
-                self.inner.prepare(&knots[from..to], &xs[from * nx..to * nx], controls, wanted);
+                self.inner.prepare(&knots[from..to], &xs[from * nx..to * nx], controls, what);
             }
             for i in from..to {
                 let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
@@ -163,24 +163,24 @@ impl<M: ContinuousModel> Integrated<M> {
         }
     }
 
-    /// Writes the derivatives of a group in inverse-dynamics form, from the motion that the nodes know, or else from its own.
-    fn write_equations(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    /// Writes the derivatives of a group in inverse-dynamics form, from the motion that the knots know, or else from its own.
+    fn write_equations(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         let (nx, nu, lanes, size) = (self.nx(), self.nu(), self.lanes(), self.motion_size());
-        for (k, nodes) in nodes.chunks_mut(lanes).enumerate() {
-            let (from, count) = (k * lanes, nodes.len());
+        for (k, lq_knots) in lq_knots.chunks_mut(lanes).enumerate() {
+            let (from, count) = (k * lanes, lq_knots.len());
             let (knots, xs, us) =
                 (&knots[from..][..count], &xs[from * nx..][..count * nx], &us[from * nu..][..count * nu]);
-            if nodes.iter().all(|node| node.inverse_dynamics.knows_motion) {
-                for (lane, node) in nodes.iter().enumerate() {
-                    self.inner.set_motion(lane, &node.inverse_dynamics.motion[..size]);
+            if lq_knots.iter().all(|knot| knot.inverse_dynamics.knows_motion) {
+                for (lane, knot) in lq_knots.iter().enumerate() {
+                    self.inner.set_motion(lane, &knot.inverse_dynamics.motion[..size]);
                 }
             } else {
-                self.inner.prepare(knots, xs, us, Wanted::Motion);
+                self.inner.prepare(knots, xs, us, Evaluation::Motion);
             }
-            self.inner.prepare(knots, xs, us, Wanted::Equations);
-            for (lane, (node, &t)) in nodes.iter_mut().zip(knots).enumerate() {
+            self.inner.prepare(knots, xs, us, Evaluation::Equations);
+            for (lane, (knot, &t)) in lq_knots.iter_mut().zip(knots).enumerate() {
                 let (x, u) = (&xs[lane * nx..][..nx], &us[lane * nu..][..nu]);
-                self.differentiate(KnotInput { lane, t, x, u }, node);
+                self.differentiate(KnotInput { lane, t, x, u }, knot);
             }
         }
     }
@@ -209,17 +209,17 @@ impl<M: ContinuousModel> Integrated<M> {
     }
 
     /// Writes the derivatives at a prepared state.
-    fn differentiate(&mut self, input: KnotInput<'_>, node: &mut LqNode) {
+    fn differentiate(&mut self, input: KnotInput<'_>, knot: &mut LqKnot) {
         match self.parts() {
             (inner, Method::Euler(dt), Work { retraction, first: Some(first), .. }) => {
                 euler::calc_diff(inner, input, dt, retraction, first);
-                widen(first, node);
+                widen(first, knot);
             }
-            (inner, Method::Euler(dt), work) => euler::calc_diff(inner, input, dt, &mut work.retraction, node),
+            (inner, Method::Euler(dt), work) => euler::calc_diff(inner, input, dt, &mut work.retraction, knot),
             (inner, Method::RungeKutta(dt, _), Work { runge_kutta: Some(method), retraction, .. }) => {
-                method.calc_diff(inner, input, dt, retraction, node);
+                method.calc_diff(inner, input, dt, retraction, knot);
             }
-            (inner, ..) => _ = inner.calc_diff(input, 1.0, node),
+            (inner, ..) => _ = inner.calc_diff(input, 1.0, knot),
         }
     }
 }
@@ -241,8 +241,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
-    fn is_end(&self) -> bool {
-        self.method == Method::Still
+    fn is_terminal(&self) -> bool {
+        self.method == Method::Terminal
     }
 
     fn lanes(&self) -> usize {
@@ -277,9 +277,9 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         if self.is_simple_step() { self.inner.inverse_dynamics_form() } else { None }
     }
 
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         let Self { inner, method, controls, bounds, work } = self;
-        let (inner, bounds, work) = (inner.fork()?, bounds.clone(), work.clone());
+        let (inner, bounds, work) = (inner.try_clone()?, bounds.clone(), work.clone());
         Some(Box::new(Self { inner, method: *method, controls: *controls, bounds, work }))
     }
 
@@ -288,8 +288,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         let nx = self.nx();
         assert_length("next", next.len(), knots.len() * nx);
         assert_length("costs", costs.len(), knots.len());
-        self.each(knots, xs, us, Wanted::Motion, |knot, input, i| {
-            costs[i] = knot.step(input, &mut next[i * nx..][..nx]);
+        self.each(knots, xs, us, Evaluation::Motion, |integrated, input, i| {
+            costs[i] = integrated.step(input, &mut next[i * nx..][..nx]);
         });
     }
 
@@ -310,53 +310,55 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         let (nx, room, size) = (self.nx(), motions.len() / knots.len(), self.motion_size());
         assert_length("next", next.len(), knots.len() * nx);
         assert_length("costs", costs.len(), knots.len());
-        self.each(knots, xs, us, Wanted::Motion, |knot, input, i| {
+        self.each(knots, xs, us, Evaluation::Motion, |integrated, input, i| {
             if size > 0 {
-                knot.inner.motion(input.lane, &mut motions[i * room..][..size]);
+                integrated.inner.motion(input.lane, &mut motions[i * room..][..size]);
             }
-            costs[i] = knot.step(input, &mut next[i * nx..][..nx]);
+            costs[i] = integrated.step(input, &mut next[i * nx..][..nx]);
         });
     }
 
     #[track_caller]
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        assert_length("nodes", nodes.len(), knots.len());
-        if nodes.first().is_some_and(|node| node.inverse_dynamics.wanted) && self.inverse_dynamics_form().is_some() {
-            return self.write_equations(knots, xs, us, nodes);
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        assert_length("lq_knots", lq_knots.len(), knots.len());
+        if lq_knots.first().is_some_and(|knot| knot.inverse_dynamics.wanted) && self.inverse_dynamics_form().is_some() {
+            return self.write_equations(knots, xs, us, lq_knots);
         }
-        self.each(knots, xs, us, Wanted::Derivatives, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
+        self.each(knots, xs, us, Evaluation::Derivatives, |integrated, input, i| {
+            integrated.differentiate(input, &mut lq_knots[i])
+        });
     }
 
     #[track_caller]
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.assert_knot(x, u);
-        if self.method != Method::Still {
+        if self.method != Method::Terminal {
             assert_length("next", next.len(), self.nx());
         }
         let mut cost = 0.0;
-        self.each(&[t], x, u, Wanted::Motion, |knot, input, _| cost = knot.step(input, next));
+        self.each(&[t], x, u, Evaluation::Motion, |integrated, input, _| cost = integrated.step(input, next));
         cost
     }
 
     #[track_caller]
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.assert_knot(x, u);
-        self.each(&[t], x, u, Wanted::Derivatives, |knot, input, _| knot.differentiate(input, node));
+        self.each(&[t], x, u, Evaluation::Derivatives, |integrated, input, _| integrated.differentiate(input, knot));
     }
 
     fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        if self.method != Method::Still {
+        if self.method != Method::Terminal {
             let u = &u[..self.inner.nu()]; // u(0)
-            self.inner.prepare(&[t], x, u, Wanted::Motion);
+            self.inner.prepare(&[t], x, u, Evaluation::Motion);
             self.inner.outputs(KnotInput { lane: 0, t, x, u }, show);
         }
     }
 
     #[track_caller]
-    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
-        match self.inner.hold(x) {
+    fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        match self.inner.quasi_static(x) {
             Some(u) => u.repeat(self.controls.nodes()),
-            None => hold::newton(self, t, x),
+            None => quasi_static::newton(self, t, x),
         }
     }
 

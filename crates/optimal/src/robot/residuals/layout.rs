@@ -161,7 +161,7 @@ pub(crate) struct ResidualData {
     /// The residuals of kinematics: those of costs, and those of limits.
     pub kinematic: [KinematicData; 2],
     /// M q̈ + h − g at a knot with contacts, else −g. Shape: nv.
-    pub surplus: Vec<f64>,
+    pub gravity_residual: Vec<f64>,
     /// The derivatives of the surplus by q, v, q̈; of −g that by q. Shape: nv × nv.
     pub dsurplus: [DMatrix<f64>; 3],
     /// J_c (v⁺ − v) at an impact: the change of the velocity of the centre of mass.
@@ -189,8 +189,8 @@ impl ResidualData {
             }
         }
         let requirements = layouts[0].requirements | layouts[1].requirements;
-        if requirements.gravity && self.surplus.is_empty() {
-            self.surplus.resize(nv, 0.0);
+        if requirements.gravity && self.gravity_residual.is_empty() {
+            self.gravity_residual.resize(nv, 0.0);
             self.dsurplus.fill(DMatrix::zeros(nv, nv));
         }
         if requirements.impulse_com && self.dcom_change[0].is_empty() {

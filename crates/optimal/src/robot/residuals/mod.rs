@@ -3,12 +3,12 @@
 pub(super) mod autodiff;
 pub(super) mod cones;
 pub(super) mod frame_name;
+pub(super) mod gravity_residual;
 pub(super) mod kernel;
 pub(super) mod layout;
 pub(super) mod own;
 pub(super) mod residual;
 pub(super) mod rows;
-pub(super) mod surplus;
 pub(super) mod target;
 pub(super) mod terms;
 pub(super) mod view;

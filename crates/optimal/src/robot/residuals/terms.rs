@@ -3,7 +3,7 @@
 use super::layout::{KnotLayout, Plan};
 use super::residual::{Part, Residual};
 use super::view::ResidualView;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use crate::robot::knot::Sensitivities;
 
 /// A residual that is worth something.
@@ -99,14 +99,14 @@ impl<T: Term> Terms<T> {
     }
 
     /// Adds to the gradient and the Hessian of what the terms are worth: first the rows of Jacobians to those that are
-    /// collected in the scratch, then (`diagonal`) what has no rows to q, r, Q, R of the node.
+    /// collected in the scratch, then (`diagonal`) what has no rows to q, r, Q, R of the knot.
     pub(crate) fn differentiate(
         &self,
         view: &mut ResidualView<'_>,
         sensitivities: &dyn Sensitivities,
         objective: &mut impl Objective<T>,
         diagonal: bool,
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) {
         for (term, plan) in self.weighty() {
             let residual = term.residual();
@@ -118,7 +118,7 @@ impl<T: Term> Terms<T> {
             objective.slopes(term, plan, &s.r[..plan.n], &mut s.d[..plan.n], &mut s.dd[..plan.n]);
             match diagonal {
                 false => view.push_rows(residual, plan, sensitivities),
-                true => view.add_diagonal(residual, node),
+                true => view.add_diagonal(residual, knot),
             }
         }
     }

@@ -1,11 +1,11 @@
-//! Values of residuals, and how their Jacobians come into a node; costs and limits say what they are worth.
+//! Values of residuals, and how their Jacobians come into a knot; costs and limits say what they are worth.
 #![allow(non_snake_case)] // D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
-use crate::lq::{Hessian, LARGEST_BLOCK, LqNode};
+use crate::lq::{Hessian, LARGEST_BLOCK, LqKnot};
 use crate::robot::capabilities::Output;
 use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::state::{groups, state_difference};
@@ -51,13 +51,13 @@ impl Scratch {
     }
 
     /// Writes q, r, Q, S and R from all rows and second derivatives.
-    pub(crate) fn write(&mut self, node: &mut LqNode) {
-        self.rows.write(node);
+    pub(crate) fn write(&mut self, knot: &mut LqKnot) {
+        self.rows.write(knot);
         if let Some(hessians) = &self.hessians {
             let [_, Hessian { xx, xu, uu }] = &**hessians;
-            node.Q += xx;
-            node.S += xu;
-            node.R += uu;
+            knot.Q += xx;
+            knot.S += xu;
+            knot.R += uu;
         }
     }
 }
@@ -89,7 +89,7 @@ impl ResidualView<'_> {
             Residual::State { reference } => state_difference(model, reference, x, r), // x ⊖ x_ref
             Residual::Control { reference } => minus(r, u, reference),
             Residual::ControlGravity => {
-                r.copy_from_slice(&data.residuals.surplus);
+                r.copy_from_slice(&data.residuals.gravity_residual);
                 if !plan.in_contact {
                     r.iter_mut().zip(&data.tau).for_each(|(r, tau)| *r += tau); // τ − g
                 }
@@ -224,20 +224,20 @@ impl ResidualView<'_> {
     }
 
     /// Adds gradient and Hessian of a state's or a control's residual that was just computed.
-    pub(crate) fn add_diagonal(&mut self, residual: &Residual, node: &mut LqNode) {
+    pub(crate) fn add_diagonal(&mut self, residual: &Residual, knot: &mut LqKnot) {
         match residual {
-            Residual::State { .. } => self.add_state(node),
-            _ => add_control_diagonal(node, &self.scratch.d, &self.scratch.dd),
+            Residual::State { .. } => self.add_state(knot),
+            _ => add_control_diagonal(knot, &self.scratch.d, &self.scratch.dd),
         }
     }
 
     /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity but for the groups' blocks of q.
-    fn add_state(&mut self, node: &mut LqNode) {
+    fn add_state(&mut self, knot: &mut LqKnot) {
         let Self { model, scratch: s, .. } = self;
         let nv = model.nv();
         let mut from = 0;
         for group in s.groups.iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
-            add_state_diagonal(node, from..group.start, &s.d, &s.dd);
+            add_state_diagonal(knot, from..group.start, &s.d, &s.dd);
             from = group.end;
         }
         if s.groups.is_empty() {
@@ -264,8 +264,8 @@ impl ResidualView<'_> {
                 }
             }
             for a in 0..size {
-                node.q[start + a] += g[a];
-                let column = &mut node.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
+                knot.q[start + a] += g[a];
+                let column = &mut knot.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
                 column.iter_mut().zip(&H[a]).for_each(|(Q, H)| *Q += H);
             }
         }

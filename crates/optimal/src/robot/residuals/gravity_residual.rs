@@ -1,4 +1,4 @@
-//! Surplus: the efforts of a knot beyond those that hold the robot still, for several knots side by side or for one.
+//! Gravity residual: the efforts of a knot beyond those that hold the robot still, for several knots side by side or for one.
 
 use super::kernel::KnotGroup;
 use crate::robot::knot::unpack;
@@ -9,14 +9,14 @@ use nalgebra::DMatrix;
 
 /// M q̈ + h − g at knots with contacts, else −g.
 #[derive(Debug)]
-pub(crate) struct Surplus<S> {
+pub(crate) struct GravityResidual<S> {
     /// The value. Shape: nv.
     value: Vec<S>,
     /// The derivative by q. Shape: nv × nv.
     by_q: DMatrix<S>,
 }
 
-impl<S: Block<Number = f64>> Surplus<S> {
+impl<S: Block<Number = f64>> GravityResidual<S> {
     /// Scratch for a robot with nv coordinates.
     pub(crate) fn new(nv: usize) -> Self {
         Self { value: vec![S::zero(); nv], by_q: DMatrix::from_element(nv, nv, S::zero()) }
@@ -37,7 +37,7 @@ impl<S: Block<Number = f64>> Surplus<S> {
             false => value.fill(S::zero()),
         }
         subtract(value, gravity(model, data, q)); // M q̈ + h − g
-        unpack(value, group.data, |data| &mut data.residuals.surplus);
+        unpack(value, group.data, |data| &mut data.residuals.gravity_residual);
         if !group.slopes {
             return;
         }

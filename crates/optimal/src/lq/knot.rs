@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use super::inverse_dynamics_form::InverseDynamicsForm;
-use super::structure::{EulerBlock, LARGEST_BLOCK, Structure};
+use super::structure::{DynamicsStructure, EulerBlock, LARGEST_BLOCK};
 use crate::error::assert_length;
 use core::fmt;
 use nalgebra::{DMatrix, DVector};
@@ -19,7 +19,7 @@ pub(crate) const DIVERGED: f64 = 1e30;
 /// with lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q and
 /// q are read.
 #[derive(Clone, PartialEq)]
-pub struct LqNode {
+pub struct LqKnot {
     /// ∂x⁺/∂x, ndx × ndx.
     pub A: DMatrix<f64>,
     /// ∂x⁺/∂u, ndx × nu.
@@ -41,23 +41,23 @@ pub struct LqNode {
     /// Upper bound of δu, nu; ∞ for none. Written by the solver.
     pub upper: DVector<f64>,
     /// Structure of A and B, as far as it is known.
-    pub structure: Structure,
+    pub structure: DynamicsStructure,
     /// Equations of inverse dynamics, which replace A, B, S, R and part of Q if solver and action support them.
     pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
 /// Formats the fields that a user writes, without the scratch of the sweep.
-impl fmt::Debug for LqNode {
+impl fmt::Debug for LqKnot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, structure, .. } = self;
-        let mut shown = f.debug_struct("LqNode");
+        let mut shown = f.debug_struct("LqKnot");
         shown.field("A", A).field("B", B).field("f", gap).field("Q", Q).field("S", S).field("R", R);
         shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper).field("structure", structure);
         shown.finish_non_exhaustive()
     }
 }
 
-impl LqNode {
+impl LqKnot {
     /// Maximum number of states, and of controls: it bounds the size of a knot's matrices.
     pub const MOST_SIZE: usize = 4096;
 
@@ -80,7 +80,7 @@ impl LqNode {
             r: DVector::zeros(nu),
             lower: DVector::from_element(nu, f64::NEG_INFINITY),
             upper: DVector::from_element(nu, f64::INFINITY),
-            structure: Structure::default(),
+            structure: DynamicsStructure::default(),
             inverse_dynamics: InverseDynamicsForm::default(),
         }
     }
@@ -130,7 +130,7 @@ fn assert_shape(name: &str, matrix: &DMatrix<f64>, shape: (usize, usize)) {
 /// Result of a sweep at one knot: the feedback δu = k + K δx, and the value function V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx +
 /// const of the rest of the horizon.
 #[derive(Debug, Clone, PartialEq)]
-pub struct LqKnot {
+pub struct KnotFeedback {
     /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
     pub K: DMatrix<f64>,
     /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
@@ -150,7 +150,7 @@ pub struct LqKnot {
     pub(super) is_put_off: bool,
 }
 
-impl LqKnot {
+impl KnotFeedback {
     /// Creates a knot of zeros with ndx states and nu controls.
     pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
         Self {

@@ -3,11 +3,11 @@
 use super::action::ActionModel;
 
 /// Actions of all knots: a problem's own, or copies of them.
-pub(crate) struct Actors<'a> {
+pub(crate) struct ActionView<'a> {
     /// Initial state x̂₀.
     pub(super) x0: &'a [f64],
     /// Model of each knot, and the action that represents each model.
-    pub(super) stages: &'a [usize],
+    pub(super) knot_models: &'a [usize],
     pub(super) places: &'a [[usize; 2]],
     pub(super) actions: Actions<'a>,
 }
@@ -23,7 +23,7 @@ pub(super) enum Actions<'a> {
 /// Message for a violated condition that [`Problem::two`](super::Problem::two) and the users of copies guarantee.
 const COPIED: &str = "copies serve the knots before the terminal one";
 
-impl Actors<'_> {
+impl ActionView<'_> {
     /// Returns the initial state x̂₀.
     pub(crate) fn x0(&self) -> &[f64] {
         self.x0
@@ -31,7 +31,7 @@ impl Actors<'_> {
 
     /// Returns the action of knot t.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
-        let place = self.stages.get(t).map(|stage| self.places[*stage][0]);
+        let place = self.knot_models.get(t).map(|model| self.places[*model][0]);
         match (&self.actions, place) {
             (Actions::Own(actions, _), Some(k)) => &*actions[k],
             (Actions::Own(_, terminal), None) => &**terminal,
@@ -41,7 +41,7 @@ impl Actors<'_> {
 
     /// Returns the action of knot t, for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
-        let place = self.stages.get(t).map(|stage| self.places[*stage][0]);
+        let place = self.knot_models.get(t).map(|model| self.places[*model][0]);
         match (&mut self.actions, place) {
             (Actions::Own(actions, _), Some(k)) => &mut *actions[k],
             (Actions::Own(_, terminal), None) => &mut **terminal,
