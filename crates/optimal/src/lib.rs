@@ -71,25 +71,26 @@
 //! ```
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-mod constrained;
-mod ddp;
 mod error;
 mod lq;
 mod problem;
 #[cfg(feature = "serde")]
 mod read;
 pub mod robot;
+mod solvers;
 mod time;
 
-pub use constrained::{
-    AugmentedLagrangian, AutoDiffConstraint, Constrained, ConstraintSettings, GenericConstraint, Outcome,
-    PathConstraint, Violation, ViolationKind,
-};
-pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{DynamicsStructure, EulerBlock, Hessian, KnotFeedback, LqKnot, Sweep, SweepError};
 pub use nalgebra;
-pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
+pub use problem::{
+    ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, Lqr, NumDiff,
+    PathConstraint, Problem, Unicycle,
+};
+pub use solvers::{
+    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, Iteration, Observer, Outcome, Settings, Solution, Status,
+    Timings, Verdict, Violation, ViolationKind,
+};
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;
 

@@ -1,8 +1,7 @@
-//! Knots of a linear-quadratic problem, and the results of a sweep at them.
-#![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
+//! Knots of a linear-quadratic problem.
+#![allow(non_snake_case)] // the names of the literature: A, B, Q, …
 
-use super::inverse_dynamics_form::InverseDynamicsForm;
-use super::structure::{DynamicsStructure, EulerBlock, LARGEST_BLOCK};
+use super::structure::{DynamicsStructure, EulerBlock, InverseDynamicsForm, LARGEST_BLOCK};
 use crate::error::assert_length;
 use core::fmt;
 use nalgebra::{DMatrix, DVector};
@@ -52,7 +51,8 @@ impl fmt::Debug for LqKnot {
         let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, structure, .. } = self;
         let mut shown = f.debug_struct("LqKnot");
         shown.field("A", A).field("B", B).field("f", gap).field("Q", Q).field("S", S).field("R", R);
-        shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper).field("structure", structure);
+        shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper);
+        shown.field("structure", structure);
         shown.finish_non_exhaustive()
     }
 }
@@ -125,45 +125,6 @@ impl LqKnot {
 #[track_caller]
 fn assert_shape(name: &str, matrix: &DMatrix<f64>, shape: (usize, usize)) {
     assert!(matrix.shape() == shape, "`{name}` has shape {:?}, expected {shape:?}", matrix.shape());
-}
-
-/// Result of a sweep at one knot: the feedback δu = k + K δx, and the value function V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx +
-/// const of the rest of the horizon.
-#[derive(Debug, Clone, PartialEq)]
-pub struct KnotFeedback {
-    /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
-    pub K: DMatrix<f64>,
-    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
-    pub k: DVector<f64>,
-    /// Gradient of the value function at δx = 0, ndx.
-    pub Vx: DVector<f64>,
-    /// Hessian of the value function, with the regularisation on its diagonal; ndx × ndx, symmetric.
-    pub Vxx: DMatrix<f64>,
-    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu; zero for a control at its bound.
-    pub Qu: DVector<f64>,
-    /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
-    pub Quu: DMatrix<f64>,
-    /// Quᵀk and kᵀQuu k: the change of the cost that a full step is expected to make, to first order and (twice) to
-    /// second order.
-    pub expected: [f64; 2],
-    /// Whether K, Qu and Quu store the data from which K and k are computed later: see [`Gains`](super::gains::Gains).
-    pub(super) is_put_off: bool,
-}
-
-impl KnotFeedback {
-    /// Creates a knot of zeros with ndx states and nu controls.
-    pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
-        Self {
-            K: DMatrix::zeros(nu, ndx),
-            k: DVector::zeros(nu),
-            Vx: DVector::zeros(ndx),
-            Vxx: DMatrix::zeros(ndx, ndx),
-            Qu: DVector::zeros(nu),
-            Quu: DMatrix::zeros(nu, nu),
-            expected: [0.0; 2],
-            is_put_off: false,
-        }
-    }
 }
 
 /// Second derivatives of a function ψ(δx, δu) of one knot; see

@@ -2,9 +2,8 @@
 
 mod box_qp;
 mod conditional_value;
+mod feedback;
 mod forms;
-mod gains;
-mod inverse_dynamics_form;
 mod knot;
 mod segments;
 mod step;
@@ -12,11 +11,11 @@ mod structure;
 mod sweep;
 mod workspace;
 
-pub(crate) use gains::Gains;
-pub(crate) use inverse_dynamics_form::InverseDynamicsForm;
+pub(crate) use feedback::Gains;
+pub use feedback::KnotFeedback;
 pub(crate) use knot::DIVERGED;
-pub use knot::{Hessian, KnotFeedback, LqKnot};
+pub use knot::{Hessian, LqKnot};
 pub use step::SweepError;
-pub(crate) use structure::LARGEST_BLOCK;
 pub use structure::{DynamicsStructure, EulerBlock};
+pub(crate) use structure::{InverseDynamicsForm, LARGEST_BLOCK};
 pub use sweep::Sweep;

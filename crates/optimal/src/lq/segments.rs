@@ -20,8 +20,10 @@
 #![allow(non_snake_case)] // the names of the literature
 
 use super::conditional_value::{Link, SegmentValue, Value};
-use super::knot::{Hessian, KnotFeedback, LqKnot};
-use super::step::{Sizes, Step, SweepError};
+use super::feedback::KnotFeedback;
+use super::forms::Sizes;
+use super::knot::LqKnot;
+use super::step::{Step, SweepError, SweepOptions};
 use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
@@ -152,7 +154,7 @@ enum Pass {
 #[derive(Clone, Copy)]
 struct SegmentTask<'a> {
     pass: Pass,
-    /// Nodes of the whole horizon.
+    /// Knots of the whole horizon.
     knots: &'a [LqKnot],
     regularisation: f64,
     /// Whether threads share the segments.
@@ -160,12 +162,12 @@ struct SegmentTask<'a> {
 }
 
 impl SegmentTask<'_> {
-    /// Does the task for some of the segments, given all knots.
+    /// Does the task for some of the segments, given the feedback of all knots.
     fn over(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         self.run(segments, &mut feedback[segments[0].knots.start..]);
     }
 
-    /// Does the task for consecutive segments; `knots` begin with the knots of the first segment.
+    /// Does the task for consecutive segments; `feedback` begins with the first knot of the first segment.
     fn run(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         if let [segment] = segments {
             return self.run_one(segment, feedback);
@@ -180,21 +182,21 @@ impl SegmentTask<'_> {
         }
     }
 
-    /// Does the task for one segment, given its knots.
+    /// Does the task for one segment, given the feedback of its knots.
     fn run_one(self, segment: &mut Segment, feedback: &mut [KnotFeedback]) {
         let Self { pass, knots, regularisation, .. } = self;
         let Segment { knots: range, step, value, end, result, good } = segment;
         let (first, own) = (range.start, &knots[range.clone()]);
-        let no_curvature = &mut |_: usize, _: &[f64], _: &mut Hessian| false;
+        let options = &mut SweepOptions::linear(regularisation);
         match pass {
             Pass::Begin if range.end + 1 == knots.len() => {
-                *result = step.run(first, &knots[first..], feedback, regularisation, no_curvature);
+                *result = step.run(first, &knots[first..], feedback, options);
             }
             Pass::Begin => *good = value.run(step, own, regularisation),
             Pass::Finish => {
                 step.work.P.copy_from_slice(&end.P);
                 step.work.p.copy_from_slice(&end.p);
-                *result = step.back(first, own, feedback, regularisation, no_curvature);
+                *result = step.back(first, own, feedback, options);
             }
         }
     }

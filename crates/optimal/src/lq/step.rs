@@ -1,8 +1,9 @@
 //! Steps of the Riccati recursion.
 #![allow(non_snake_case)] // the names of the literature: H, L, X, Vxx
 
-use super::forms::{Controls, Curvature, Driven, Forms, InverseDynamics};
-use super::knot::{Hessian, KnotFeedback, LqKnot};
+use super::feedback::KnotFeedback;
+use super::forms::{Curvature, CurvatureFn, Forms, Sizes};
+use super::knot::{Hessian, LqKnot};
 use super::workspace::Workspace;
 
 /// Reason why a sweep stopped before the first knot.
@@ -28,30 +29,20 @@ pub enum SweepError {
     },
 }
 
-/// Largest numbers of states and controls of some knots, and their requirements for inverse dynamics.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sizes {
-    /// Number of states.
-    pub(super) n: usize,
-    /// Largest number of controls.
-    pub(super) m: usize,
-    /// Requirements as returned by [`InverseDynamics::room`].
-    inverse_dynamics: [usize; 3],
+/// Options of a sweep, which hold for all of its knots.
+pub(super) struct SweepOptions<'a> {
+    /// Number that is added to the diagonals of Quu and Vxx.
+    pub(super) regularisation: f64,
+    /// Whether gains are deferred, if a form supports it: see [`Gains`](super::feedback::Gains).
+    pub(super) defers_gains: bool,
+    /// Function that computes the curvature of the dynamics; `None` if they count as linear.
+    pub(super) curvature: Option<&'a mut CurvatureFn<'a>>,
 }
 
-impl Sizes {
-    /// Returns the sizes of some knots.
-    pub(super) fn of(knots: &[LqKnot]) -> Self {
-        Self {
-            n: knots.last().map_or(0, LqKnot::ndx),
-            m: knots.iter().map(LqKnot::nu).max().unwrap_or(0),
-            inverse_dynamics: InverseDynamics::room(knots),
-        }
-    }
-
-    /// Returns the maximum number of controls of knots in inverse-dynamics form: 0 without such knots.
-    pub(super) fn solved_controls(self) -> usize {
-        if self.inverse_dynamics[0] > 0 { self.m } else { 0 }
+impl SweepOptions<'_> {
+    /// Returns the options for linear dynamics, with gains that are written at once.
+    pub(super) fn linear(regularisation: f64) -> Self {
+        Self { regularisation, defers_gains: false, curvature: None }
     }
 }
 
@@ -59,12 +50,9 @@ impl Sizes {
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
     pub(super) work: Workspace,
-    /// Whether Vxx is written to the knots.
+    /// Whether Vxx is written to the feedback.
     pub(super) keep: bool,
-    /// Whether gains are deferred, if a form supports it: see [`Gains`](super::gains::Gains).
-    pub(super) puts_off: bool,
     forms: Forms,
-    controls: Controls,
     /// Curvature of the dynamics, one entry for each number of controls that occurs at knots with curvature.
     hessians: Vec<Hessian>,
 }
@@ -73,47 +61,41 @@ impl Step {
     /// Allocates the workspace for knots of the given sizes, with `below` additional rows in H. The dynamics may be
     /// curved at knots whose number of controls is in `curved`.
     pub(super) fn new(sizes: Sizes, below: usize, mut curved: Vec<usize>) -> Self {
-        let Sizes { n, m, inverse_dynamics } = sizes;
         curved.sort_unstable();
         curved.dedup();
         Self {
-            work: Workspace::new(n, m, below.max(Driven::rows_below(n, m))),
+            work: Workspace::new(sizes.n, sizes.m, below.max(sizes.rows_below())),
             keep: true,
-            puts_off: false,
-            forms: Forms::new(n, sizes.solved_controls(), inverse_dynamics),
-            controls: Controls::new(m),
-            hessians: curved.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
+            forms: Forms::new(sizes),
+            hessians: curved.into_iter().map(|nu| Hessian::zeros(sizes.n, nu)).collect(),
         }
     }
 
     /// Sweeps the end of a horizon. The first knot is knot `first`, and the last knot is the terminal one.
-    pub(crate) fn run(
+    pub(super) fn run(
         &mut self,
         first: usize,
         knots: &[LqKnot],
         feedback: &mut [KnotFeedback],
-        regularisation: f64,
-        curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+        options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
         let last = knots.len() - 1;
         self.work.start(&knots[last]);
-        self.finish(first + last, &mut feedback[last], regularisation)?;
-        self.back(first, &knots[..last], feedback, regularisation, curvature)
+        self.finish(first + last, &mut feedback[last], options.regularisation)?;
+        self.back(first, &knots[..last], feedback, options)
     }
 
     /// Makes the steps at `knots`, whose first is knot `first`, from P, p of the knot after them.
-    pub(crate) fn back(
+    pub(super) fn back(
         &mut self,
         first: usize,
         knots: &[LqKnot],
         feedback: &mut [KnotFeedback],
-        regularisation: f64,
-        curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+        options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
-        for i in (0..knots.len()).rev() {
-            let (t, feedback) = (first + i, &mut feedback[i]);
-            self.step(t, &knots[i], feedback, regularisation, curvature)?;
-            self.finish(t, feedback, regularisation)?;
+        for (i, (knot, feedback)) in knots.iter().zip(feedback).enumerate().rev() {
+            self.step(first + i, knot, feedback, options)?;
+            self.finish(first + i, feedback, options.regularisation)?;
         }
         Ok(())
     }
@@ -124,23 +106,21 @@ impl Step {
         t: usize,
         knot: &LqKnot,
         feedback: &mut KnotFeedback,
-        regularisation: f64,
-        ask: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+        options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
-        let Self { work, forms, controls, hessians, puts_off, .. } = self;
+        let Self { work, forms, hessians, .. } = self;
+        let SweepOptions { regularisation, defers_gains, .. } = *options;
         let form = forms.of_step(knot, regularisation);
         work.move_by(knot.f.as_slice());
+        let ask = options.curvature.as_mut().map(|ask| &mut **ask as &mut CurvatureFn<'_>);
         form.write(work, knot, regularisation, &mut Curvature { knot: t, ask, hessians });
-        let eliminated =
-            form.eliminate(work, controls, knot, feedback).map_err(|(row, pivot)| match pivot.is_finite() {
-                true => SweepError::NotPositive { knot: t, row, pivot },
-                false => SweepError::NotFinite { knot: t },
-            })?;
+        let eliminated = form.eliminate(work, knot, feedback).map_err(|(row, pivot)| match pivot.is_finite() {
+            true => SweepError::NotPositive { knot: t, row, pivot },
+            false => SweepError::NotFinite { knot: t },
+        })?;
         work.take_value(work.stride(knot.nu()), eliminated, form.turn(knot.ndx()));
-        feedback.is_put_off = *puts_off && knot.nu() > 0 && form.put_off_gains(work, knot, feedback);
-        if !feedback.is_put_off {
-            form.recover_gains(work, controls, knot, feedback);
-        }
+        feedback.gains_deferred = false;
+        form.write_gains(work, knot, feedback, defers_gains);
         Ok(())
     }
 
@@ -155,17 +135,12 @@ impl Step {
         let Self { work, forms, .. } = self;
         let form = forms.of(knot);
         work.move_by(knot.f.as_slice());
-        form.write(
-            work,
-            knot,
-            regularisation,
-            &mut Curvature { knot: 0, ask: &mut |_, _, _| false, hessians: &mut [] },
-        );
+        form.write(work, knot, regularisation, &mut Curvature { knot: 0, ask: None, hessians: &mut [] });
         form.write_below(work, knot, Theta);
         (work, form.turn(knot.ndx()))
     }
 
-    /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to knot t.
+    /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to the feedback of knot t.
     fn finish(&mut self, t: usize, feedback: &mut KnotFeedback, regularisation: f64) -> Result<(), SweepError> {
         match self.work.finish_value(feedback, regularisation, self.keep) {
             true => Ok(()),

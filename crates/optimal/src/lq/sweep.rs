@@ -1,10 +1,11 @@
 //! Backward sweep that solves a linear-quadratic problem.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
-use super::gains::Gains;
-use super::knot::{Hessian, KnotFeedback, LqKnot};
+use super::feedback::{Gains, KnotFeedback};
+use super::forms::Sizes;
+use super::knot::{Hessian, LqKnot};
 use super::segments::Segments;
-use super::step::{Sizes, Step, SweepError};
+use super::step::{Step, SweepError, SweepOptions};
 use crate::error::assert_length;
 use condyle_dynamics::level::level;
 
@@ -27,8 +28,8 @@ use condyle_dynamics::level::level;
 /// knot uses it), as in Crocoddyl.
 ///
 /// A knot whose A and B have the structure of semi-implicit Euler ([`DynamicsStructure`](crate::DynamicsStructure))
-/// takes half the operations. With N = (Δt EᵀP₁₁ + P₂₁) T,
-/// Π = Δt²EᵀP₁₁E + Δt (EᵀP₁₂ + P₂₁E) + P₂₂, and A_v = [F_q F_v], B_v = G,
+/// takes half the operations. With N = (Δt EᵀP₁₁ + P₂₁) T, Π = Δt²EᵀP₁₁E + Δt (EᵀP₁₂ + P₂₁E) + P₂₂, and A_v = [F_q
+/// F_v], B_v = G,
 ///
 /// ```text
 /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   H += W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T
@@ -66,7 +67,7 @@ pub struct Sweep {
     /// Number of segments that was requested, and their workspaces, unless the number is one.
     at_once: usize,
     segments: Option<Segments>,
-    /// Scratch for the gains; see [`parts`](Self::parts).
+    /// Scratch for deferred gains, one for each thread: see [`follow`](Self::follow).
     gains: Vec<Gains>,
     sizes: Sizes,
 }
@@ -153,10 +154,10 @@ impl Sweep {
     #[track_caller]
     pub fn run(&mut self, knots: &[LqKnot], regularisation: f64) -> Result<(), SweepError> {
         self.check(knots);
-        let Self { segments, feedback, .. } = self;
+        let Self { segments, feedback, step, .. } = self;
         match segments.as_mut().and_then(|segments| segments.run(knots, feedback, regularisation)) {
             Some(result) => result,
-            None => self.run_with(knots, regularisation, |_, _, _| false),
+            None => step.run(0, knots, feedback, &mut SweepOptions::linear(regularisation)),
         }
     }
 
@@ -177,8 +178,8 @@ impl Sweep {
         mut curvature: impl FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
         self.check(knots);
-        self.step.puts_off = false;
-        self.step.run(0, knots, &mut self.feedback, regularisation, &mut curvature)
+        let mut options = SweepOptions { curvature: Some(&mut curvature), ..SweepOptions::linear(regularisation) };
+        self.step.run(0, knots, &mut self.feedback, &mut options)
     }
 
     /// Returns whether the sweep can proceed from knot to knot while they are computed; it cannot if it is cut into
@@ -187,13 +188,12 @@ impl Sweep {
         self.segments.is_none()
     }
 
-    /// Returns the parts of a sequential sweep: its steps, the knots that they write, and scratch for `threads` threads
-    /// that write deferred gains. The first step is [`Step::run`] at the terminal knot, the others are [`Step::back`].
-    pub(crate) fn parts(&mut self, threads: usize) -> (&mut Step, &mut [KnotFeedback], &mut [Gains]) {
+    /// Begins a sweep that receives the knots while they are computed, and defers their gains. Returns it, the feedback
+    /// that it writes, and scratch for `threads` threads that compute deferred gains.
+    pub(crate) fn follow(&mut self, threads: usize) -> (FollowingSweep<'_>, &mut [KnotFeedback], &mut [Gains]) {
         let Self { feedback, step, gains, sizes, .. } = self;
-        gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.solved_controls()));
-        step.puts_off = true;
-        (step, feedback, gains)
+        gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.deferred_controls()));
+        (FollowingSweep { step, is_at_end: true }, feedback, gains)
     }
 
     #[track_caller]
@@ -201,6 +201,33 @@ impl Sweep {
         assert_length("knots", knots.len(), self.feedback.len());
         for (knot, feedback) in knots.iter().zip(&self.feedback) {
             knot.assert_shapes(self.sizes.n, feedback.k.len());
+        }
+    }
+}
+
+/// Sweep that receives the knots in groups, from the last to the first.
+pub(crate) struct FollowingSweep<'a> {
+    step: &'a mut Step,
+    /// Whether the next group ends with the terminal knot.
+    is_at_end: bool,
+}
+
+impl FollowingSweep<'_> {
+    /// Sweeps the next group of knots, whose first is knot `first`. The first group ends with the terminal knot.
+    ///
+    /// # Errors
+    /// As [`Sweep::run`]. The sweep is then over.
+    pub(crate) fn run(
+        &mut self,
+        first: usize,
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
+        regularisation: f64,
+    ) -> Result<(), SweepError> {
+        let options = &mut SweepOptions { defers_gains: true, ..SweepOptions::linear(regularisation) };
+        match std::mem::replace(&mut self.is_at_end, false) {
+            true => self.step.run(first, knots, feedback, options),
+            false => self.step.back(first, knots, feedback, options),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Workspace of a step of the sweep.
 #![allow(non_snake_case)] // the names of the literature: P, F, W, H
 
-use super::knot::{DIVERGED, KnotFeedback, LqKnot};
+use super::feedback::KnotFeedback;
+use super::knot::{DIVERGED, LqKnot};
 use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric_turned, copy_with_squares};
 
 /// Value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step computes from it. Matrices
@@ -73,7 +74,7 @@ impl Workspace {
         }
     }
 
-    /// Adds ϱ 1 to P. Writes p to the knot, and P if `keep` is set. Returns whether they are finite and have not
+    /// Adds ϱ 1 to P. Writes p to the feedback, and P if `keep` is set. Returns whether they are finite and have not
     /// diverged.
     pub(crate) fn finish_value(&mut self, feedback: &mut KnotFeedback, regularisation: f64, keep: bool) -> bool {
         let Self { P, p, .. } = self;

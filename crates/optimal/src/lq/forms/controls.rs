@@ -2,13 +2,14 @@
 #![allow(non_snake_case)] // the names of the literature: K, Quu
 
 use super::super::box_qp::BoxQp;
-use super::super::knot::{KnotFeedback, LqKnot};
+use super::super::feedback::KnotFeedback;
+use super::super::knot::LqKnot;
 use super::super::workspace::Workspace;
 use condyle_linalg::{SLACK, View, copy_symmetric, dot, eliminate, solve_right, transpose_negated};
 
 /// Elimination of controls, with its scratch.
 #[derive(Debug, Clone)]
-pub(crate) struct Controls {
+pub(super) struct Controls {
     qp: BoxQp,
     /// Lᵀ, for the back substitution.
     upper: Vec<f64>,
@@ -18,12 +19,12 @@ pub(crate) struct Controls {
 
 impl Controls {
     /// Allocates the scratch for m controls.
-    pub(crate) fn new(m: usize) -> Self {
+    pub(super) fn new(m: usize) -> Self {
         Self { qp: BoxQp::new(m), upper: vec![0.0; (m + SLACK) * m], free: 0 }
     }
 
     /// Computes L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a
-    /// bound. Stores Qu and Quu in the knot and, if there are bounds, k in the scratch. Returns the number of these
+    /// bound. Stores Qu and Quu in the feedback and, if there are bounds, k in the scratch. Returns the number of these
     /// controls.
     ///
     /// # Errors
@@ -56,7 +57,7 @@ impl Controls {
     }
 
     /// Computes [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination. The states are rotated by `turn`.
-    pub(super) fn recover_gains(
+    pub(super) fn write_gains(
         &mut self,
         work: &mut Workspace,
         knot: &LqKnot,

@@ -1,14 +1,25 @@
 //! Quadratic form of a knot whose A and B have no known structure.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …
 
+use super::super::feedback::KnotFeedback;
 use super::super::knot::{Hessian, LqKnot};
 use super::super::workspace::Workspace;
+use super::controls::Controls;
 use super::{Curvature, KnotForm};
 use condyle_linalg::{SLACK, View, add_product_lower, copy_lower, copy_matrix, product, transpose};
 
-/// KnotForm with full matrices, and with the states in their original order.
+/// Form with full matrices, and with the states in their original order.
 #[derive(Debug, Clone)]
-pub(super) struct Dense;
+pub(super) struct Dense {
+    controls: Controls,
+}
+
+impl Dense {
+    /// Allocates the scratch for at most m controls.
+    pub(super) fn new(m: usize) -> Self {
+        Self { controls: Controls::new(m) }
+    }
+}
 
 impl KnotForm for Dense {
     fn turn(&self, _: usize) -> usize {
@@ -38,6 +49,20 @@ impl KnotForm for Dense {
         let ld = work.stride(m);
         let Workspace { F, H, .. } = work;
         product(&mut H[m + n + 1..], ld, [n, m + n, n], View::new(Theta, n + SLACK), View::new(F, ld));
+    }
+
+    fn eliminate(
+        &mut self,
+        work: &mut Workspace,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+    ) -> Result<usize, (usize, f64)> {
+        self.controls.eliminate(work, knot, feedback)
+    }
+
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, _: bool) {
+        let turn = self.turn(knot.ndx());
+        self.controls.write_gains(work, knot, feedback, turn);
     }
 }
 

@@ -12,11 +12,11 @@
 //! The elimination adds the rows of U and G, scaled so that their squares are added, to H tile by tile.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, U
 
-use super::super::gains::take_gains;
-use super::super::inverse_dynamics_form::InverseDynamicsForm;
-use super::super::knot::{KnotFeedback, LqKnot};
+use super::super::feedback::{KnotFeedback, take_gains};
+use super::super::knot::LqKnot;
+use super::super::structure::InverseDynamicsForm;
 use super::super::workspace::Workspace;
-use super::{Controls, Curvature, KnotForm};
+use super::{Curvature, KnotForm};
 use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_narrow_level, copy_scaled, eliminate_sum,
     transpose_block,
@@ -82,21 +82,15 @@ impl KnotForm for Driven {
     }
 
     /// Adds the squares and eliminates the unknowns. With U below H, the result is [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K], as
-    /// in [`Gains`](super::super::gains::Gains).
-    fn eliminate(
-        &self,
-        work: &mut Workspace,
-        _: &mut Controls,
-        knot: &LqKnot,
-        _: &mut KnotFeedback,
-    ) -> Result<usize, (usize, f64)> {
+    /// in [`Gains`](super::super::feedback::Gains).
+    fn eliminate(&mut self, work: &mut Workspace, knot: &LqKnot, _: &mut KnotFeedback) -> Result<usize, (usize, f64)> {
         let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         let shape = [m + n + 1 + m, m + n, m];
         eliminate_sum(&mut work.H, ld, shape, View::new(&self.rows, self.stride), [m + n + 1, self.count])?;
         Ok(m)
     }
 
-    fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, knot: &LqKnot, feedback: &mut KnotFeedback) {
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, _: bool) {
         let (all, ld) = (knot.ndx() + knot.nu(), work.stride(knot.nu()));
         let H = View::new(&work.H, ld);
         take_gains(H.at(all + 1, 0), H.at(all, 0), knot, feedback, &mut self.y);

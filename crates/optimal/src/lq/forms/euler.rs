@@ -1,9 +1,11 @@
 //! Quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, T, E
 
+use super::super::feedback::KnotFeedback;
 use super::super::knot::LqKnot;
 use super::super::structure::{EulerBlock, LARGEST_BLOCK};
 use super::super::workspace::Workspace;
+use super::controls::Controls;
 use super::dense::{add_to_diagonal, write_cost};
 use super::{Curvature, KnotForm};
 use condyle_linalg::{
@@ -17,12 +19,13 @@ pub(super) struct Euler {
     steps: Steps,
     /// Part of NᵀF_q; its stride equals the stride of Nᵀ and Π.
     M: Vec<f64>,
+    controls: Controls,
 }
 
 impl Euler {
-    /// Allocates the scratch for n states.
-    pub(super) fn new(n: usize) -> Self {
-        Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)] }
+    /// Allocates the scratch for n states and at most m controls.
+    pub(super) fn new(n: usize, m: usize) -> Self {
+        Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)], controls: Controls::new(m) }
     }
 }
 
@@ -41,7 +44,7 @@ impl KnotForm for Euler {
         let (n, m) = (knot.ndx(), knot.nu());
         let (nv, ld, rows) = (n / 2, work.stride(m), m + n);
         let ldn = nv + SLACK;
-        let Self { steps, M } = self;
+        let Self { steps, M, .. } = self;
         write_cost(work, knot, nv, curvature);
         steps.write(work, knot);
 
@@ -73,6 +76,20 @@ impl KnotForm for Euler {
         let Workspace { F, W: Psi, H, .. } = work;
         product(&mut H[m + n + 1..], ld, [n, m + n, n / 2], View::new(Psi, n + SLACK), View::new(F, ld));
         self.steps.add_positions_below(work, knot, Theta);
+    }
+
+    fn eliminate(
+        &mut self,
+        work: &mut Workspace,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+    ) -> Result<usize, (usize, f64)> {
+        self.controls.eliminate(work, knot, feedback)
+    }
+
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, _: bool) {
+        let turn = self.turn(knot.ndx());
+        self.controls.write_gains(work, knot, feedback, turn);
     }
 }
 

@@ -24,12 +24,12 @@
 //! U_w K_w and k = U_w k_w equal the explicit form's results, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
-use super::super::gains::Gains;
-use super::super::inverse_dynamics_form::InverseDynamicsForm;
-use super::super::knot::{KnotFeedback, LqKnot};
+use super::super::feedback::{Gains, KnotFeedback};
+use super::super::knot::LqKnot;
+use super::super::structure::InverseDynamicsForm;
 use super::super::workspace::Workspace;
 use super::euler::Steps;
-use super::{Controls, Curvature, KnotForm};
+use super::{Curvature, KnotForm};
 use condyle_linalg::{
     OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_narrow_level, copy_block, copy_matrix, copy_scaled,
     eliminate, mask,
@@ -37,7 +37,7 @@ use condyle_linalg::{
 
 /// Inverse-dynamics form, with its scratch.
 #[derive(Debug, Clone)]
-pub(crate) struct InverseDynamics {
+pub(super) struct InverseDynamics {
     steps: Steps,
     /// Outer products, with rows over (w, δv, δq).
     products: OuterProducts,
@@ -50,7 +50,7 @@ pub(crate) struct InverseDynamics {
 
 impl InverseDynamics {
     /// Returns the maximum requirements of some knots: numbers in rows, products, dependent coordinates.
-    pub(crate) fn room(knots: &[LqKnot]) -> [usize; 3] {
+    pub(super) fn room(knots: &[LqKnot]) -> [usize; 3] {
         let rooms = knots.iter().map(|LqKnot { inverse_dynamics: form, .. }| {
             let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
             [2 * (efforts + steps + costs) * form.stride, efforts + 2 * steps + costs, steps]
@@ -130,25 +130,19 @@ impl KnotForm for InverseDynamics {
         steps.add_positions_below(work, knot, Theta);
     }
 
-    fn eliminate(
-        &self,
-        work: &mut Workspace,
-        _: &mut Controls,
-        knot: &LqKnot,
-        _: &mut KnotFeedback,
-    ) -> Result<usize, (usize, f64)> {
+    fn eliminate(&mut self, work: &mut Workspace, knot: &LqKnot, _: &mut KnotFeedback) -> Result<usize, (usize, f64)> {
         let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         eliminate(&mut work.H, ld, [m + n + 1, m + n, m])?;
         Ok(m)
     }
 
-    fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, knot: &LqKnot, feedback: &mut KnotFeedback) {
-        self.gains.write(View::new(&work.H, work.stride(knot.nu())), knot, feedback);
-    }
-
-    fn put_off_gains(&self, work: &Workspace, knot: &LqKnot, feedback: &mut KnotFeedback) -> bool {
-        Gains::put_off(View::new(&work.H, work.stride(knot.nu())), knot, feedback);
-        true
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, defers: bool) {
+        let left = View::new(&work.H, work.stride(knot.nu()));
+        if defers && knot.nu() > 0 {
+            Gains::defer(left, knot, feedback);
+        } else {
+            self.gains.write(left, knot, feedback);
+        }
     }
 }
 

@@ -11,13 +11,13 @@ mod driven;
 mod euler;
 mod inverse_dynamics;
 
-use super::knot::{Hessian, KnotFeedback, LqKnot};
+use super::feedback::KnotFeedback;
+use super::knot::{Hessian, LqKnot};
 use super::workspace::Workspace;
-pub(super) use controls::Controls;
 use dense::Dense;
-pub(super) use driven::Driven;
+use driven::Driven;
 use euler::Euler;
-pub(super) use inverse_dynamics::InverseDynamics;
+use inverse_dynamics::InverseDynamics;
 
 /// Smallest ndx for which the form of Euler steps is faster than the dense form, as measured by `benches/riccati.rs`.
 const EULER_FROM: usize = 16;
@@ -34,37 +34,48 @@ pub(super) trait KnotForm {
     /// n + SLACK).
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]);
 
-    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns. By
-    /// default, they are the controls that are not at a bound.
+    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns.
     ///
     /// # Errors
     /// The row and its pivot, if the pivot is not positive.
     fn eliminate(
-        &self,
-        work: &mut Workspace,
-        controls: &mut Controls,
-        knot: &LqKnot,
-        feedback: &mut KnotFeedback,
-    ) -> Result<usize, (usize, f64)> {
-        controls.eliminate(work, knot, feedback)
-    }
-
-    /// Writes the gains of the knot, from the result of `eliminate` in H.
-    fn recover_gains(
         &mut self,
         work: &mut Workspace,
-        controls: &mut Controls,
         knot: &LqKnot,
         feedback: &mut KnotFeedback,
-    ) {
-        let turn = self.turn(knot.ndx());
-        controls.recover_gains(work, knot, feedback, turn);
+    ) -> Result<usize, (usize, f64)>;
+
+    /// Writes the gains of the knot, from the result of `eliminate` in H. If `defers`, a form may instead store the
+    /// factors from which [`Gains::finish`](super::feedback::Gains::finish) computes them.
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, defers: bool);
+}
+
+/// Sizes for which the workspace of a sweep is allocated.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    /// Number of states.
+    pub(super) n: usize,
+    /// Largest number of controls.
+    pub(super) m: usize,
+    /// Requirements as returned by [`InverseDynamics::room`].
+    room: [usize; 3],
+}
+
+impl Sizes {
+    /// Returns the sizes for some knots.
+    pub(super) fn of(knots: &[LqKnot]) -> Self {
+        let (n, m) = (knots.last().map_or(0, LqKnot::ndx), knots.iter().map(LqKnot::nu).max().unwrap_or(0));
+        Self { n, m, room: InverseDynamics::room(knots) }
     }
 
-    /// Stores in the knot the data from which [`Gains::finish`](super::gains::Gains::finish) computes its gains;
-    /// returns whether it did so.
-    fn put_off_gains(&self, _: &Workspace, _: &LqKnot, _: &mut KnotFeedback) -> bool {
-        false
+    /// Returns the maximum number of controls of knots whose gains may be deferred: 0 without such knots.
+    pub(super) fn deferred_controls(self) -> usize {
+        if self.room[0] > 0 { self.m } else { 0 }
+    }
+
+    /// Returns the number of rows that the forms need below H.
+    pub(super) fn rows_below(self) -> usize {
+        Driven::rows_below(self.n, self.m)
     }
 }
 
@@ -78,11 +89,15 @@ pub(super) struct Forms {
 }
 
 impl Forms {
-    /// Allocates the forms for n states, and for inverse dynamics with at most m controls and the requirements `room`
-    /// of [`InverseDynamics::room`].
-    pub(super) fn new(n: usize, m: usize, room: [usize; 3]) -> Self {
-        let (euler, inverse_dynamics) = (Euler::new(n), InverseDynamics::new(room, n, m));
-        Self { dense: Dense, euler, inverse_dynamics, driven: Driven::new(n) }
+    /// Allocates the forms.
+    pub(super) fn new(sizes: Sizes) -> Self {
+        let Sizes { n, m, room } = sizes;
+        Self {
+            dense: Dense::new(m),
+            euler: Euler::new(n, m),
+            inverse_dynamics: InverseDynamics::new(room, n, sizes.deferred_controls()),
+            driven: Driven::new(n),
+        }
     }
 
     /// Returns the form for a step at a knot.
@@ -105,20 +120,24 @@ impl Forms {
     }
 }
 
+/// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it did so.
+pub(super) type CurvatureFn<'a> = dyn FnMut(usize, &[f64], &mut Hessian) -> bool + 'a;
+
 /// Request for the curvature of a knot's dynamics; see [`Sweep::run_with`](crate::Sweep::run_with).
 pub(super) struct Curvature<'a> {
     /// Index of the knot.
     pub(super) knot: usize,
-    /// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it did so.
-    pub(super) ask: &'a mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
-    /// Storage for these derivatives, one entry for each number of controls.
+    /// Function that computes the curvature; `None` if the dynamics count as linear.
+    pub(super) ask: Option<&'a mut CurvatureFn<'a>>,
+    /// Storage for the curvature, one entry for each number of controls.
     pub(super) hessians: &'a mut [Hessian],
 }
 
 impl Curvature<'_> {
     /// Returns the second derivatives of λᵀφ at a knot with nu controls; `None` if the dynamics count as linear.
     fn at(&mut self, lambda: &[f64], nu: usize) -> Option<&Hessian> {
+        let ask = self.ask.as_mut()?;
         let hessian = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == nu)?;
-        (self.ask)(self.knot, lambda, hessian).then_some(&*hessian)
+        ask(self.knot, lambda, hessian).then_some(&*hessian)
     }
 }

@@ -1,22 +1,22 @@
 //! Multipliers of all constraints of a problem.
 
-use super::violation::{Violation, ViolationKind};
+use super::outcome::{Violation, ViolationKind};
 use crate::error::Error;
 use crate::problem::{PENALTY, Problem};
 
 /// State of all constraints at a trajectory.
 #[derive(Debug, Default)]
-pub(crate) struct Measured {
+pub(super) struct Measured {
     /// Largest violation; `None` if all constraints hold exactly.
-    pub(crate) worst: Option<Violation>,
+    pub(super) worst: Option<Violation>,
     /// Largest violation of a constraint that no control can change, because it depends on x₀ = x̂₀ alone.
-    pub(crate) fixed: Option<Violation>,
+    pub(super) fixed: Option<Violation>,
     /// Amount of the largest violation of all other constraints.
-    pub(crate) rest: f64,
+    pub(super) rest: f64,
     /// Largest absolute value of the next multipliers of all other constraints, |z − Π z| / μ.
-    pub(crate) multiplier: f64,
+    pub(super) multiplier: f64,
     /// Sum of the constraints' terms of the cost.
-    pub(crate) terms: f64,
+    pub(super) terms: f64,
 }
 
 impl Problem {
@@ -24,7 +24,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`Error`] if bounds have a wrong length or no value satisfies them.
-    pub(crate) fn start_constraints(&mut self, mu: f64) -> Result<(), Error> {
+    pub(super) fn start_constraints(&mut self, mu: f64) -> Result<(), Error> {
         let horizon = self.horizon();
         for t in 0..=horizon {
             let mut result = Ok(());
@@ -39,7 +39,7 @@ impl Problem {
     }
 
     /// Sets the multipliers of each knot whose number of constraints equals the number of given multipliers.
-    pub(crate) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
+    pub(super) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
         for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
             let mut all = 0;
             self.action_mut(t).constraints(t, &mut |bounded| all += bounded.count);
@@ -57,7 +57,7 @@ impl Problem {
     }
 
     /// Sets all multipliers to zero, and the penalty to its default value.
-    pub(crate) fn forget_multipliers(&mut self) {
+    pub(super) fn forget_multipliers(&mut self) {
         let knots = self.horizon() + 1;
         for t in 0..knots {
             self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.start(t, knots, 1.0 / PENALTY));
@@ -66,14 +66,14 @@ impl Problem {
     }
 
     /// Returns whether any knot has a constraint.
-    pub(crate) fn has_constraints(&mut self) -> bool {
+    pub(super) fn has_constraints(&mut self) -> bool {
         let mut any = false;
         (0..=self.horizon()).for_each(|t| self.action_mut(t).constraints(t, &mut |bounded| any |= bounded.count > 0));
         any
     }
 
     /// Sets the penalty 1/μ.
-    pub(crate) fn set_penalty(&mut self, mu: f64) {
+    pub(super) fn set_penalty(&mut self, mu: f64) {
         for t in 0..=self.horizon() {
             self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.set_mu(mu));
         }
@@ -81,7 +81,7 @@ impl Problem {
     }
 
     /// Updates y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
-    pub(crate) fn update_multipliers(&mut self) {
+    pub(super) fn update_multipliers(&mut self) {
         for t in 0..=self.horizon() {
             self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.update(t));
         }
@@ -90,7 +90,7 @@ impl Problem {
 
     /// Measures the constraints at the trajectory at which derivatives were computed last. `starts_at_x0` tells whether
     /// its x₀ is x̂₀. A constraint whose value is NaN has an infinite violation.
-    pub(crate) fn measure_constraints(&mut self, starts_at_x0: bool) -> Measured {
+    pub(super) fn measure_constraints(&mut self, starts_at_x0: bool) -> Measured {
         let mut all = Measured::default();
         for t in 0..=self.horizon() {
             let without_controls = self.nu(t) == 0;
@@ -128,7 +128,7 @@ impl Problem {
     }
 
     /// Copies the multipliers y of each knot. Allocates at the first call.
-    pub(crate) fn multipliers(&mut self, out: &mut Vec<Vec<f64>>) {
+    pub(super) fn multipliers(&mut self, out: &mut Vec<Vec<f64>>) {
         out.resize(self.horizon() + 1, vec![]);
         for (t, out) in out.iter_mut().enumerate() {
             out.clear();

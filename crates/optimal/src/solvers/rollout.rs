@@ -1,35 +1,16 @@
 //! Rollouts of several step lengths side by side.
 
+use super::iterate::{Iterate, Sum};
+use super::solution::Solution;
 use crate::lq::{DIVERGED, KnotFeedback};
 use crate::problem::{ActionView, Problem, Shape};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
 
-/// Sum that is rounded only once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Sum {
-    sum: f64,
-    /// Sum of the rounding errors.
-    lost: f64,
-}
-
-impl Sum {
-    pub(crate) fn add(&mut self, x: f64) {
-        let sum = self.sum + x;
-        let (large, small) = if self.sum.abs() >= x.abs() { (self.sum, x) } else { (x, self.sum) };
-        self.lost += (large - sum) + small;
-        self.sum = sum;
-    }
-
-    pub(crate) fn value(self) -> f64 {
-        self.sum + self.lost
-    }
-}
-
 /// Trial trajectories, one per step length, that are rolled out together: at each knot the trials form one group. They
 /// are stored knot after knot and, within a knot, trial after trial.
 #[derive(Debug, Clone)]
-pub(crate) struct Trials {
+pub(super) struct Trials {
     shape: Shape,
     /// Number of trials of the last run; at most `width`.
     count: usize,
@@ -54,17 +35,17 @@ pub(crate) struct Trials {
 
 /// Trajectory from which trials start, and the direction.
 #[derive(Clone, Copy)]
-pub(crate) struct Nominal<'a> {
-    pub(crate) xs: &'a [f64],
-    pub(crate) us: &'a [f64],
+pub(super) struct Nominal<'a> {
+    pub(super) xs: &'a [f64],
+    pub(super) us: &'a [f64],
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
-    pub(crate) gaps: Option<&'a [f64]>,
-    pub(crate) feedback: &'a [KnotFeedback],
+    pub(super) gaps: Option<&'a [f64]>,
+    pub(super) feedback: &'a [KnotFeedback],
 }
 
 impl Trials {
     /// Allocates the storage for `width` trials of `problem`.
-    pub(crate) fn new(problem: &Problem, width: usize) -> Self {
+    pub(super) fn new(problem: &Problem, width: usize) -> Self {
         let shape = problem.shape().clone();
         let horizon = shape.horizon();
         Self {
@@ -86,19 +67,19 @@ impl Trials {
     }
 
     /// Adapts the storage to a problem whose numbers of controls have changed.
-    pub(crate) fn reshape(&mut self, problem: &Problem) {
+    pub(super) fn reshape(&mut self, problem: &Problem) {
         self.shape.clone_from(problem.shape());
         self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
     }
 
     /// Sets the number of entries of each knot's motion that the next runs keep.
-    pub(crate) fn keep_motions(&mut self, size: usize) {
+    pub(super) fn keep_motions(&mut self, size: usize) {
         self.motion_size = size;
         self.motions.resize(self.shape.horizon() * self.width * size, 0.0);
     }
 
     /// Returns the maximum number of trials.
-    pub(crate) fn width(&self) -> usize {
+    pub(super) fn width(&self) -> usize {
         self.width
     }
 
@@ -107,9 +88,9 @@ impl Trials {
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
     ///
     /// with uₜ moved into its bounds. The knots begin the horizon or follow the knots of the last call.
-    pub(crate) fn run(
+    pub(super) fn run(
         &mut self,
-        action_view: &mut ActionView<'_>,
+        view: &mut ActionView<'_>,
         nominal: &Nominal<'_>,
         steps: &[f64],
         knots: RangeInclusive<usize>,
@@ -135,8 +116,8 @@ impl Trials {
                     x.copy_from_slice(x_nominal); // a valid state: the group call evaluates the action there
                     continue;
                 }
-                let action = action_view.action(t);
-                let predicted = if t == 0 { action_view.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
+                let action = view.action(t);
+                let predicted = if t == 0 { view.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
                 match nominal.gaps {
                     Some(gaps) if step != 1.0 => {
                         for (dx, f) in dx.iter_mut().zip(&gaps[shape.dx(t)]) {
@@ -159,7 +140,7 @@ impl Trials {
             }
             knot[..count].fill(t);
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
-            let action = action_view.action_mut(t);
+            let action = view.action_mut(t);
             let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
             match size {
                 _ if t == horizon => action.calc_group(knot, x_all, u_all, next_all, costs_all),
@@ -179,16 +160,16 @@ impl Trials {
     }
 
     /// Returns the cost of trial `i`, or `None` if the trial diverged.
-    pub(crate) fn cost(&self, i: usize) -> Option<f64> {
+    pub(super) fn cost(&self, i: usize) -> Option<f64> {
         (!self.failed[i]).then_some(self.costs[i].value())
     }
 
     /// Computes −Σ bᵀ (x ⊖ x_trial) for trial `i`, summed over the states x and the vectors b of all knots, both flat.
-    pub(crate) fn distance(&mut self, action_view: &ActionView<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
+    pub(super) fn distance(&mut self, view: &ActionView<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
         let mut dx = std::mem::take(&mut self.dx);
         let mut sum = 0.0;
         for t in 0..=self.shape.horizon() {
-            action_view.action(t).difference(self.x(i, t), &xs[self.shape.x(t)], &mut dx);
+            view.action(t).difference(self.x(i, t), &xs[self.shape.x(t)], &mut dx);
             sum -= dot(&b[self.shape.dx(t)], &dx);
         }
         self.dx = dx;
@@ -200,8 +181,9 @@ impl Trials {
         &self.xs[(t * self.count + i) * self.shape.nx..][..self.shape.nx]
     }
 
-    /// Copies trial `i` to the arguments.
-    pub(crate) fn copy_to(&self, i: usize, xs: &mut [f64], us: &mut [f64], next: &mut [f64], motions: &mut [f64]) {
+    /// Copies trial `i`, except its cost, to the iterate.
+    pub(super) fn copy_to(&self, i: usize, to: &mut Iterate) {
+        let Iterate { solution: Solution { xs, us, .. }, next, motions, .. } = to;
         for t in 0..=self.shape.horizon() {
             xs[self.shape.x(t)].copy_from_slice(self.x(i, t));
         }

@@ -3,7 +3,7 @@
 
 use crate::problem::{Problem, Shape};
 use core::fmt;
-use core::ops::{AddAssign, Range};
+use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -128,16 +128,6 @@ pub struct Timings {
     pub overrun: Duration,
 }
 
-/// Adds the phases of another part of the same solve. `total` and `overrun` are set at the end of the solve.
-impl AddAssign for Timings {
-    fn add_assign(&mut self, part: Self) {
-        self.calc += part.calc;
-        self.calc_diff += part.calc_diff;
-        self.sweep += part.sweep;
-        self.rollout += part.rollout;
-    }
-}
-
 impl Timings {
     /// Sets the duration of the whole solve, and the time beyond the budget.
     pub(crate) fn end(&mut self, total: Duration, budget: Option<Duration>) {
@@ -219,6 +209,17 @@ impl Solution {
         let horizon = self.shape.horizon();
         assert!(t < horizon, "`t` is {t}, expected less than {horizon}: knot {horizon} has no controls");
         &self.us[self.shape.u(t)]
+    }
+
+    /// Returns the regularisation with which a resumed solve begins: `start`, unless the last solve ran out of time or
+    /// iterations after a rejected step. It is then the regularisation of its end, as with a smaller one the same step
+    /// would be rejected again.
+    pub(super) fn resumed_regularisation(&self, start: f64) -> f64 {
+        let stopped = matches!(self.status, Status::TimeLimit | Status::MaxIterations | Status::Interrupted);
+        match self.trace.last() {
+            Some(last) if stopped && !last.accepted => last.regularisation.max(start),
+            _ => start,
+        }
     }
 
     /// Drops the first knot and appends one at the end, with its dimensions in `shape`. The new knot copies the last

@@ -1,8 +1,48 @@
-//! Gains of knots in inverse-dynamics form, from the result of the elimination of their unknowns.
-#![allow(non_snake_case)] // the names of the literature, and Y, U
+//! Results of a sweep at one knot, and the computation of gains from the elimination of other unknowns than controls.
+#![allow(non_snake_case)] // the names of the literature: K, Vxx, and Y, U
 
-use super::knot::{KnotFeedback, LqKnot};
+use super::knot::LqKnot;
 use condyle_linalg::{SLACK, View, add_product_vector, copy_matrix, eliminate_rows, transpose};
+use nalgebra::{DMatrix, DVector};
+
+/// Result of a sweep at one knot: the feedback δu = k + K δx, and the value function V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx +
+/// const of the rest of the horizon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnotFeedback {
+    /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
+    pub K: DMatrix<f64>,
+    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
+    pub k: DVector<f64>,
+    /// Gradient of the value function at δx = 0, ndx.
+    pub Vx: DVector<f64>,
+    /// Hessian of the value function, with the regularisation on its diagonal; ndx × ndx, symmetric.
+    pub Vxx: DMatrix<f64>,
+    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu; zero for a control at its bound.
+    pub Qu: DVector<f64>,
+    /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
+    pub Quu: DMatrix<f64>,
+    /// Quᵀk and kᵀQuu k: the change of the cost that a full step is expected to make, to first order and (twice) to
+    /// second order.
+    pub expected: [f64; 2],
+    /// Whether K, Qu and Quu store the factors from which [`Gains::finish`] computes K and k.
+    pub(super) gains_deferred: bool,
+}
+
+impl KnotFeedback {
+    /// Creates a knot of zeros with ndx states and nu controls.
+    pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
+        Self {
+            K: DMatrix::zeros(nu, ndx),
+            k: DVector::zeros(nu),
+            Vx: DVector::zeros(ndx),
+            Vxx: DMatrix::zeros(ndx, ndx),
+            Qu: DVector::zeros(nu),
+            Quu: DMatrix::zeros(nu, nu),
+            expected: [0.0; 2],
+            gains_deferred: false,
+        }
+    }
+}
 
 /// Computation of gains, with its scratch. Its input is [L; X; yᵀ], the eliminated columns of the unknowns w, and the
 /// controls δu = U (w, δx):
@@ -42,25 +82,26 @@ impl Gains {
         take_gains(View::new(rows, ld), left.at(all, 0), knot, feedback, y);
     }
 
-    /// Stores [L; X; yᵀ] in the knot, for [`finish`](Self::finish).
-    pub(super) fn put_off(left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
+    /// Stores [L; X; yᵀ] in the feedback, for [`finish`](Self::finish).
+    pub(super) fn defer(left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
         let (n, m) = (knot.ndx(), knot.nu());
         copy_matrix(feedback.Quu.as_mut_slice(), m, left, [m, m]);
         copy_matrix(feedback.K.as_mut_slice(), n, left.at(m, 0), [n, m]);
         copy_matrix(feedback.Qu.as_mut_slice(), 1, left.at(m + n, 0), [1, m]);
+        feedback.gains_deferred = true;
     }
 
     /// Writes the gains of all knots whose gains were deferred.
     pub(crate) fn finish(&mut self, knots: &[LqKnot], feedback: &mut [KnotFeedback]) {
         let mut left = core::mem::take(&mut self.left);
-        for (knot, feedback) in knots.iter().zip(feedback).filter(|(_, feedback)| feedback.is_put_off) {
+        for (knot, feedback) in knots.iter().zip(feedback).filter(|(_, feedback)| feedback.gains_deferred) {
             let (n, m) = (knot.ndx(), knot.nu());
             let ld = m + n + 1 + SLACK;
             copy_matrix(&mut left, ld, View::new(feedback.Quu.as_slice(), m), [m, m]);
             copy_matrix(&mut left[m..], ld, View::new(feedback.K.as_slice(), n), [n, m]);
             copy_matrix(&mut left[m + n..], ld, View::new(feedback.Qu.as_slice(), 1), [1, m]);
             self.write(View::new(&left, ld), knot, feedback);
-            feedback.is_put_off = false;
+            feedback.gains_deferred = false;
         }
         self.left = left;
     }

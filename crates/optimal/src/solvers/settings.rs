@@ -1,4 +1,4 @@
-//! Settings of the FDDP family.
+//! Settings of the solvers.
 
 use crate::error::Error;
 use core::fmt;
@@ -154,19 +154,28 @@ impl Settings {
         !feasible && self.method == DdpMethod::Fddp
     }
 
+    /// Returns a larger regularisation, up to the largest.
+    pub(super) fn increased(&self, regularisation: f64) -> f64 {
+        (regularisation * self.regularisation_factor).min(self.regularisation_max)
+    }
+
+    /// Returns a smaller regularisation, down to the smallest.
+    pub(super) fn decreased(&self, regularisation: f64) -> f64 {
+        (regularisation / self.regularisation_factor).max(self.regularisation_min)
+    }
+
     /// Checks the settings, as each solve does.
     ///
     /// # Errors
     /// [`Error::Setting`] for the first invalid field.
     pub fn check(&self) -> Result<(), Error> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        let from_zero = |x: f64| x >= 0.0 && x.is_finite();
         let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
-        let number = |x: f64| x.is_finite();
         let (above, below) = (self.regularisation_decrease_above, self.regularisation_increase_below);
-        for (name, value, good, allowed) in [
-            ("regularisation_decrease_above", above, number(above), "a finite number"),
-            ("regularisation_increase_below", below, number(below), "a finite number"),
+        let [start, min, max, factor] =
+            [self.regularisation_start, self.regularisation_min, self.regularisation_max, self.regularisation_factor];
+        check_all([
+            ("regularisation_decrease_above", above, above.is_finite(), "a finite number"),
+            ("regularisation_increase_below", below, below.is_finite(), "a finite number"),
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
             ("segments", segments, (1..=MOST_AT_ONCE).contains(&self.segments), AT_ONCE),
@@ -175,30 +184,93 @@ impl Settings {
             ("accept", self.accept, from_zero(self.accept), "at least 0"),
             ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),
             ("flat", self.flat, from_zero(self.flat), "at least 0"),
-            ("regularisation_min", self.regularisation_min, positive(self.regularisation_min), "above 0"),
-            (
-                "regularisation_max",
-                self.regularisation_max,
-                self.regularisation_max > self.regularisation_min && self.regularisation_max.is_finite(),
-                "above regularisation_min",
-            ),
+            ("regularisation_min", min, exceeds(0.0, min), "above 0"),
+            ("regularisation_max", max, exceeds(min, max), "above regularisation_min"),
             (
                 "regularisation_start",
-                self.regularisation_start,
-                (self.regularisation_min..self.regularisation_max).contains(&self.regularisation_start),
+                start,
+                (min..max).contains(&start),
                 "at least regularisation_min and below regularisation_max",
             ),
-            (
-                "regularisation_factor",
-                self.regularisation_factor,
-                self.regularisation_factor > 1.0 && self.regularisation_factor.is_finite(),
-                "above 1",
-            ),
-        ] {
-            if !good {
-                return Err(Error::Setting { name, value, allowed });
-            }
+            ("regularisation_factor", factor, exceeds(1.0, factor), "above 1"),
+        ])
+    }
+}
+
+/// Setting: name, value, whether it is valid, and the valid range in words.
+type Checked = (&'static str, f64, bool, &'static str);
+
+/// Returns the error of the first invalid setting, if one is invalid.
+fn check_all<const N: usize>(settings: [Checked; N]) -> Result<(), Error> {
+    match settings.into_iter().find(|(_, _, good, _)| !good) {
+        Some((name, value, _, allowed)) => Err(Error::Setting { name, value, allowed }),
+        None => Ok(()),
+    }
+}
+
+/// Returns whether x is finite and at least 0.
+fn from_zero(x: f64) -> bool {
+    x >= 0.0 && x.is_finite()
+}
+
+/// Returns whether x is finite and above the limit.
+fn exceeds(limit: f64, x: f64) -> bool {
+    x > limit && x.is_finite()
+}
+
+/// Settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct ConstraintSettings {
+    /// Maximum distance of a constraint from its bounds, and maximum gap of the dynamics.
+    pub tolerance: f64,
+    /// Maximum entry of the gradient of the Lagrangian.
+    pub tolerance_dual: f64,
+    /// Maximum number of inner solves.
+    pub max_solves: usize,
+    /// Penalty 1/μ of the first inner solve.
+    pub penalty_start: f64,
+    /// Largest penalty 1/μ.
+    pub penalty_max: f64,
+    /// Factor by which the penalty 1/μ rises.
+    pub penalty_factor: f64,
+    /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold it still
+    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if it ends as not finite, or with violated
+    /// constraints at the largest penalty. The better result is kept. Typical causes are warm starts that diverge or
+    /// saturate the controls. The repetition allocates. `resume` never repeats, nor does a problem without constraints
+    /// and bounds.
+    pub restart: bool,
+}
+
+impl Default for ConstraintSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-6,
+            tolerance_dual: 1e-5,
+            max_solves: 50,
+            penalty_start: 10.0,
+            penalty_max: 1e8,
+            penalty_factor: 10.0,
+            restart: true,
         }
-        Ok(())
+    }
+}
+
+impl ConstraintSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for the first invalid field.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let (start, max, factor) = (self.penalty_start, self.penalty_max, self.penalty_factor);
+        check_all([
+            ("max_solves", self.max_solves as f64, self.max_solves > 0, "at least 1"),
+            ("tolerance", self.tolerance, exceeds(0.0, self.tolerance), "above 0"),
+            ("tolerance_dual", self.tolerance_dual, exceeds(0.0, self.tolerance_dual), "above 0"),
+            ("penalty_start", start, exceeds(1.0, start), "above 1"),
+            ("penalty_max", max, max >= start && max.is_finite(), "at least penalty_start"),
+            ("penalty_factor", factor, exceeds(1.0, factor), "above 1"),
+        ])
     }
 }

@@ -1,14 +1,15 @@
 //! Constrained problems by an augmented Lagrangian.
-#![allow(non_snake_case)]
 
-use super::settings::ConstraintSettings;
-use super::violation::{Violation, ViolationKind};
-use crate::ddp::{Fddp, Observer, Recent, Rules, Settings, Solution, Status, Timings, Unobserved};
+use super::outcome::{Outcome, Violation, ViolationKind};
+use super::settings::{ConstraintSettings, Settings};
+use super::solution::{Iteration, Solution, Status};
+use super::solver_loop::{Pass, SolverLoop};
+use super::start::held_still;
+use super::watch::{Observer, Recent, Watch};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::time::Instant;
 use nalgebra::DVector;
-use std::time::Duration;
 
 /// Augmented Lagrangian solver around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and
 /// robots with [`Limit`](crate::robot::Limit)s. It follows the bound-constrained Lagrangian method (Conn, Gould, Toint,
@@ -79,16 +80,14 @@ pub struct AugmentedLagrangian {
     /// Settings of the inner solves. The solver chooses their tolerances. Their time budget applies to all inner solves
     /// together.
     pub inner: Settings,
-    pub(super) solver: Fddp,
-    pub(super) outcome: Outcome,
+    solver: SolverLoop,
+    outcome: Outcome,
     /// Adjoint state λ, and scratch for the adjoint state of the previous knot.
     adjoint: [DVector<f64>; 2],
     /// Durations of the last measurements of the residuals.
     measuring: Recent,
-    /// Durations of the phases of all inner solves so far.
-    timings: Timings,
     /// Whether the next solve cannot use the multipliers and the penalty.
-    pub(super) lost: bool,
+    lost: bool,
 }
 
 /// Residuals of the stopping tests, in addition to the residuals in [`Outcome`].
@@ -105,45 +104,16 @@ struct Residuals {
 /// Chosen because rounding at the largest penalty leaves four digits of the violation's gradient.
 const STATIONARY: f64 = 1e-4;
 
-/// State of the constraints after a solve; the trajectory is in the [`Solution`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Outcome {
-    /// Cost Σ ℓ without the terms of the constraints.
-    pub cost: f64,
-    /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
-    pub primal: f64,
-    /// Row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]. `None` if all constraints hold
-    /// exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on x̂₀ with the
-    /// largest violation.
-    pub worst: Option<Violation>,
-    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on their bounds.
-    pub dual: f64,
-    /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
-    /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in their
-    /// order. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
-    pub multipliers: Vec<Vec<f64>>,
-    /// Penalty 1/μ at the end of the solve.
-    pub penalty: f64,
-    /// Number of inner solves.
-    pub solves: usize,
-    /// Number of iterations of all inner solves.
-    pub iterations: usize,
-}
-
 impl AugmentedLagrangian {
     /// Creates a solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
-        let adjoint = [(); 2].map(|()| DVector::zeros(problem.ndx()));
-        let (settings, inner) = (ConstraintSettings::default(), Settings::default());
-        let (solver, outcome) = (Fddp::new(problem), Outcome::default());
         Self {
-            settings,
-            inner,
-            solver,
-            outcome,
-            adjoint,
+            settings: ConstraintSettings::default(),
+            inner: Settings::default(),
+            solver: SolverLoop::new(problem),
+            outcome: Outcome::default(),
+            adjoint: [(); 2].map(|()| DVector::zeros(problem.ndx())),
             measuring: Recent::default(),
-            timings: Timings::default(),
             lost: false,
         }
     }
@@ -167,7 +137,7 @@ impl AugmentedLagrangian {
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if no value satisfies the bounds of a constraint.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut Unobserved)
+        self.run(problem, Some([xs, us]), &mut |_: &Iteration| {})
     }
 
     /// Solves as [`solve`](Self::solve) does, and passes each iteration of the inner solves to `observer`, which may
@@ -193,7 +163,7 @@ impl AugmentedLagrangian {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut Unobserved)
+        self.run(problem, None, &mut |_: &Iteration| {})
     }
 
     /// Solves as [`resume`](Self::resume) does, and passes each iteration of the inner solves to `observer`, which may
@@ -212,7 +182,7 @@ impl AugmentedLagrangian {
     /// # Errors
     /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
-        self.solver.shift(problem)?;
+        self.solver.shift(problem, &self.inner)?;
         let horizon = problem.horizon();
         if let Some(knots) = self.outcome.multipliers.get_mut(..horizon) {
             knots.rotate_left(1);
@@ -223,42 +193,49 @@ impl AugmentedLagrangian {
         Ok(())
     }
 
+    /// Returns the result of the last solve.
+    pub fn solution(&self) -> &Solution {
+        &self.solver.iterate.solution
+    }
+
+    /// Returns the state of the constraints after the last solve.
+    pub fn outcome(&self) -> &Outcome {
+        &self.outcome
+    }
+
     fn run(
         &mut self,
         problem: &mut Problem,
         warm_start: Option<[&[f64]; 2]>,
         observer: &mut dyn Observer,
     ) -> Result<&Solution, Error> {
-        let begin = Instant::now();
-        self.timings = Timings::default();
-        let mut result = self.attempt(problem, warm_start, observer, begin, true);
+        let mut watch = Watch::new(observer);
+        let settings = Settings { project_warm_start: true, ..self.inner.clone() };
+        self.solver.start_clock(&settings, &watch);
+        let mut result = self.attempt(problem, &settings, warm_start, &mut watch);
         if let (Ok(status), Some(start)) = (&result, warm_start)
             && self.lost
             && self.settings.restart
         {
-            result = self.restart(problem, start, *status, observer, begin);
+            result = self.restart(problem, &settings, start, *status, &mut watch);
         }
         if result.is_ok() {
             problem.multipliers(&mut self.outcome.multipliers);
         }
         problem.forget_multipliers();
-        self.solver.solution.status = result?;
-        self.timings.end(begin.elapsed(), self.inner.time_budget);
-        self.solver.solution.timings = std::mem::take(&mut self.timings);
-        Ok(&self.solver.solution)
+        self.solver.iterate.solution.status = result?;
+        Ok(self.solver.end(&settings, &watch))
     }
 
-    /// Makes one attempt, with a budget that starts at `begin`. The first attempt makes an iteration even without time.
-    pub(super) fn attempt(
+    /// Makes one attempt: passes of the solver's loop, with an update of the multipliers or of the penalty after each.
+    fn attempt(
         &mut self,
         problem: &mut Problem,
+        settings: &Settings,
         warm_start: Option<[&[f64]; 2]>,
-        observer: &mut dyn Observer,
-        begin: Instant,
-        first: bool,
+        watch: &mut Watch<'_>,
     ) -> Result<Status, Error> {
         self.settings.check()?;
-        self.solver.settings = Settings { project_warm_start: true, ..self.inner.clone() };
         let goes_on = warm_start.is_none() && !self.lost && self.outcome.solves > 0;
         let ConstraintSettings { tolerance, tolerance_dual, penalty_start, penalty_max, .. } = self.settings;
         let penalty = if goes_on { self.outcome.penalty.clamp(penalty_start, penalty_max) } else { penalty_start };
@@ -269,24 +246,21 @@ impl AugmentedLagrangian {
         }
         let multipliers = std::mem::take(&mut self.outcome.multipliers);
         self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
-        // tolerances of one inner solve, which follow μ
+        self.lost = false;
+        self.solver.begin(problem, settings, warm_start)?;
+        // tolerances of one pass, which follow μ
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
         let mut status = Status::MaxIterations;
         let mut residuals = Residuals { primal: f64::INFINITY, fixed: None, stationary: false };
-        self.lost = false;
         for solve in 0..self.settings.max_solves {
-            // the expected decrease of an inner solve is about the square of its gradient
+            // the expected improvement of a pass is about the square of its gradient
             let dual = omega.max(0.1 * tolerance_dual);
-            (self.solver.settings.tolerance, self.solver.settings.tolerance_bounded) = (dual * dual, dual * dual);
-            let over = begin.elapsed() + self.measuring.median();
-            self.solver.settings.time_budget = self.inner.time_budget.map(|budget| budget.saturating_sub(over));
-            let guaranteed = first && solve == 0 && self.inner.time_budget != Some(Duration::ZERO);
-            let rules = Rules { guaranteed, trusts_start: true, resumes: warm_start.is_none() && solve == 0 };
-            let result = self.solver.run(problem, warm_start.filter(|_| solve == 0), observer, rules)?;
-            self.timings += result.timings;
+            let resumes = warm_start.is_none() && solve == 0;
+            self.solver.clock.reserve = self.measuring.median();
+            let pass = Pass { tolerance: Some(dual * dual), trusts_start: true, resumes };
+            let stopped = self.solver.pass(problem, settings, pass, watch);
             self.outcome.solves += 1;
-            self.outcome.iterations += result.trace.len();
-            let stopped = result.status;
+            self.outcome.iterations += self.solver.iterate.solution.trace.len();
             // computes z − Π z at the iterate, and the residuals of the stopping tests
             residuals = self.measure(problem);
             if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
@@ -321,30 +295,62 @@ impl AugmentedLagrangian {
         Ok(status)
     }
 
-    /// Returns the result of the last solve.
-    pub fn solution(&self) -> &Solution {
-        &self.solver.solution
-    }
-
-    /// Returns the state of the constraints after the last solve.
-    pub fn outcome(&self) -> &Outcome {
-        &self.outcome
+    /// Makes a second attempt after a failed one: from x̂₀ at all knots and the controls that hold it still, with
+    /// multipliers of zero. Returns the status of the better attempt, and keeps its solution and outcome. A converged
+    /// attempt is better; otherwise the attempt with the smaller violation is.
+    ///
+    /// Does nothing if the first attempt started there or no time is left. It also does nothing without constraints and
+    /// bounds, where the solve equals [`Fddp`](crate::Fddp)'s.
+    fn restart(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        [xs, us]: [&[f64]; 2],
+        status: Status,
+        watch: &mut Watch<'_>,
+    ) -> Result<Status, Error> {
+        if self.solver.clock.is_over() || !(problem.check_bounds()? || problem.has_constraints()) {
+            return Ok(status);
+        }
+        let [held_xs, held_us] = held_still(problem)?;
+        let finite = held_us.iter().all(|u| u.is_finite());
+        if !finite || (held_xs == xs && held_us == us) {
+            return Ok(status);
+        }
+        problem.multipliers(&mut self.outcome.multipliers);
+        let (solution, first, lost) = (self.solver.iterate.solution.clone(), self.outcome.clone(), self.lost);
+        let second = self.attempt(problem, settings, Some([&held_xs, &held_us]), watch)?;
+        let (solves, iterations) = (first.solves + self.outcome.solves, first.iterations + self.outcome.iterations);
+        let solved = second == Status::Converged || second == Status::Infeasible && !self.lost;
+        let mut kept = second;
+        if !(solved || self.outcome.primal < first.primal) {
+            let timings = self.solver.iterate.solution.timings;
+            self.solver.iterate.solution = solution;
+            self.solver.iterate.solution.timings = timings;
+            (self.outcome, self.lost) = (first, lost);
+            problem.set_multipliers(&self.outcome.multipliers);
+            if !matches!(second, Status::TimeLimit | Status::Interrupted) {
+                kept = status;
+            }
+        }
+        (self.outcome.solves, self.outcome.iterations) = (solves, iterations);
+        Ok(kept)
     }
 
     /// Computes cost and residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺. The vectors q and r contain the
     /// terms yᵀ∂g of the constraints, with the multipliers y that an update would give.
     fn measure(&mut self, problem: &mut Problem) -> Residuals {
-        let Self { settings, solver, outcome, adjoint: [lambda, before], .. } = self;
+        let Self { settings, solver: SolverLoop { iterate, knots, .. }, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
-        let Solution { xs, us, gap, cost, .. } = &solver.solution;
-        for knot in &mut solver.lq_knots {
+        let Solution { xs, us, gap, cost, .. } = &iterate.solution;
+        for knot in &mut *knots {
             knot.inverse_dynamics.wanted = false; // r and B are read
         }
-        problem.calc_diff(xs, us, &mut solver.lq_knots);
+        problem.calc_diff(xs, us, knots);
         let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
         let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);
         (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - measured.terms, 0.0);
-        outcome.worst = match solver.largest_gap() {
+        outcome.worst = match iterate.largest_gap() {
             Some((knot, row, amount)) if amount > violation => {
                 Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })
             }
@@ -352,9 +358,9 @@ impl AugmentedLagrangian {
         };
         let primal = larger(*gap, measured.rest);
         let mut slope_of_free = 0.0; // controls that are not pressed against a bound
-        lambda.copy_from(&solver.lq_knots[horizon].q);
+        lambda.copy_from(&knots[horizon].q);
         for t in (0..horizon).rev() {
-            let knot = &solver.lq_knots[t];
+            let knot = &knots[t];
             let u = &us[problem.control_range(t)];
             for (j, u) in u.iter().enumerate() {
                 let slope = knot.r[j] + knot.B.column(j).dot(lambda);

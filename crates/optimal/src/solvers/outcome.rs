@@ -1,7 +1,35 @@
-//! Evidence of a constraint that does not hold.
+//! Outcome of a solve with constraints, and the evidence of a constraint that does not hold.
 
 use core::fmt;
 use std::sync::Arc;
+
+/// State of the constraints after a solve; the trajectory is in the [`Solution`](crate::Solution).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Outcome {
+    /// Cost Σ ℓ without the terms of the constraints.
+    pub cost: f64,
+    /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
+    pub primal: f64,
+    /// Row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]. `None` if all constraints hold
+    /// exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on x̂₀ with the
+    /// largest violation.
+    ///
+    /// [`Status::ConstraintsViolated`]: crate::Status::ConstraintsViolated
+    /// [`Status::Infeasible`]: crate::Status::Infeasible
+    pub worst: Option<Violation>,
+    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on their bounds.
+    pub dual: f64,
+    /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
+    /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in their
+    /// order. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
+    pub multipliers: Vec<Vec<f64>>,
+    /// Penalty 1/μ at the end of the solve.
+    pub penalty: f64,
+    /// Number of inner solves.
+    pub solves: usize,
+    /// Number of iterations of all inner solves.
+    pub iterations: usize,
+}
 
 /// Kind of a [`Violation`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

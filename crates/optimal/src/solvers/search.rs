@@ -1,13 +1,12 @@
 //! Line search of differential dynamic programming: the expected improvement of a step, and the test of whether it is
 //! reached.
 
-use super::best::Best;
-use super::clock::{Clock, Phase};
-use super::observer::PacedObserver;
-use super::progress::Value;
+use super::best::{Best, Merit};
+use super::iterate::Iterate;
 use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};
+use super::watch::{Clock, Phase, Watch};
 use crate::lq::KnotFeedback;
 use crate::problem::{ActionView, Problem};
 use crate::time::Instant;
@@ -39,26 +38,18 @@ pub(super) struct Search {
     pub(super) left_best: bool,
 }
 
-/// Iterate with its feedback, and the data that a search around it needs.
-pub(super) struct Iterate<'a, 'o> {
-    /// Solution that contains the iterate; the accepted trial replaces the iterate.
-    pub(super) solution: &'a mut Solution,
-    /// φₜ(xₜ, uₜ), N·nx.
-    pub(super) next: &'a mut Vec<f64>,
-    /// Accelerations and forces of the iterate.
-    pub(super) motions: &'a mut [f64],
-    /// Value of the iterate, and the best iterate before it.
-    pub(super) value: Value,
+/// Iterate with its feedback, and the parts of a solver that a search around it uses.
+pub(super) struct Surroundings<'a, 'o> {
+    /// Iterate, which the accepted trial replaces.
+    pub(super) iterate: &'a mut Iterate,
+    pub(super) merit: Merit,
+    /// Best iterate before this one.
     pub(super) best: &'a mut Best,
-    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
-    pub(super) gaps: &'a [f64],
     /// Feedback and value functions.
     pub(super) feedback: &'a [KnotFeedback],
-    /// Whether the iterate counts as feasible.
-    pub(super) feasible: bool,
     pub(super) settings: &'a Settings,
     pub(super) clock: &'a mut Clock,
-    pub(super) watch: &'a mut PacedObserver<'o>,
+    pub(super) watch: &'a mut Watch<'o>,
 }
 
 /// Line search, with its workspace.
@@ -117,16 +108,17 @@ impl LineSearch {
     /// keeps the expected improvement of the previous line search, `last`. In DDP the expected improvement does not
     /// depend on the trial, so the value of this search is kept.
     #[inline(never)] // `benches/instructions.py` counts this function by name
-    pub(super) fn run(&mut self, problem: &mut Problem, iterate: Iterate<'_, '_>, last: Search) -> Search {
-        self.expect(&iterate);
+    pub(super) fn run(&mut self, problem: &mut Problem, around: Surroundings<'_, '_>, last: Search) -> Search {
+        self.expect(&around);
         let Self { trials, ahead, wary, steps, curved_gaps, expected } = self;
-        let Iterate { solution, next, motions, value, best, feedback, feasible, settings, clock, watch, .. } = iterate;
+        let Surroundings { iterate, merit, best, feedback, settings, clock, watch } = around;
+        let feasible = merit.feasible;
         let mut search = Search { accepted: false, left_best: false, ..last };
         if settings.method == DdpMethod::Ddp {
             [search.d1, search.d2] = *expected;
         }
-        let gaps = settings.counts_gaps(feasible).then_some(iterate.gaps);
-        let curved_gaps = gaps.map(|_| &curved_gaps[..]);
+        let counts_gaps = settings.counts_gaps(feasible);
+        let curved_gaps = counts_gaps.then_some(&curved_gaps[..]);
         let (horizon, lanes, count) = (problem.horizon(), trials.width(), steps.len());
         let some_from = |tried: usize| {
             let most = match tried {
@@ -145,9 +137,9 @@ impl LineSearch {
                 return search;
             }
             let start = Instant::now();
-            let Solution { xs, us, cost, .. } = &*solution;
-            let nominal = Nominal { xs, us, gaps, feedback };
-            let rule = Rule { settings, feasible, expected: *expected, curved_gaps, xs, cost: *cost };
+            let Iterate { solution: Solution { xs, us, .. }, gaps, .. } = &*iterate;
+            let nominal = Nominal { xs, us, gaps: counts_gaps.then_some(&gaps[..]), feedback };
+            let rule = Rule { settings, feasible, expected: *expected, curved_gaps, xs, cost: merit.cost };
             let trying = some_from(tried);
             let lengths = &steps[trying.clone()];
             match (ahead.as_mut(), problem.two()) {
@@ -174,16 +166,16 @@ impl LineSearch {
                 }
                 _ => trials.run(&mut problem.action_view(), &nominal, lengths, 0..=horizon),
             }
-            let action_view = problem.action_view();
+            let view = problem.action_view();
             let good = lengths
                 .iter()
                 .enumerate()
-                .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &action_view).map(|cost| (i, cost)));
-            solution.timings.rollout += clock.ran(Phase::Rollout, start);
+                .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &view).map(|cost| (i, cost)));
+            iterate.solution.timings.rollout += clock.ran(Phase::Rollout, start);
             if let Some((i, cost)) = good {
-                search.left_best = best.leave(solution, next, value);
-                trials.copy_to(i, &mut solution.xs, &mut solution.us, next, motions);
-                solution.cost = cost;
+                search.left_best = best.leave(iterate, merit);
+                trials.copy_to(i, iterate);
+                iterate.solution.cost = cost;
                 search.accepted = true;
                 break;
             }
@@ -194,15 +186,15 @@ impl LineSearch {
     }
 
     /// Computes dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP omits the gaps f.
-    fn expect(&mut self, iterate: &Iterate<'_, '_>) {
-        let (mut dg, mut dq) = (0.0, 0.0);
-        let gaps = iterate.settings.counts_gaps(iterate.feasible);
-        for (t, feedback) in iterate.feedback.iter().enumerate() {
+    fn expect(&mut self, around: &Surroundings<'_, '_>) {
+        let Surroundings { iterate, merit, feedback, settings, .. } = around;
+        let ((mut dg, mut dq), counts_gaps) = ((0.0, 0.0), settings.counts_gaps(merit.feasible));
+        for (t, feedback) in feedback.iter().enumerate() {
             dg -= feedback.expected[0];
             dq -= feedback.expected[1];
-            if gaps {
-                let place = iterate.solution.shape().dx(t);
-                let (f, curved) = (&iterate.gaps[place.clone()], &mut self.curved_gaps[place]);
+            if counts_gaps {
+                let range = iterate.solution.shape().dx(t);
+                let (f, curved) = (&iterate.gaps[range.clone()], &mut self.curved_gaps[range]);
                 curved.fill(0.0);
                 add_scaled_product(curved, 1.0, View::new(feedback.Vxx.as_slice(), f.len()), f); // Vxx f
                 let curvature = dot(f, curved);
@@ -240,11 +232,11 @@ impl Rule<'_> {
         trials: &mut Trials,
         i: usize,
         step: f64,
-        action_view: &ActionView<'_>,
+        view: &ActionView<'_>,
     ) -> Option<f64> {
         search.step = step;
         let cost = trials.cost(i)?;
-        let dv = self.curved_gaps.map_or(0.0, |curved| trials.distance(action_view, i, self.xs, curved));
+        let dv = self.curved_gaps.map_or(0.0, |curved| trials.distance(view, i, self.xs, curved));
         search.d1 = self.expected[0] + dv;
         search.d2 = self.expected[1] - 2.0 * dv;
         search.expected_decrease = step * (search.d1 + 0.5 * step * search.d2);

@@ -1,9 +1,10 @@
 //! Actions with constraints, as terms of an augmented Lagrangian.
 
+use super::action::ActionModel;
+use super::multipliers::{Bounded, Multipliers, Visit};
 use super::path_constraint::{self, PathConstraint};
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
-use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
 use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
