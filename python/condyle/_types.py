@@ -661,6 +661,21 @@ class Solution(_Solution):
         return type(self), tuple(self)
 
 
+class ConstraintRows(NamedTuple):
+    """Constraints of an `LqKnot`: lower ≤ C δx + D δu + c ≤ upper, row by row."""
+
+    C: ArrayLike
+    """∂g/∂x, (rows, ndx)."""
+    D: ArrayLike
+    """∂g/∂u, (rows, nu)."""
+    c: ArrayLike
+    """Values at δx = 0, δu = 0, one for each row."""
+    lower: ArrayLike
+    """Lower bounds, one for each row; −∞ for none."""
+    upper: ArrayLike
+    """Upper bounds, one for each row; ∞ for none."""
+
+
 class LqKnot(NamedTuple):
     """A knot's linear-quadratic problem: δx⁺ = A δx + B δu + f, ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu."""
 
@@ -680,6 +695,8 @@ class LqKnot(NamedTuple):
     """∂ℓ/∂x, ndx numbers."""
     r: ArrayLike
     """∂ℓ/∂u, nu numbers."""
+    rows: ConstraintRows | None = None
+    """General constraints; None if there are none."""
 
 
 class SweepResult(NamedTuple):
@@ -818,6 +835,7 @@ _MODULES = {
     "Evaluation": "optimal",
     "SweepResult": "optimal",
     "LqKnot": "optimal",
+    "ConstraintRows": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
     "Ground": "simulation",

@@ -49,13 +49,14 @@ from ._condyle import (
     Unicycle,
     WrenchCone,
 )
-from ._types import Evaluation, Iteration, LqKnot, Outcome, Solution, SweepResult, Timings
+from ._types import ConstraintRows, Evaluation, Iteration, LqKnot, Outcome, Solution, SweepResult, Timings
 
 __all__ = [
     "Action",
     "Activation",
     "AugmentedLagrangian",
     "ConstrainedAction",
+    "ConstraintRows",
     "ContactDynamics",
     "ContactInverseDynamics",
     "Cost",

@@ -13,6 +13,7 @@ from condyle.optimal import (
     Activation,
     AugmentedLagrangian,
     ConstrainedAction,
+    ConstraintRows,
     ContactDynamics,
     ContactInverseDynamics,
     Cost,
@@ -265,7 +266,7 @@ def test_a_sweep_is_the_solvers() -> None:
     # the first step for a linear-quadratic problem gives its optimum: u + k + K dx, computed by hand
     dx, cost = np.zeros(14) + np.array(knots[0].f) * 0.0, 0.0
     for knot, K, k in zip(knots, found.K, found.k, strict=False):
-        A, B, f, Q, S, R, q, r = (np.array(part) for part in knot)
+        A, B, f, Q, S, R, q, r = (np.array(part) for part in knot[:8])
         du = k + K @ dx
         cost += 0.5 * dx @ Q @ dx + dx @ S @ du + 0.5 * du @ R @ du + q @ dx + r @ du
         dx = A @ dx + B @ du + f
@@ -279,6 +280,17 @@ def test_a_sweep_is_the_solvers() -> None:
         Sweep(
             [knots[0], LqKnot([[1.0]], np.zeros((1, 0)), [0.0], [[1.0]], np.zeros((1, 0)), np.zeros((0, 0)), [0], [])]
         )
+
+
+def test_a_sweep_refuses_constraint_rows() -> None:
+    problem, xs, us = reach()
+    knots = problem.derivatives(xs, us)
+    assert all(knot.rows is None for knot in knots)
+    rows = ConstraintRows(np.eye(2, 14), np.ones((2, 7)), [0.5, 0.0], [-np.inf, 0.0], [1.0, 0.0])
+    with pytest.raises(ProblemError, match="knot 2: the sweep does not treat constraint rows"):
+        Sweep([*knots[:2], knots[2]._replace(rows=rows), *knots[3:]]).run()
+    with pytest.raises(ValueError, match=r"rows\.D"):
+        Sweep([knots[0]._replace(rows=rows._replace(D=np.ones((2, 6)))), *knots[1:]])
 
 
 def power(t: Any, x: Any, u: Any) -> Any:

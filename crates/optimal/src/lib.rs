@@ -81,7 +81,9 @@ mod solvers;
 mod time;
 
 pub use error::Error;
-pub use lq::{DynamicsStructure, EulerBlock, Hessian, KnotFeedback, LqKnot, Sweep, SweepError};
+pub use lq::{
+    ConstraintRow, ConstraintRows, DynamicsStructure, EulerBlock, Hessian, KnotFeedback, LqKnot, Sweep, SweepError,
+};
 pub use nalgebra;
 pub use problem::{
     ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, Lqr, NumDiff,

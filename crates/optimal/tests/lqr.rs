@@ -4,7 +4,10 @@
 mod common;
 
 use common::{Linear, random, random_euler_knot, random_knot, random_matrix};
-use condyle_optimal::{ActionModel, Fddp, LqKnot, Lqr, NumDiff, Problem, Settings, Status, Sweep, SweepError};
+use condyle_optimal::{
+    ActionModel, ConstraintRow, ConstraintRows, Fddp, LqKnot, Lqr, NumDiff, Problem, Settings, Status, Sweep,
+    SweepError,
+};
 use nalgebra::{DMatrix, DVector};
 
 /// Tolerance of random problems with entries of size one, whose value functions grow to about 1e3 over the horizon.
@@ -141,6 +144,91 @@ fn sweep_names_the_knot_that_is_not_convex() {
     assert_eq!(sweep.run(&lq_knots, 1e5), Err(SweepError::NotFinite { knot: 2 }));
     lq_knots[3].q[1] = f64::INFINITY;
     assert_eq!(sweep.run(&lq_knots, 1e5), Err(SweepError::NotFinite { knot: 3 }));
+}
+
+/// A sweep and a solver name the knot that has constraint rows, instead of ignoring them.
+#[test]
+fn constraint_rows_are_refused() {
+    let mut random = random();
+    let knots: Vec<LqKnot> = (0..12).map(|t| random_knot(&mut random, 4, if t < 11 { 2 } else { 0 })).collect();
+    let mut sweep = Sweep::new(&knots);
+    for segments in [1, 3] {
+        sweep.set_segments(segments);
+        for t in [0, 5, 11] {
+            let mut knots = knots.clone();
+            let (lower, upper) = (-1.0, f64::INFINITY);
+            knots[t].rows.push(ConstraintRow { first: 1, entries: &[1.0, 0.5], c: 0.0, lower, upper });
+            assert_eq!(sweep.run(&knots, 0.0), Err(SweepError::ConstraintRows { knot: t }));
+            knots[t].rows.clear();
+            assert_eq!(sweep.run(&knots, 0.0), Ok(()));
+        }
+    }
+}
+
+/// Action whose derivatives have a constraint row.
+struct Limited;
+
+impl ActionModel for Limited {
+    fn nx(&self) -> usize {
+        1
+    }
+    fn nu(&self) -> usize {
+        1
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        next[0] = x[0] + u[0];
+        0.5 * u[0] * u[0]
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        knot.A.fill(1.0);
+        knot.B.fill(1.0);
+        knot.R.fill(1.0);
+        knot.r[0] = u[0];
+        knot.rows.push(ConstraintRow { first: 0, entries: &[1.0], c: x[0], lower: 0.0, upper: 1.0 });
+    }
+}
+
+/// Derivatives that are computed again replace the rows.
+#[test]
+fn an_action_writes_constraint_rows() {
+    let end = Lqr::new(LqKnot::zeros(1, 0));
+    let mut problem = Problem::new(vec![0.5], vec![Box::new(Limited)], vec![0; 2], Box::new(end)).unwrap();
+    let mut knots = problem.lq_knots();
+    for _ in 0..2 {
+        problem.calc_diff(&[0.5; 3], &[0.0; 2], &mut knots);
+        assert_eq!(knots.iter().map(|knot| knot.rows.len()).collect::<Vec<_>>(), [1, 1, 0]);
+    }
+    let row = knots[0].rows.iter().next().unwrap();
+    assert_eq!(row, ConstraintRow { first: 0, entries: &[1.0], c: 0.5, lower: 0.0, upper: 1.0 });
+}
+
+#[test]
+#[should_panic(expected = "knot 1: the sweep does not treat constraint rows")]
+fn a_solver_refuses_constraint_rows() {
+    let end = Lqr::new(LqKnot::zeros(1, 0));
+    let mut problem = Problem::new(vec![0.5], vec![Box::new(Limited)], vec![0; 2], Box::new(end)).unwrap();
+    let _ = Fddp::new(&problem).solve(&mut problem, &[0.5; 3], &[0.0; 2]);
+}
+
+/// Zeros around the entries of a row are not stored.
+#[test]
+fn constraint_rows_are_compact() {
+    let mut rows = ConstraintRows::default();
+    for (first, entries) in [(0, &[0.0, 0.0, 2.0, 0.0, 3.0, 0.0][..]), (4, &[0.0, 0.0]), (5, &[1.0])] {
+        rows.push(ConstraintRow { first, entries, c: 0.0, lower: 0.0, upper: 0.0 });
+    }
+    let runs: Vec<_> = rows.iter().map(|row| (row.first, row.entries.to_vec())).collect();
+    assert_eq!(runs, [(2, vec![2.0, 0.0, 3.0]), (4, vec![]), (5, vec![1.0])]);
+    let [C, D] = rows.dense(4, 2);
+    assert_eq!((C.row(0).sum(), D.row(0).sum(), C.row(1).sum(), D[(2, 1)]), (2.0, 3.0, 0.0, 1.0));
+}
+
+#[test]
+#[should_panic(expected = "row 0 of `rows` ends at column 4, but [C D] has 3")]
+fn constraint_rows_fit_their_knot() {
+    let mut knots = [LqKnot::zeros(2, 1), LqKnot::zeros(2, 0)];
+    knots[0].rows.push(ConstraintRow { first: 3, entries: &[1.0], c: 0.0, lower: 0.0, upper: 0.0 });
+    Sweep::new(&knots);
 }
 
 /// One full step solves from any start, with or without gaps; the second iteration only confirms it.

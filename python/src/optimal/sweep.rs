@@ -1,13 +1,13 @@
 //! The backward sweep, and the linear-quadratic problems that it solves.
 
 use super::own::write;
-use crate::arrays::{Array, class, output};
+use crate::arrays::{Array, class, matrix, output, vector};
 use crate::exceptions::{ProblemError, within};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
-use rust::LqKnot;
+use rust::{ConstraintRow, LqKnot};
 
 const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 
@@ -16,7 +16,8 @@ const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 /// knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
 /// controls.
 ///
-/// Raises `ProblemError` if their shapes do not fit together.
+/// Raises `ProblemError` if their shapes do not fit together. `run` raises it for a knot with constraint rows, which
+/// the sweep does not treat.
 ///
 /// >>> from condyle.optimal import Lqr, Problem, Sweep
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
@@ -41,6 +42,7 @@ impl Sweep {
             for name in FIELDS {
                 write(&mut to, name, &knot.getattr(name)?)?;
             }
+            read_rows(&mut to, &knot.getattr("rows")?)?;
             Ok(to)
         };
         let lq_knots = lq_knots.iter().enumerate().map(read).collect::<PyResult<Vec<_>>>()?;
@@ -91,6 +93,49 @@ impl Sweep {
     }
 }
 
+/// Reads the constraint rows of a knot from a `ConstraintRows` or None.
+#[allow(non_snake_case)]
+fn read_rows(to: &mut LqKnot, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    if given.is_none() {
+        return Ok(());
+    }
+    let part = |name: &str| given.getattr(name);
+    let (ndx, nu) = (to.ndx(), to.nu());
+    let count = within("rows.c", part("c")?.len()?, 0, LqKnot::MOST_SIZE)?;
+    let (C, D) = (part("C")?, part("D")?);
+    let (C, D) = (matrix("rows.C", &C, [count, ndx])?.to_matrix(), matrix("rows.D", &D, [count, nu])?.to_matrix());
+    let (c, lower, upper) = (part("c")?, part("lower")?, part("upper")?);
+    let c = vector("rows.c", &c, count)?;
+    let (lower, upper) = (vector("rows.lower", &lower, count)?, vector("rows.upper", &upper, count)?);
+    for i in 0..count {
+        let entries: Vec<f64> = C.row(i).iter().chain(D.row(i).iter()).copied().collect();
+        let (c, lower, upper) = (c[i], lower[i], upper[i]);
+        to.rows.push(ConstraintRow { first: 0, entries: &entries, c, lower, upper });
+    }
+    Ok(())
+}
+
+/// Converts the constraint rows of a knot to a `ConstraintRows`, or to None if it has none.
+#[allow(non_snake_case)]
+fn give_rows<'py>(py: Python<'py>, knot: &LqKnot) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let (rows, ndx, nu) = (&knot.rows, knot.ndx(), knot.nu());
+    if rows.is_empty() {
+        return Ok(None);
+    }
+    let [C, D] = rows.dense(ndx, nu);
+    let column = |of: fn(ConstraintRow<'_>) -> f64| {
+        output(py, None, &[rows.len()], |out| out.iter_mut().zip(rows.iter()).for_each(|(out, row)| *out = of(row)))
+    };
+    let given = (
+        output(py, None, &[rows.len(), ndx], |out| C.write(out))?,
+        output(py, None, &[rows.len(), nu], |out| D.write(out))?,
+        column(|row| row.c)?,
+        column(|row| row.lower)?,
+        column(|row| row.upper)?,
+    );
+    class!(py, "ConstraintRows")?.call1(given).map(Some)
+}
+
 /// Converts knots to `LqKnot`s.
 pub(super) fn give<'py>(py: Python<'py>, lq_knots: &[LqKnot]) -> PyResult<Bound<'py, PyList>> {
     let class = class!(py, "LqKnot")?;
@@ -110,6 +155,7 @@ pub(super) fn give<'py>(py: Python<'py>, lq_knots: &[LqKnot]) -> PyResult<Bound<
             matrix(nu, nu, &knot.R)?,
             vector(knot.q.as_slice())?,
             vector(knot.r.as_slice())?,
+            give_rows(py, knot)?,
         ))?)?;
     }
     Ok(all)

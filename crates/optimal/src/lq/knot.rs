@@ -1,6 +1,7 @@
 //! Knots of a linear-quadratic problem.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …
 
+use super::rows::ConstraintRows;
 use super::structure::{DynamicsStructure, EulerBlock, InverseDynamicsForm, LARGEST_BLOCK};
 use crate::error::assert_length;
 use core::fmt;
@@ -15,8 +16,8 @@ pub(crate) const DIVERGED: f64 = 1e30;
 /// minimise   Σₜ ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu    subject to   δx⁺ = A δx + B δu + f
 /// ```
 ///
-/// with lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q and
-/// q are read.
+/// with lower ≤ δu ≤ upper, and with the constraints `rows`. Q and R are symmetric, with both triangles filled. At the
+/// terminal knot (nu = 0) only Q, q and `rows` are read.
 #[derive(Clone, PartialEq)]
 pub struct LqKnot {
     /// ∂x⁺/∂x, ndx × ndx.
@@ -39,6 +40,10 @@ pub struct LqKnot {
     pub lower: DVector<f64>,
     /// Upper bound of δu, nu; ∞ for none. Written by the solver.
     pub upper: DVector<f64>,
+    /// General constraints on δx and δu; empty unless the action writes them. A [`Sweep`](crate::Sweep) returns
+    /// [`SweepError::ConstraintRows`](crate::SweepError::ConstraintRows) for a knot with rows, and a solver panics:
+    /// neither ignores them.
+    pub rows: ConstraintRows,
     /// Structure of A and B, as far as it is known.
     pub structure: DynamicsStructure,
     /// Equations of inverse dynamics, which replace A, B, S, R and part of Q if solver and action support them.
@@ -48,10 +53,10 @@ pub struct LqKnot {
 /// Formats the fields that a user writes, without the scratch of the sweep.
 impl fmt::Debug for LqKnot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, structure, .. } = self;
+        let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, rows, structure, .. } = self;
         let mut shown = f.debug_struct("LqKnot");
         shown.field("A", A).field("B", B).field("f", gap).field("Q", Q).field("S", S).field("R", R);
-        shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper);
+        shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper).field("rows", rows);
         shown.field("structure", structure);
         shown.finish_non_exhaustive()
     }
@@ -80,6 +85,7 @@ impl LqKnot {
             r: DVector::zeros(nu),
             lower: DVector::from_element(nu, f64::NEG_INFINITY),
             upper: DVector::from_element(nu, f64::INFINITY),
+            rows: ConstraintRows::default(),
             structure: DynamicsStructure::default(),
             inverse_dynamics: InverseDynamicsForm::default(),
         }
@@ -108,6 +114,7 @@ impl LqKnot {
         assert_length("f", self.f.len(), ndx);
         assert_length("lower", self.lower.len(), nu);
         assert_length("upper", self.upper.len(), nu);
+        self.rows.assert_columns(ndx + nu);
         if let Some((_, blocks)) = self.structure.euler() {
             assert!(ndx.is_multiple_of(2), "`structure` is that of x = (q, v), but ndx is {ndx}");
             let inside = |block: &EulerBlock| block.range().end <= ndx / 2 && block.range().len() <= LARGEST_BLOCK;

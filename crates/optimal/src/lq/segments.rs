@@ -76,9 +76,9 @@ impl Segments {
     }
 
     /// Returns whether a segment may contain a knot. It may not if controls are bounded, since the value function is
-    /// then not quadratic in a multiplier.
+    /// then not quadratic in a multiplier. A knot with constraint rows is left to the sweep as one.
     fn serve(knot: &LqKnot) -> bool {
-        !knot.is_bounded()
+        !knot.is_bounded() && knot.rows.is_empty()
     }
 
     /// Sweeps the horizon; returns `None` if it must be swept as one.

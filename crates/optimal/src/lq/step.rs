@@ -27,6 +27,12 @@ pub enum SweepError {
         /// Index of the knot.
         knot: usize,
     },
+    /// The knot has [constraint rows](crate::LqKnot::rows), which the sweep does not treat.
+    #[error("knot {knot}: the sweep does not treat constraint rows")]
+    ConstraintRows {
+        /// Index of the knot.
+        knot: usize,
+    },
 }
 
 /// Options of a sweep, which hold for all of its knots.
@@ -80,6 +86,7 @@ impl Step {
         options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
         let last = knots.len() - 1;
+        check_rows(first + last, &knots[last])?;
         self.work.start(&knots[last]);
         self.finish(first + last, &mut feedback[last], options.regularisation)?;
         self.back(first, &knots[..last], feedback, options)
@@ -94,6 +101,7 @@ impl Step {
         options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
         for (i, (knot, feedback)) in knots.iter().zip(feedback).enumerate().rev() {
+            check_rows(first + i, knot)?;
             self.step(first + i, knot, feedback, options)?;
             self.finish(first + i, feedback, options.regularisation)?;
         }
@@ -147,4 +155,9 @@ impl Step {
             false => Err(SweepError::NotFinite { knot: t }),
         }
     }
+}
+
+/// Returns an error if knot t has constraint rows, which the recursion does not treat.
+fn check_rows(t: usize, knot: &LqKnot) -> Result<(), SweepError> {
+    if knot.rows.is_empty() { Ok(()) } else { Err(SweepError::ConstraintRows { knot: t }) }
 }

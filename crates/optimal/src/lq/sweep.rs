@@ -146,8 +146,9 @@ impl Sweep {
     /// Sweeps from the terminal knot back to the first, with `regularisation` added to the diagonals of Quu and Vxx.
     ///
     /// # Errors
-    /// [`SweepError`] if a Quu is not positive definite or the value function is not finite. The knots before the
-    /// failing one then keep their old values; with several segments, some of them may have new values.
+    /// [`SweepError`] if a Quu is not positive definite, the value function is not finite, or a knot has constraint
+    /// rows. The knots before the failing one then keep their old values; with several segments, some of them may have
+    /// new values.
     ///
     /// # Panics
     /// If the shapes of `knots` differ from the shapes given to [`new`](Self::new).

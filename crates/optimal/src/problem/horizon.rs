@@ -374,6 +374,7 @@ impl Problem {
         assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
         for (t, knot) in lq_knots.iter_mut().enumerate() {
             knot.structure.set_dense();
+            knot.rows.clear();
             knot.inverse_dynamics.active = false;
             knot.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
         }

@@ -27,9 +27,10 @@ impl Lqr {
     /// Creates the action of a knot.
     ///
     /// # Panics
-    /// If the shapes of the knot's matrices do not fit each other.
+    /// If the shapes of the knot's matrices do not fit each other, or the knot has constraint rows.
     #[track_caller]
     pub fn new(knot: LqKnot) -> Self {
+        assert!(knot.rows.is_empty(), "`rows` is not empty, but an action has no constraint rows: see `Constrained`");
         let (n, m) = (knot.ndx(), knot.nu());
         for (name, found, expected) in [
             ("A", knot.A.shape(), (n, n)),

@@ -260,11 +260,12 @@ impl SolverLoop {
         }
         now.swept_best = false;
         while let Err(error) = swept.take().unwrap_or_else(|| self.sweep(problem, settings, now.merit.regularisation)) {
+            assert!(!matches!(error, SweepError::ConstraintRows { .. }), "{error}");
             now.merit.regularisation = settings.increased(now.merit.regularisation);
             if now.merit.regularisation == settings.regularisation_max {
                 return Err(match error {
                     SweepError::NotPositive { .. } => Status::RegularisationLimit,
-                    SweepError::NotFinite { .. } => Status::NotFinite,
+                    _ => Status::NotFinite,
                 });
             }
             self.clock.allows(&[Phase::Sweep], watch)?;
