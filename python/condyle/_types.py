@@ -696,7 +696,7 @@ class LqKnot(NamedTuple):
     r: ArrayLike
     """∂ℓ/∂u, nu numbers."""
     rows: ConstraintRows | None = None
-    """General constraints; None if there are none."""
+    """General constraints; None without constraints."""
 
 
 class SweepResult(NamedTuple):

@@ -486,7 +486,7 @@ impl Problem {
             let expected = self.shape.nu(knot);
             for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
                 if found != expected {
-                    return Err(Error::Dimension { knot: knot, name, expected, found });
+                    return Err(Error::Dimension { knot, name, expected, found });
                 }
             }
             for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {

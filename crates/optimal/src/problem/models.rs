@@ -117,7 +117,7 @@ pub(crate) fn check(
         }
         for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
             if expected != found {
-                return Err(Error::Dimension { knot: knot, name, expected, found });
+                return Err(Error::Dimension { knot, name, expected, found });
             }
         }
         Error::check_size("nu", model.nu(), MOST_ENTRIES)?;

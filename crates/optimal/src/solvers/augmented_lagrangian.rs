@@ -4,7 +4,7 @@ use super::outcome::{Outcome, Violation, ViolationKind};
 use super::settings::{ConstraintSettings, Settings};
 use super::solution::{Iteration, Solution, Status};
 use super::solver_loop::{Pass, SolverLoop};
-use super::start::held_still;
+use super::start::quasi_static_start;
 use super::watch::{Observer, Recent, Watch};
 use crate::error::Error;
 use crate::problem::Problem;
@@ -312,14 +312,14 @@ impl AugmentedLagrangian {
         if self.solver.clock.is_over() || !(problem.check_bounds()? || problem.has_constraints()) {
             return Ok(status);
         }
-        let [held_xs, held_us] = held_still(problem)?;
-        let finite = held_us.iter().all(|u| u.is_finite());
-        if !finite || (held_xs == xs && held_us == us) {
+        let [start_xs, start_us] = quasi_static_start(problem)?;
+        let finite = start_us.iter().all(|u| u.is_finite());
+        if !finite || (start_xs == xs && start_us == us) {
             return Ok(status);
         }
         problem.multipliers(&mut self.outcome.multipliers);
         let (solution, first, lost) = (self.solver.iterate.solution.clone(), self.outcome.clone(), self.lost);
-        let second = self.attempt(problem, settings, Some([&held_xs, &held_us]), watch)?;
+        let second = self.attempt(problem, settings, Some([&start_xs, &start_us]), watch)?;
         let (solves, iterations) = (first.solves + self.outcome.solves, first.iterations + self.outcome.iterations);
         let solved = second == Status::Converged || second == Status::Infeasible && !self.lost;
         let mut kept = second;

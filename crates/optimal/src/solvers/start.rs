@@ -17,7 +17,7 @@ const LOST: f64 = 10.0;
 ///
 /// # Errors
 /// [`Error`] if an entry of x̂₀ is not finite.
-pub(super) fn held_still(problem: &mut Problem) -> Result<[Vec<f64>; 2], Error> {
+pub(super) fn quasi_static_start(problem: &mut Problem) -> Result<[Vec<f64>; 2], Error> {
     let xs = problem.x0().repeat(problem.horizon() + 1);
     let us = problem.quasi_static(&xs)?;
     Ok([xs, us])
@@ -33,18 +33,18 @@ impl SolverLoop {
         if gap.is_finite() && cost.is_finite() && cost - last_cost <= limit {
             return gap;
         }
-        let Ok([mut xs, mut us]) = held_still(problem) else { return gap };
+        let Ok([mut xs, mut us]) = quasi_static_start(problem) else { return gap };
         let solution = &mut self.iterate.solution;
         std::mem::swap(&mut solution.xs, &mut xs);
         std::mem::swap(&mut solution.us, &mut us);
         if settings.project_warm_start {
             solution.project(problem, 0..problem.horizon());
         }
-        let held_gap = self.iterate.evaluate(problem);
-        let held_cost = self.iterate.solution.cost;
-        let is_finite = held_gap.is_finite() && held_cost.is_finite();
-        if is_finite && !(gap.is_finite() && held_cost >= cost) {
-            return held_gap;
+        let start_gap = self.iterate.evaluate(problem);
+        let start_cost = self.iterate.solution.cost;
+        let is_finite = start_gap.is_finite() && start_cost.is_finite();
+        if is_finite && !(gap.is_finite() && start_cost >= cost) {
+            return start_gap;
         }
         (self.iterate.solution.xs, self.iterate.solution.us) = (xs, us);
         self.iterate.evaluate(problem)
