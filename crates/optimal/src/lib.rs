@@ -5,8 +5,8 @@
 //! ```
 //!
 //! # Overview
-//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. It is evaluated for a group of
-//!   knots, or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
+//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. A [`GroupModel`] computes several
+//!   knots, or step lengths, in one call.
 //! - A [`Problem`] is a horizon of action models.
 //! - Around a trajectory, the problem is approximated as linear-quadratic in the changes δx, δu; each knot is then an
 //!   [`LqKnot`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
@@ -89,7 +89,7 @@ pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, 
 pub use error::Error;
 pub use lq::{DynamicsStructure, EulerBlock, Hessian, KnotFeedback, LqKnot, Sweep, SweepError};
 pub use nalgebra;
-pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
+pub use problem::{ActionModel, AutoDiff, GenericAction, GroupModel, Lqr, NumDiff, Problem, Unicycle};
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;
 

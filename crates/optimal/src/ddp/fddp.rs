@@ -11,7 +11,7 @@ use super::settings::Settings;
 use super::solution::{Solution, Timings};
 use crate::error::Error;
 use crate::lq::{Hessian, LqKnot, Sweep, SweepError};
-use crate::problem::{ActionModel, Problem};
+use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::time::Instant;
 use condyle_linalg::max_abs;
 use std::time::Duration;
@@ -36,7 +36,7 @@ use std::time::Duration;
 /// K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
 ///
 /// The first step length is tried alone. If it fails, the next four are tried side by side, and then the others. The
-/// number tried at once is limited by the [`lanes`](crate::ActionModel::lanes) of the actions. The longest good step is
+/// number tried at once is limited by the [`lanes`](crate::GroupModel::lanes) of the actions. The longest good step is
 /// taken, as in a search of one length after the other.
 ///
 /// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace, and workspaces for
@@ -275,7 +275,7 @@ impl Fddp {
     pub(super) fn calc(&mut self, problem: &mut Problem) {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
-        problem.calc_with_motion(xs, us, next, costs, motions);
+        problem.calc_with_motions(xs, us, next, costs, motions);
         self.knows_motions = true;
         let mut sum = Sum::default();
         self.costs.iter().for_each(|cost| sum.add(*cost));
@@ -317,17 +317,12 @@ impl Fddp {
         regularisation: f64,
     ) -> Option<Result<(), SweepError>> {
         let clock = Instant::now();
-        for knot in &mut self.lq_knots {
-            knot.inverse_dynamics.wanted = self.inverse_dynamics;
-            knot.inverse_dynamics.knows_motion = self.knows_motions;
-        }
-        let size = self.motions.len() / problem.horizon();
-        for (knot, motion) in self.lq_knots.iter_mut().zip(self.motions.chunks_exact(size.max(1))) {
-            knot.inverse_dynamics.motion.resize(size, 0.0);
-            knot.inverse_dynamics.motion.copy_from_slice(motion);
-        }
         let follows = self.follows();
-        let Self { solution, gaps, lq_knots, sweep, settings, .. } = self;
+        let Self { solution, gaps, lq_knots, sweep, settings, motions, .. } = self;
+        let what = match self.inverse_dynamics {
+            true => Evaluation::Equations(if self.knows_motions { motions } else { &[] }),
+            false => Evaluation::Derivatives,
+        };
         let (Solution { xs, us, .. }, threads) = (&*solution, settings.threads);
         let complete = |model: &dyn ActionModel, first: usize, lq_knots: &mut [LqKnot]| {
             for (t, knot) in (first..).zip(lq_knots) {
@@ -351,14 +346,14 @@ impl Fddp {
         };
         let (mut outcome, mut sweeping) = (Ok(()), Duration::ZERO);
         if threads == 1 {
-            problem.calc_diff(xs, us, lq_knots);
+            problem.calc_diff_as(what, xs, us, lq_knots);
             for (t, knot) in lq_knots.chunks_exact_mut(1).enumerate() {
                 complete(problem.action(t), t, knot);
             }
         } else {
             let horizon = problem.horizon();
             let (step, feedback, gains) = sweep.parts(threads);
-            problem.calc_diff_on([xs, us], lq_knots, feedback, gains, |model, first, lq_knots, feedback| {
+            problem.calc_diff_on(what, [xs, us], lq_knots, feedback, gains, |model, first, lq_knots, feedback| {
                 complete(model, first, lq_knots);
                 if !(follows && outcome.is_ok()) {
                     return;

@@ -6,14 +6,6 @@ use condyle_linalg::{SLACK, SparseRows};
 /// `Q` for δq are taken from the knot; its `A`, `B`, `S` and `R` are not used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
-    /// Whether the solver can use the equations.
-    pub(crate) wanted: bool,
-    /// Whether the action wrote the equations, instead of A and B.
-    pub(crate) active: bool,
-    /// Motion of the knot (q̈, and the forces of its contacts), as computed by the rollout that led to it.
-    pub(crate) motion: Vec<f64>,
-    /// Whether `motion` belongs to the point at which derivatives are computed.
-    pub(crate) knows_motion: bool,
     /// Distance between consecutive rows, the same for all rows.
     pub(crate) stride: usize,
     /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, and the number of both.
@@ -48,10 +40,10 @@ impl InverseDynamicsForm {
 
     /// Takes U and D out while G is being written.
     pub(crate) fn lend(&mut self) -> Self {
-        let Self { wanted, active, stride, .. } = *self;
+        let stride = self.stride;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
         let diagonal = core::mem::take(&mut self.diagonal);
-        core::mem::replace(self, Self { wanted, active, stride, costs, slopes, diagonal, ..Self::default() })
+        core::mem::replace(self, Self { stride, costs, slopes, diagonal, ..Self::default() })
     }
 
     /// Puts back the parts that [`lend`](Self::lend) took out.

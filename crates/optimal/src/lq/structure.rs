@@ -38,6 +38,8 @@ pub struct DynamicsStructure {
     /// Δt, if the structure is known.
     dt: Option<f64>,
     blocks: Vec<EulerBlock>,
+    /// Whether the knot is given as equations of inverse dynamics instead of A and B.
+    inverse_dynamics: bool,
 }
 
 /// Blocks of T and E of one joint; see [`DynamicsStructure`].
@@ -54,7 +56,17 @@ pub struct EulerBlock {
 impl DynamicsStructure {
     /// Sets the structure to unknown. Keeps the memory of blocks.
     pub fn set_dense(&mut self) {
-        self.dt = None;
+        (self.dt, self.inverse_dynamics) = (None, false);
+    }
+
+    /// Marks the knot as given by equations of inverse dynamics, until the structure is unknown again.
+    pub(crate) fn set_inverse_dynamics(&mut self) {
+        self.inverse_dynamics = true;
+    }
+
+    /// Returns whether the knot is given by equations of inverse dynamics.
+    pub(crate) fn is_inverse_dynamics(&self) -> bool {
+        self.inverse_dynamics
     }
 
     /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for a block

@@ -3,6 +3,7 @@
 mod action;
 mod action_view;
 mod autodiff;
+mod group;
 mod horizon;
 mod lqr;
 mod models;
@@ -16,6 +17,8 @@ pub use action::ActionModel;
 pub(crate) use action::{differences, quasi_static};
 pub(crate) use action_view::ActionView;
 pub use autodiff::{AutoDiff, GenericAction};
+pub use group::GroupModel;
+pub(crate) use group::{Evaluation, KnotGroup, Results, evaluate, innermost, lanes};
 pub use horizon::Problem;
 pub use lqr::Lqr;
 pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a_value};

@@ -2,9 +2,9 @@
 
 use super::activation::Activation;
 use super::costs::{Cost, Costs, check_weight};
-use super::dynamics::knots::knot_of;
-use super::horizon_terms::HorizonTerms;
+use super::horizon::HorizonTerms;
 use super::residuals::target::Target;
+use crate::problem::innermost;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
 
@@ -77,7 +77,7 @@ impl Costs {
 
 /// The costs and limits of the robot of an action.
 fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
-    Some(&mut knot_of(action)?.robot_mut().terms)
+    Some(&mut innermost(action)?.robot()?.terms)
 }
 
 /// Access to the costs of robots, whatever the dynamics and integrator of a knot, under [`Constrained`](crate::Constrained)

@@ -1,8 +1,7 @@
 //! Limits of a robot's state, control and forces: residuals that are held within bounds.
 
-use super::capabilities::Capabilities;
-use super::per_knot::PerKnot;
-use super::per_model::PerModel;
+use super::horizon::{PerKnot, PerModel};
+use super::knot_data::Capabilities;
 use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
@@ -124,24 +123,20 @@ impl LimitSet {
 
 /// The limits of all knots that an action serves, with their multipliers.
 #[derive(Clone, Debug)]
-pub struct Limits {
+pub(crate) struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
     /// Those that the dynamics ask for at every knot, before those that are given.
     own: Vec<Limit>,
     /// No limits, where they do not count.
     none: Terms<Limit>,
     multipliers: Multipliers,
-    /// Whether limits count: not at later stages of a step.
-    pub(super) active: bool,
-    /// The term of the augmented Lagrangian, which no Δt scales. Written by: `HorizonTerms::calc`.
-    pub(super) term: f64,
 }
 
 impl Limits {
     /// No limits.
     pub(super) fn none() -> Self {
         let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
-        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0) }
     }
 
     /// The same with the limits that the dynamics ask for at every knot.
@@ -174,9 +169,9 @@ impl Limits {
     }
 
     /// Takes over the limits of the models that another action stands for. Forgets multipliers.
-    pub(super) fn append(&mut self, other: &mut Self) {
+    pub(super) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         let most = self.multipliers.size().max(other.multipliers.size());
-        self.sets.append(&mut other.sets);
+        self.sets.append(&mut other.sets, place);
         self.multipliers = Multipliers::new(most);
     }
 
@@ -200,15 +195,15 @@ impl Limits {
         self.all().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
 
-    /// The limits that count at knot t.
-    pub(super) fn at(&self, t: usize) -> &Terms<Limit> {
-        if self.active { &self.sets.at(t).at(t).terms } else { &self.none }
+    /// Returns the limits of knot t if it is `limited`: limits count at the first stage of a step only.
+    pub(super) fn at(&self, t: usize, limited: bool) -> &Terms<Limit> {
+        if limited { &self.sets.at(t).at(t).terms } else { &self.none }
     }
 
-    /// The limits that count at knot t, and what they are worth.
-    pub(super) fn objective(&mut self, t: usize) -> (&Terms<Limit>, LimitObjective<'_>) {
-        let Self { sets, none, multipliers, active, .. } = self;
-        let terms = if *active { &sets.at(t).at(t).terms } else { none };
+    /// Returns the limits as [`at`](Self::at) does, and their term of the augmented Lagrangian.
+    pub(super) fn objective(&mut self, t: usize, limited: bool) -> (&Terms<Limit>, LimitObjective<'_>) {
+        let Self { sets, none, multipliers, .. } = self;
+        let terms = if limited { &sets.at(t).at(t).terms } else { none };
         (terms, LimitObjective { multipliers, t })
     }
 

@@ -1,7 +1,7 @@
 //! The motion of a robot at a knot: accelerations, efforts of joints, and forces of contacts.
 
 use super::contact::Contact;
-use super::dynamics::knots::knot_of;
+use crate::problem::innermost;
 use crate::{Problem, Solution};
 use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
 
@@ -133,9 +133,9 @@ impl Problem {
             _ => {}
         });
         let action = self.action_mut(t);
-        if let Some(knot) = knot_of(action) {
-            let (model, is_impact) = (knot.robot().model.clone(), knot.robot().is_impact());
-            motion.contacts = forces(&model, knot.contacts(), &rows, &x[..model.nq()]);
+        if let Some(robot) = innermost(action).and_then(|group| group.robot()) {
+            let (model, is_impact) = (robot.model.clone(), robot.is_impact());
+            motion.contacts = forces(&model, robot.contacts(), &rows, &x[..model.nq()]);
             if is_impact {
                 let mut next = x.to_vec();
                 action.calc(t, x, u, &mut next);

@@ -4,12 +4,12 @@ use super::actuation::Actuation;
 use super::contact::Contact;
 use super::continuous::ContinuousModel;
 use super::costs::Cost;
+use super::dynamics::acceleration::{RobotAcceleration, RobotKind};
 use super::dynamics::contact::ContactAcceleration;
 use super::dynamics::free::{FreeAcceleration, FreeDynamics};
 use super::dynamics::impulse::ImpulseDynamics;
 use super::dynamics::inverse::ControlledAcceleration;
 use super::dynamics::inverse_contact::ControlledContactAcceleration;
-use super::dynamics::knots::HasRobot;
 use super::integrators::{ControlPolynomial, Integrated, Integrator};
 use super::limits::Limit;
 use crate::ActionModel;
@@ -225,7 +225,7 @@ impl Knot {
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Impulse { contacts, restitution, damping } => {
-                let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
+                let action = ImpulseDynamics::instant(model.clone(), contacts, *restitution, *damping, costs)?;
                 self.check_bounds(0)?;
                 self.check_no_controls()?;
                 Ok(Box::new(self.complete(action)?))
@@ -239,8 +239,11 @@ impl Knot {
     }
 
     /// Gives an action the limits, and the costs and limits of single knots.
-    fn complete<K: HasRobot>(&self, mut action: K) -> Result<K, Error> {
-        let terms = &mut action.robot_mut().terms;
+    fn complete<K: RobotKind>(
+        &self,
+        mut action: Integrated<RobotAcceleration<K>>,
+    ) -> Result<Integrated<RobotAcceleration<K>>, Error> {
+        let terms = action.terms_mut();
         terms.set_limits(None, self.limits.clone())?;
         for (&t, costs) in &self.costs_at {
             terms.set_costs(t, costs.clone())?;
@@ -269,7 +272,7 @@ impl Knot {
         }
     }
 
-    fn bounded<M: ContinuousModel + HasRobot>(&self, action: Integrated<M>) -> Result<Box<dyn ActionModel>, Error> {
+    fn bounded<K: RobotKind>(&self, action: Integrated<RobotAcceleration<K>>) -> Result<Box<dyn ActionModel>, Error> {
         let action = self.complete(action)?.with_controls(self.controls);
         self.check_bounds(action.inner().nu())?;
         Ok(match &self.bounds {

@@ -2,21 +2,12 @@
 
 use crate::lq::Hessian;
 use condyle_dynamics::{
-    DifferenceArgument, IntegrateArgument, Joint, Model, difference, difference_jacobian, integrate, integrate_jacobian,
+    DifferenceArgument, IntegrateArgument, Joint, Model, difference, difference_jacobian, integrate_jacobian,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::lane_dual::LaneDual;
 use core::ops::Range;
 use nalgebra::DMatrix;
-
-/// x ⊕ δx, with δx = (δq, δv): q ⊕ δq in the configuration space, v + δv.
-pub(super) fn state_integrate(model: &Model, x: &[f64], dx: &[f64], out: &mut [f64]) {
-    let (nq, nv) = (model.nq(), model.nv());
-    integrate(model, &x[..nq], &dx[..nv], &mut out[..nq]);
-    for k in 0..nv {
-        out[nq + k] = x[nq + k] + dx[nv + k];
-    }
-}
 
 /// x₁ ⊖ x₀ = (q₁ ⊖ q₀, v₁ − v₀).
 pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut [f64]) {

@@ -1,19 +1,19 @@
 //! Dynamics of a robot in contact with the world.
 
+use super::acceleration::{InContact, RobotAcceleration};
 use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
-#[derive(Clone, Debug)]
-pub struct ContactAcceleration(pub(super) RobotDynamics);
+pub type ContactAcceleration = RobotAcceleration<InContact>;
 
 /// A knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
 ///
@@ -60,7 +60,7 @@ impl ContactAcceleration {
         let nu = actuation.nu();
         let capabilities = Capabilities { nu, effort: true, contacts: rows_of(contacts), ..Capabilities::default() };
         let kind = DynamicsKind::Contact(contacts.to_vec(), damping);
-        RobotDynamics::new(model, actuation, capabilities, kind, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, kind, costs).map(Self::of)
     }
 }
 
@@ -74,14 +74,5 @@ impl ContactDynamics {
         let actuation = Actuation::joints(&model);
         let inner = ContactAcceleration::new(model, actuation, contacts, 0.0, costs)?;
         Self::new(inner, Integrator::SemiImplicitEuler, dt)
-    }
-
-    /// The smallest controls and forces that hold the robot still at a state, (u, λ) = [S Jᵀ]⁺ g(q): u of them. Allocates.
-    ///
-    /// # Panics
-    /// If `x` has not nq + nv numbers.
-    #[track_caller]
-    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.quasi_static(x)
     }
 }

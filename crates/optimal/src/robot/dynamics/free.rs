@@ -1,18 +1,18 @@
 //! Dynamics of a robot that touches nothing.
 
+use super::acceleration::{Free, RobotAcceleration};
 use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
-#[derive(Clone, Debug)]
-pub struct FreeAcceleration(pub(super) RobotDynamics);
+pub type FreeAcceleration = RobotAcceleration<Free>;
 
 /// A knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
 ///
@@ -45,7 +45,7 @@ impl FreeAcceleration {
     /// joints that move no mass.
     pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
         let capabilities = Capabilities { nu: actuation.nu(), effort: true, ..Capabilities::default() };
-        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Free, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Free, costs).map(Self::of)
     }
 }
 
@@ -67,21 +67,7 @@ impl FreeDynamics {
     /// [`Error::Cost`] for a term that does not fit.
     pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
         let none = Actuation::none(&model);
-        Ok(Self::without_time(FreeAcceleration(RobotDynamics::new(
-            model,
-            none,
-            Capabilities::default(),
-            DynamicsKind::None,
-            costs,
-        )?)))
-    }
-
-    /// The efforts that hold the robot still at a state, u = S⁺ g(q): the smallest ones that come nearest to it. Allocates.
-    ///
-    /// # Panics
-    /// If `x` has not nq + nv numbers.
-    #[track_caller]
-    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.quasi_static(x)
+        let robot = RobotDynamics::new(model, none, Capabilities::default(), DynamicsKind::None, costs)?;
+        Ok(Self::without_time(FreeAcceleration::of(robot)))
     }
 }

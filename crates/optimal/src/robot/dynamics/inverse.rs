@@ -1,18 +1,18 @@
 //! Dynamics of a robot whose accelerations are the controls, and whose efforts follow by inverse dynamics.
 
+use super::acceleration::{Controlled, RobotAcceleration};
 use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Inverse dynamics of a robot that touches nothing: q̈ = u, τ = rnea(q, v, u), and costs.
-#[derive(Clone, Debug)]
-pub struct ControlledAcceleration(pub(super) RobotDynamics);
+pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 
 /// A knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
 ///
@@ -50,7 +50,7 @@ impl ControlledAcceleration {
         let (nu, undriven) = (model.nv(), Actuation::joints(&model).undriven());
         let capabilities = Capabilities { nu, effort: true, inverse: true, undriven, ..Capabilities::default() };
         let actuation = Actuation::all(&model);
-        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Inverse, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Inverse, costs).map(Self::of)
     }
 }
 

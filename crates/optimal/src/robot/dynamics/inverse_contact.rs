@@ -1,21 +1,21 @@
 //! Dynamics of a robot in contact whose accelerations and forces are the controls, and whose efforts follow.
 
+use super::acceleration::{ControlledInContact, RobotAcceleration};
 use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use crate::robot::limits::Limit;
 use crate::robot::residuals::residual::Residual;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈ + γ = 0.
-#[derive(Clone, Debug)]
-pub struct ControlledContactAcceleration(pub(super) RobotDynamics);
+pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 
 /// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
 /// Euler:
@@ -69,7 +69,7 @@ impl ControlledContactAcceleration {
         let kind = DynamicsKind::ContactInverse(contacts.to_vec(), actuation);
         let mut robot = RobotDynamics::new(model, all, capabilities, kind, costs)?;
         robot.terms.require(limits)?;
-        Ok(Self(robot))
+        Ok(Self::of(robot))
     }
 }
 
@@ -83,15 +83,5 @@ impl ContactInverseDynamics {
         let actuation = Actuation::joints(&model);
         let inner = ControlledContactAcceleration::new(model, actuation, contacts, costs)?;
         Self::new(inner, Integrator::SemiImplicitEuler, dt)
-    }
-
-    /// No accelerations, and the forces among the smallest efforts and forces that hold the robot still at a state,
-    /// (τ, λ) = [S Jᵀ]⁺ g(q): u = (0, λ). Allocates.
-    ///
-    /// # Panics
-    /// If `x` has not nq + nv numbers.
-    #[track_caller]
-    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.quasi_static(x)
     }
 }

@@ -16,8 +16,8 @@
 #![allow(non_snake_case)] // J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
-use crate::robot::capabilities::Output;
-use crate::robot::knot::Sensitivities;
+use crate::robot::knot_data::Output;
+use crate::robot::knot_data::Sensitivities;
 use crate::robot::residuals::rows::Row;
 use condyle_linalg::{Runs, SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
 use core::ops::Range;

@@ -2,8 +2,8 @@
 #![allow(non_snake_case)] // J
 
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Output;
-use crate::robot::knot::{KnotData, Sensitivities, add_matrix_row};
+use crate::robot::knot_data::Output;
+use crate::robot::knot_data::{KnotData, Sensitivities, add_matrix_row};
 use crate::robot::residuals::rows::Row;
 
 /// The derivatives of the outputs of a knot, from those in its data.

@@ -13,7 +13,7 @@
 use super::retraction::Retraction;
 use crate::lq::Hessian;
 use crate::lq::LARGEST_BLOCK;
-use crate::robot::continuous::{ContinuousModel, Derivatives, Evaluation, KnotInput};
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use core::ops::Range;
 
 /// The rows of a group of a column of a matrix, zeros after them.
@@ -55,7 +55,6 @@ impl Curvature {
         let (lambda_q, lambda_v) = lambda.split_at(nv);
         mu.copy_from_slice(lambda_q);
         if !groups.is_empty() {
-            model.prepare(&[input.t], input.x, input.u, Evaluation::Motion);
             let a = model.calc(input).0;
             step.set_euler(&input.x[input.x.len() - nv..], a, dt);
             if !model.integrate_hessian(&step.delta, lambda_q, theta) {

@@ -1,7 +1,7 @@
 //! Gravity residual: the efforts of a knot beyond those that hold the robot still, for several knots side by side or for one.
 
 use super::kernel::KnotGroup;
-use crate::robot::knot::unpack;
+use crate::robot::knot_data::unpack;
 use condyle_dynamics::{Data, Model, gravity, rnea, rnea_derivatives, static_torque_derivative};
 use condyle_spatial::block::Block;
 use condyle_spatial::{Scalar, kernel};

@@ -5,7 +5,7 @@
 use super::layout::{Plan, ROWS, STRIDE, row_width};
 use super::residual::Residual;
 use super::terms::KnotTerms;
-use crate::robot::knot::{KnotData, WIDEST, unpack, unpack_matrix};
+use crate::robot::knot_data::{KnotData, WIDEST, unpack, unpack_matrix};
 use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities,

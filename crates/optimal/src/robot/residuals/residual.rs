@@ -4,7 +4,7 @@ use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
 use super::own::{Inputs, OwnResidual};
 use super::target::check_rotation;
-use crate::robot::capabilities::{Capabilities, Output};
+use crate::robot::knot_data::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
 /// A residual: a vector r(x, u) that should be small.

@@ -8,11 +8,11 @@ use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
 pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[f64], dd: &[f64]) {
-    let (n, form) = (knot.ndx(), &mut knot.inverse_dynamics);
+    let (n, inverse, form) = (knot.ndx(), knot.structure.is_inverse_dynamics(), &mut knot.inverse_dynamics);
     for i in entries.clone() {
         knot.q[i] += d[i];
     }
-    let explicit = if form.active { n / 2 } else { n };
+    let explicit = if inverse { n / 2 } else { n };
     for i in entries.start..entries.end.min(explicit) {
         knot.Q.as_mut_slice()[i * (n + 1)] += dd[i];
     }
@@ -23,10 +23,11 @@ pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[
 
 /// r += d and R += diag(dd).
 pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
-    let (n, m, form) = (knot.ndx(), knot.nu(), &mut knot.inverse_dynamics);
+    let (n, m, inverse) = (knot.ndx(), knot.nu(), knot.structure.is_inverse_dynamics());
+    let form = &mut knot.inverse_dynamics;
     for i in 0..m {
         knot.r[i] += d[i];
-        match form.active {
+        match inverse {
             true => form.diagonal[n / 2 + i] += dd[i],
             false => knot.R.as_mut_slice()[i * (m + 1)] += dd[i],
         }
@@ -99,7 +100,7 @@ impl Rows {
     pub(crate) fn write(&mut self, knot: &mut LqKnot) {
         knot.q.as_mut_slice().fill(0.0);
         knot.r.as_mut_slice().fill(0.0);
-        if knot.inverse_dynamics.active {
+        if knot.structure.is_inverse_dynamics() {
             knot.inverse_dynamics.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
         }
         at_level(Write { rows: self, knot });
@@ -116,7 +117,7 @@ impl Vectorized for Write<'_> {
     fn run<V: Vector>(self) {
         let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, knot } = self;
         let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
-        let inverse = knot.inverse_dynamics.active;
+        let inverse = knot.structure.is_inverse_dynamics();
         let (some, all) = if inverse { (0, *positions) } else { (*whole, *whole + *positions) };
         let first = slopes.len() - *positions;
         for k in 0..all {

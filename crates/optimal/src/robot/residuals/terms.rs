@@ -4,7 +4,7 @@ use super::layout::{KnotLayout, Plan};
 use super::residual::{Part, Residual};
 use super::view::ResidualView;
 use crate::lq::LqKnot;
-use crate::robot::knot::Sensitivities;
+use crate::robot::knot_data::Sensitivities;
 
 /// A residual that is worth something.
 pub(crate) trait Term {

@@ -1,11 +1,58 @@
-//! A knot as its residuals see it: its state, and what its dynamics give; and how vectors with a lane for each knot become
-//! the data of each.
+//! Data of a knot: the outputs of its dynamics, the quantities that its residuals read, and workspaces for them.
 
-use super::capabilities::{Capabilities, Output};
 use super::residuals::layout::ResidualData;
 use super::residuals::rows::Row;
 use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
+use core::ops::Range;
 use nalgebra::DMatrix;
+
+/// A vector that the dynamics of a knot give beside the next state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Output {
+    /// q̈, or v⁺ − v at an impact.
+    Acceleration,
+    /// τ of all joints.
+    Effort,
+    /// λ, the forces or impulses of all contacts.
+    Force,
+    /// J q̈ + γ of all contacts, where accelerations are controls.
+    ContactAcceleration,
+}
+
+/// The outputs that the dynamics of a knot have, known when the knot is made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Capabilities {
+    pub nu: usize,
+    /// Whether there are accelerations and efforts.
+    pub effort: bool,
+    /// Whether it is an impact.
+    pub impulse: bool,
+    /// Whether accelerations, and forces of contacts, are controls.
+    pub inverse: bool,
+    /// Nᵀ: the parts of the efforts that nothing drives, where accelerations are controls. Shape: parts × nv, row after row.
+    pub undriven: Vec<f64>,
+    /// The contacts' names and rows of λ.
+    pub contacts: Vec<(String, Range<usize>)>,
+}
+
+impl Capabilities {
+    /// The number of rows of λ.
+    pub(crate) fn rows(&self) -> usize {
+        self.contacts.last().map_or(0, |(_, rows)| rows.end)
+    }
+
+    /// The rows of the contact called `name`, or what is wrong with the name.
+    pub(crate) fn contact(&self, name: &str) -> Result<Range<usize>, String> {
+        match self.contacts.iter().find(|(n, _)| n == name) {
+            Some((_, rows)) => Ok(rows.clone()),
+            None => {
+                let names: Vec<_> = self.contacts.iter().map(|(n, _)| format!("`{n}`")).collect();
+                let there = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+                Err(format!("there is no contact `{name}` at this knot; there is {there}"))
+            }
+        }
+    }
+}
 
 /// The outputs of the dynamics of a knot, and the quantities that its residuals read.
 #[derive(Clone, Debug)]
@@ -115,4 +162,33 @@ pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
 ) {
     let count = to.len();
     scatter_matrix(from, &mut parts(to, part)[..count], stride);
+}
+
+/// The memory in which something computes, made when it is first needed, so that an action costs little to make and to
+/// merge with others. A copy makes its own: what was computed in it is not part of what is copied.
+#[derive(Debug)]
+pub(crate) struct OnDemand<T>(Option<Box<T>>);
+
+impl<T> OnDemand<T> {
+    /// The memory; `make` makes it where it is not there.
+    pub(crate) fn get(&mut self, make: impl FnOnce() -> T) -> &mut T {
+        self.0.get_or_insert_with(|| Box::new(make()))
+    }
+
+    /// The memory, if it is there.
+    pub(crate) fn made(&self) -> Option<&T> {
+        self.0.as_deref()
+    }
+}
+
+impl<T> Default for OnDemand<T> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<T> Clone for OnDemand<T> {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
 }

@@ -1,11 +1,8 @@
-//! Terms of a horizon: which costs and limits serve which knot.
+//! Horizon: which costs and limits belong to which knot, for all models that one action represents.
 
-use super::capabilities::Capabilities;
 use super::costs::{Cost, Costs, WeightedActivations, check_weight};
-use super::knot::{KnotState, Sensitivities};
+use super::knot_data::{Capabilities, KnotState, Sensitivities};
 use super::limits::{Limit, Limits};
-use super::per_knot::PerKnot;
-use super::per_model::PerModel;
 use super::residuals::layout::KnotLayout;
 use super::residuals::terms::{KinematicTerms, KnotTerms};
 use super::residuals::view::{ResidualView, Scratch};
@@ -14,6 +11,137 @@ use crate::lq::LqKnot;
 use crate::problem::MOST_KNOTS;
 use condyle_dynamics::Model;
 use std::sync::Arc;
+
+/// A value for each model that an action stands for, and which of them serves which knot.
+#[derive(Clone, Debug)]
+pub(crate) struct PerModel<T> {
+    /// The value of each model.
+    all: Vec<T>,
+    /// The number of the model that serves each knot; the first one beyond its end.
+    of: Vec<usize>,
+    /// The model that is to be changed.
+    chosen: usize,
+}
+
+impl<T> PerModel<T> {
+    /// The value of a single model.
+    pub(crate) fn new(only: T) -> Self {
+        Self { all: vec![only], of: Vec::new(), chosen: 0 }
+    }
+
+    /// All values.
+    pub(crate) fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// All values, to be changed.
+    pub(crate) fn all_mut(&mut self) -> &mut [T] {
+        &mut self.all
+    }
+
+    /// The value at knot t.
+    pub(crate) fn at(&self, t: usize) -> &T {
+        self.of.get(t).and_then(|&model| self.all.get(model)).unwrap_or(&self.all[0])
+    }
+
+    /// The value of the model that is to be changed.
+    pub(crate) fn chosen_mut(&mut self) -> &mut T {
+        &mut self.all[self.chosen]
+    }
+
+    /// Chooses the model that is to be changed.
+    pub(crate) fn choose(&mut self, model: usize) {
+        self.chosen = model.min(self.all.len() - 1);
+    }
+
+    /// Takes over the value of another action's model, as model `place` or as a new one.
+    pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
+        match (place, other.all.pop()) {
+            (Some(place), Some(value)) => self.all[place] = value,
+            (_, value) => self.all.extend(value),
+        }
+    }
+
+    /// Lets a model serve knot t of so many. Allocates at the first call only.
+    pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        if self.all.len() > 1 {
+            self.of.resize(horizon, 0);
+            self.of[t] = model;
+        }
+    }
+}
+
+/// One value for all knots of a horizon, and others for some of them.
+#[derive(Clone, Debug)]
+pub(crate) struct PerKnot<T> {
+    /// The value of all knots, then those of knots with one of their own.
+    all: Vec<T>,
+    /// The number of the value of each knot; beyond its end the first.
+    of: Vec<usize>,
+    /// The numbers of values whose knots have left the horizon.
+    free: Vec<usize>,
+}
+
+impl<T> PerKnot<T> {
+    /// A value for all knots.
+    pub(crate) fn new(common: T) -> Self {
+        Self { all: vec![common], of: Vec::new(), free: Vec::new() }
+    }
+
+    fn index(&self, t: Option<usize>) -> usize {
+        t.and_then(|t| self.of.get(t)).copied().unwrap_or(0)
+    }
+
+    /// All values.
+    pub(crate) fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// All values, to be changed.
+    pub(crate) fn all_mut(&mut self) -> &mut [T] {
+        &mut self.all
+    }
+
+    /// The value of knot t.
+    pub(crate) fn at(&self, t: usize) -> &T {
+        &self.all[self.index(Some(t))]
+    }
+
+    /// The value of knot t, or that of all knots without one of their own.
+    pub(crate) fn at_mut(&mut self, t: Option<usize>) -> &mut T {
+        let k = self.index(t);
+        &mut self.all[k]
+    }
+
+    /// Sets the value of knot t, or that of all knots without one of their own.
+    pub(crate) fn set(&mut self, t: Option<usize>, value: T) {
+        let Some(t) = t else {
+            self.all[0] = value;
+            return;
+        };
+        if t >= self.of.len() {
+            self.of.resize(t + 1, 0);
+        }
+        if self.of[t] == 0 {
+            self.of[t] = self.free.pop().unwrap_or(self.all.len());
+        }
+        match self.all.get_mut(self.of[t]) {
+            Some(old) => *old = value,
+            None => {
+                self.all.push(value);
+                self.free.reserve(self.all.len()); // so that a shift need not
+            }
+        }
+    }
+
+    /// Moves the horizon on: knot t becomes knot t − 1.
+    pub(crate) fn shift(&mut self) {
+        if !self.of.is_empty() {
+            let first = self.of.remove(0);
+            self.free.extend((first > 0).then_some(first));
+        }
+    }
+}
 
 /// The costs and limits of all knots that an action serves.
 #[derive(Clone, Debug)]
@@ -106,10 +234,10 @@ impl HorizonTerms {
         scratch.get_or_insert_with(|| Box::new(Scratch::new(model, capabilities.nu, layouts[0] + layouts[1])));
     }
 
-    /// Takes over the costs and limits of the models that another action with the same dynamics stands for.
-    pub(crate) fn append(&mut self, other: &mut Self) {
-        self.costs.append(&mut other.costs);
-        self.limits.append(&mut other.limits);
+    /// Takes over the costs and limits of another action with the same dynamics, as model `place` or as a new model.
+    pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
+        self.costs.append(&mut other.costs, place);
+        self.limits.append(&mut other.limits, place);
         self.set_layouts([0, 1].map(|k| self.layouts[k].or(other.layouts[k])));
     }
 
@@ -141,41 +269,42 @@ impl HorizonTerms {
         self.layouts[0] + self.layouts[1]
     }
 
-    /// The costs of knot t, and the limits that count there.
-    pub(crate) fn at(&self, t: usize) -> KnotTerms<'_> {
-        KnotTerms([&self.costs.at(t).at(t).terms, self.limits.at(t)])
+    /// Returns the costs of knot t, and its limits if it is `limited`.
+    pub(crate) fn at(&self, t: usize, limited: bool) -> KnotTerms<'_> {
+        KnotTerms([&self.costs.at(t).at(t).terms, self.limits.at(t, limited)])
     }
 
-    /// ℓ at knot t; writes the limits' term.
-    pub(crate) fn calc(&mut self, t: usize, state: KnotState<'_>) -> f64 {
+    /// Computes ℓ at knot t, and the term of its limits if it is `limited`.
+    pub(crate) fn calc(&mut self, t: usize, state: KnotState<'_>, limited: bool) -> (f64, f64) {
         self.reserve();
         let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
         let [kinematics, others] = &state.data.residuals.kinematic;
         let mut view = ResidualView { model, t, state, kinematics, scratch };
         let cost = costs.at(t).at(t).terms.value(&mut view, &WeightedActivations(1.0));
         view.kinematics = others;
-        if limits.active {
-            let (terms, objective) = limits.objective(t);
-            limits.term = terms.value(&mut view, &objective);
+        let mut term = 0.0;
+        if limited {
+            let (terms, objective) = limits.objective(t, limited);
+            term = terms.value(&mut view, &objective);
         }
-        cost
+        (cost, term)
     }
 
-    /// The derivatives of `scale` · ℓ and of the limits' term at knot t.
+    /// Computes the derivatives of `scale` · ℓ at knot t, and of the term of its limits if it is `limited`.
     pub(crate) fn calc_diff(
         &mut self,
         t: usize,
         state: KnotState<'_>,
         sensitivities: &dyn Sensitivities,
         scale: f64,
+        limited: bool,
         knot: &mut LqKnot,
     ) {
         self.reserve();
         let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
         let [first, second] = &state.data.residuals.kinematic;
-        let active = limits.active;
-        let (limits, mut objective) = limits.objective(t);
-        if active {
+        let (limits, mut objective) = limits.objective(t, limited);
+        if limited {
             objective.multipliers.begin(t);
         }
         scratch.clear();
