@@ -12,39 +12,39 @@ use crate::problem::MOST_KNOTS;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// A value for each model that an action stands for, and which of them serves which knot.
+/// Value for each model that an action stands for, and which of them serves which knot.
 #[derive(Clone, Debug)]
 pub(crate) struct PerModel<T> {
-    /// The value of each model.
+    /// Value of each model.
     all: Vec<T>,
-    /// The number of the model that serves each knot; the first one beyond its end.
+    /// Index of the model that serves each knot; 0 beyond its end.
     of: Vec<usize>,
-    /// The model that is to be changed.
+    /// Model that is to be changed.
     chosen: usize,
 }
 
 impl<T> PerModel<T> {
-    /// The value of a single model.
+    /// Returns the value of a single model.
     pub(crate) fn new(only: T) -> Self {
         Self { all: vec![only], of: Vec::new(), chosen: 0 }
     }
 
-    /// All values.
+    /// Returns all values.
     pub(crate) fn all(&self) -> &[T] {
         &self.all
     }
 
-    /// All values, to be changed.
+    /// Returns all values, to be changed.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all
     }
 
-    /// The value at knot t.
+    /// Returns the value at knot t.
     pub(crate) fn at(&self, t: usize) -> &T {
         self.of.get(t).and_then(|&model| self.all.get(model)).unwrap_or(&self.all[0])
     }
 
-    /// The value of the model that is to be changed.
+    /// Returns the value of the model that is to be changed.
     pub(crate) fn chosen_mut(&mut self) -> &mut T {
         &mut self.all[self.chosen]
     }
@@ -62,7 +62,7 @@ impl<T> PerModel<T> {
         }
     }
 
-    /// Lets a model serve knot t of so many. Allocates at the first call only.
+    /// Assigns knot t, of `horizon` knots, to a model. Allocates at the first call only.
     pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         if self.all.len() > 1 {
             self.of.resize(horizon, 0);
@@ -74,16 +74,16 @@ impl<T> PerModel<T> {
 /// One value for all knots of a horizon, and others for some of them.
 #[derive(Clone, Debug)]
 pub(crate) struct PerKnot<T> {
-    /// The value of all knots, then those of knots with one of their own.
+    /// Value that knots share, followed by the values of single knots.
     all: Vec<T>,
-    /// The number of the value of each knot; beyond its end the first.
+    /// Index of the value of each knot; 0 beyond its end.
     of: Vec<usize>,
-    /// The numbers of values whose knots have left the horizon.
+    /// Indices of values whose knots have left the horizon.
     free: Vec<usize>,
 }
 
 impl<T> PerKnot<T> {
-    /// A value for all knots.
+    /// Returns a value for all knots.
     pub(crate) fn new(common: T) -> Self {
         Self { all: vec![common], of: Vec::new(), free: Vec::new() }
     }
@@ -92,28 +92,28 @@ impl<T> PerKnot<T> {
         t.and_then(|t| self.of.get(t)).copied().unwrap_or(0)
     }
 
-    /// All values.
+    /// Returns all values.
     pub(crate) fn all(&self) -> &[T] {
         &self.all
     }
 
-    /// All values, to be changed.
+    /// Returns all values, to be changed.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all
     }
 
-    /// The value of knot t.
+    /// Returns the value of knot t.
     pub(crate) fn at(&self, t: usize) -> &T {
         &self.all[self.index(Some(t))]
     }
 
-    /// The value of knot t, or that of all knots without one of their own.
+    /// Returns the value of knot t, or the value that knots without their own share.
     pub(crate) fn at_mut(&mut self, t: Option<usize>) -> &mut T {
         let k = self.index(t);
         &mut self.all[k]
     }
 
-    /// Sets the value of knot t, or that of all knots without one of their own.
+    /// Sets the value of knot t, or the value that knots without their own share.
     pub(crate) fn set(&mut self, t: Option<usize>, value: T) {
         let Some(t) = t else {
             self.all[0] = value;
@@ -143,14 +143,14 @@ impl<T> PerKnot<T> {
     }
 }
 
-/// The costs and limits of all knots that an action serves.
+/// Costs and limits of all knots that an action serves.
 #[derive(Clone, Debug)]
 pub(crate) struct HorizonTerms {
     model: Arc<Model>,
     capabilities: Arc<Capabilities>,
     costs: PerModel<PerKnot<Costs>>,
     pub limits: Limits,
-    /// The memory that costs of any knot take, and that limits do.
+    /// Memory that costs of any knot take, and that limits do.
     layouts: [KnotLayout; 2],
     /// Made when it is first needed, and forgotten when the layouts grow.
     scratch: Option<Box<Scratch>>,
@@ -166,23 +166,23 @@ impl HorizonTerms {
         Ok(Self { costs, limits: Limits::none(), layouts, scratch: None, capabilities, model })
     }
 
-    /// Adds limits that hold at every knot, beside those that are given.
+    /// Adds limits that hold at every knot, in addition to the given limits.
     pub(crate) fn require(&mut self, limits: Vec<Limit>) -> Result<(), Error> {
         self.limits = Limits::asked_for(limits);
         self.set_limits(None, Vec::new())
     }
 
-    /// The costs of knot t, or those of all knots without costs of their own.
+    /// Returns the costs of knot t, or the costs that knots without their own share.
     pub(crate) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
         self.costs.chosen_mut().at_mut(t)
     }
 
-    /// The costs of all knots: those that knots share, and those of single knots.
+    /// Returns the costs that knots share, and the costs of single knots.
     pub(crate) fn all_costs_mut(&mut self) -> impl Iterator<Item = &mut Costs> {
         self.costs.chosen_mut().all_mut().iter_mut()
     }
 
-    /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
+    /// Changes the weights of the terms called `name`, of all knots; returns whether it exists.
     pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
         check_weight(name, weight)?;
         let mut found = false;
@@ -241,13 +241,13 @@ impl HorizonTerms {
         self.set_layouts([0, 1].map(|k| self.layouts[k].or(other.layouts[k])));
     }
 
-    /// Chooses, of the models that this action stands for, the one that is to be changed.
+    /// Selects the model that is to be changed.
     pub(crate) fn choose(&mut self, model: usize) {
         self.costs.choose(model);
         self.limits.choose(model);
     }
 
-    /// Lets one of the models that this action stands for serve knot t of so many.
+    /// Assigns knot t, of `horizon` knots, to one of the models that the action represents.
     pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.costs.serve(t, horizon, model);
         self.limits.serve(t, horizon, model);
@@ -259,12 +259,12 @@ impl HorizonTerms {
         self.limits.shift();
     }
 
-    /// The memory that costs of any knot take, and that limits do.
+    /// Returns the memory that costs of any knot take, and that limits do.
     pub(crate) fn layouts(&self) -> [KnotLayout; 2] {
         self.layouts
     }
 
-    /// The memory that costs and limits of any knot take together.
+    /// Returns the memory that costs and limits of any knot take together.
     pub(crate) fn layout(&self) -> KnotLayout {
         self.layouts[0] + self.layouts[1]
     }

@@ -6,7 +6,7 @@ use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// A vector that the dynamics of a knot give beside the next state.
+/// Vector that the dynamics of a knot compute besides the next state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output {
     /// q̈, or v⁺ − v at an impact.
@@ -19,7 +19,7 @@ pub(crate) enum Output {
     ContactAcceleration,
 }
 
-/// The outputs that the dynamics of a knot have, known when the knot is made.
+/// Outputs that the dynamics of a knot have, known when the knot is made.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Capabilities {
     pub nu: usize,
@@ -31,17 +31,17 @@ pub(crate) struct Capabilities {
     pub inverse: bool,
     /// Nᵀ: the parts of the efforts that nothing drives, where accelerations are controls. Shape: parts × nv, row after row.
     pub undriven: Vec<f64>,
-    /// The contacts' names and rows of λ.
+    /// Contacts' names and rows of λ.
     pub contacts: Vec<(String, Range<usize>)>,
 }
 
 impl Capabilities {
-    /// The number of rows of λ.
+    /// Returns the number of rows of λ.
     pub(crate) fn rows(&self) -> usize {
         self.contacts.last().map_or(0, |(_, rows)| rows.end)
     }
 
-    /// The rows of the contact called `name`, or what is wrong with the name.
+    /// Returns the rows of the contact called `name`, or what is wrong with the name.
     pub(crate) fn contact(&self, name: &str) -> Result<Range<usize>, String> {
         match self.contacts.iter().find(|(n, _)| n == name) {
             Some((_, rows)) => Ok(rows.clone()),
@@ -54,7 +54,7 @@ impl Capabilities {
     }
 }
 
-/// The outputs of the dynamics of a knot, and the quantities that its residuals read.
+/// Outputs of the dynamics of a knot, and the quantities that its residuals read.
 #[derive(Clone, Debug)]
 pub(crate) struct KnotData {
     /// q̈, or v⁺ − v at an impact. Shape: nv.
@@ -63,20 +63,20 @@ pub(crate) struct KnotData {
     pub tau: Vec<f64>,
     /// λ. Shape: rows.
     pub lambda: Vec<f64>,
-    /// The derivatives of q̈ by q, v and what the controls drive: τ, or q̈ itself and λ. Shape: nv × nv, the last with a
+    /// Derivatives of q̈ by q, v and what the controls drive: τ, or q̈ itself and λ. Shape: nv × nv, the last with a
     /// column of zeros more for each λ that is a control.
     pub da: [DMatrix<f64>; 3],
-    /// The derivatives of λ, written only if a residual looks at forces. Shape: rows × nv.
+    /// Derivatives of λ, written only if a residual reads forces. Shape: rows × nv.
     pub dlambda: [DMatrix<f64>; 3],
-    /// The derivatives of τ by q, v and q̈ where the controls drive q̈, else nothing. Shape: nv × nv.
+    /// Derivatives of τ by q, v and q̈ where the controls drive q̈, else nothing. Shape: nv × nv.
     pub dtau: [DMatrix<f64>; 3],
     /// J q̈ + γ where the controls drive q̈, else nothing. Shape: rows.
     pub contact_acceleration: Vec<f64>,
-    /// The derivatives of that by q, v and q̈, the last being J; that of τ by λ is −Jᵀ. Shape: rows × nv.
+    /// Derivatives of J q̈ + γ with respect to q, v and q̈; the last is J, and ∂τ/∂λ = −Jᵀ. Shape: rows × nv.
     pub dcontact_acceleration: [DMatrix<f64>; 3],
-    /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
+    /// Equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
-    /// How many eliminations are solved in it: none, the limbs, the base as well; those that the robot has.
+    /// Number of eliminations that are done in it, up to the number that the robot has: of the limbs, and of the base.
     pub eliminations: usize,
     pub residuals: ResidualData,
 }
@@ -107,7 +107,7 @@ impl KnotData {
     }
 }
 
-/// A knot as its residuals see it.
+/// Knot as its residuals see it.
 #[derive(Clone, Copy)]
 pub(crate) struct KnotState<'a> {
     pub x: &'a [f64],
@@ -115,7 +115,7 @@ pub(crate) struct KnotState<'a> {
     pub data: &'a KnotData,
 }
 
-/// The derivatives of the outputs of a knot by x and u.
+/// Derivatives of the outputs of a knot by x and u.
 pub(crate) trait Sensitivities {
     /// g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>);
@@ -131,10 +131,10 @@ pub(crate) fn add_matrix_row(X: &DMatrix<f64>, row: usize, c: f64, g: &mut [f64]
     }
 }
 
-/// The most knots that a vector has lanes for.
+/// Most knots that a vector has lanes for.
 pub(crate) const WIDEST: usize = 8;
 
-/// The part of the data of each knot that is to be written.
+/// Returns the part of the data of each knot that is to be written.
 pub(crate) fn parts(of: &mut [KnotData], part: impl Fn(&mut KnotData) -> &mut [f64]) -> [&mut [f64]; WIDEST] {
     let mut parts: [&mut [f64]; WIDEST] = Default::default();
     for (to, of) in parts.iter_mut().zip(of) {
@@ -164,18 +164,18 @@ pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     scatter_matrix(from, &mut parts(to, part)[..count], stride);
 }
 
-/// The memory in which something computes, made when it is first needed, so that an action costs little to make and to
+/// Memory in which something computes, made when it is first needed, so that an action costs little to make and to
 /// merge with others. A copy makes its own: what was computed in it is not part of what is copied.
 #[derive(Debug)]
 pub(crate) struct OnDemand<T>(Option<Box<T>>);
 
 impl<T> OnDemand<T> {
-    /// The memory; `make` makes it where it is not there.
+    /// Returns the memory; `make` makes it where it is not there.
     pub(crate) fn get(&mut self, make: impl FnOnce() -> T) -> &mut T {
         self.0.get_or_insert_with(|| Box::new(make()))
     }
 
-    /// The memory, if it is there.
+    /// Returns the memory, if it is there.
     pub(crate) fn made(&self) -> Option<&T> {
         self.0.as_deref()
     }

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
-/// A residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
+/// Residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
 ///
 /// [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds it; to [`Fddp`](crate::Fddp) alone it is a cost for leaving the
 /// bounds. It shares dynamics and kinematics with the costs of its knot, and holds at the knot's beginning, whatever the
@@ -43,14 +43,14 @@ use condyle_dynamics::Model;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Limit {
-    /// The name by which errors call it.
+    /// Name by which errors call it.
     pub name: String,
-    /// The residual r.
+    /// Residual r.
     pub residual: Residual,
-    /// The least values; −∞ for none. Empty, as is `upper`, where r = 0.
+    /// Least values; −∞ for none. Empty, as is `upper`, where r = 0.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
-    /// The greatest values; ∞ for none.
+    /// Greatest values; ∞ for none.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
@@ -66,7 +66,7 @@ impl Limit {
         Self::new(name, residual, vec![], vec![])
     }
 
-    /// The plan of the residual, or what does not fit; sets bounds that are left out.
+    /// Returns the plan of the residual, or what does not fit; sets bounds that are left out.
     fn plan(&mut self, model: &Model, capabilities: &Capabilities) -> Result<Plan, String> {
         let plan = Plan::new(model, capabilities, &self.residual)?;
         if self.lower.is_empty() && self.upper.is_empty() {
@@ -89,19 +89,20 @@ impl Term for Limit {
     }
 }
 
-/// The limits of a knot.
+/// Limits of a knot.
 #[derive(Clone, Debug, Default)]
 struct LimitSet {
     terms: Terms<Limit>,
-    /// The bounds of all, one after the other.
+    /// Bounds of all, one after the other.
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// The name and the rows of each.
+    /// Name and the rows of each.
     parts: Vec<Part>,
 }
 
 impl LimitSet {
-    /// The set of some limits, of one knot of the horizon or of all, for a robot whose dynamics have some capabilities.
+    /// Returns the set of some limits, of one knot of the horizon or of all, for a robot whose dynamics have some
+    /// capabilities.
     fn new(model: &Model, capabilities: &Capabilities, limits: Vec<Limit>, knot: Option<usize>) -> Result<Self, Error> {
         let mut set = Self::default();
         for mut limit in limits {
@@ -121,7 +122,7 @@ impl LimitSet {
     }
 }
 
-/// The limits of all knots that an action serves, with their multipliers.
+/// Limits of all knots that an action serves, with their multipliers.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
@@ -139,7 +140,7 @@ impl Limits {
         Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0) }
     }
 
-    /// The same with the limits that the dynamics ask for at every knot.
+    /// Returns the same with the limits that the dynamics ask for at every knot.
     pub(super) fn asked_for(own: Vec<Limit>) -> Self {
         Self { own, ..Self::none() }
     }
@@ -158,12 +159,12 @@ impl Limits {
         Ok(())
     }
 
-    /// The sets of all knots of all models.
+    /// Returns the sets of all knots of all models.
     fn all(&self) -> impl Iterator<Item = &LimitSet> {
         self.sets.all().iter().flat_map(PerKnot::all)
     }
 
-    /// The most numbers that a knot's limits have.
+    /// Returns the most numbers that a knot's limits have.
     fn most(&self) -> usize {
         self.all().map(|set| set.terms.len()).max().unwrap_or(0)
     }
@@ -180,7 +181,7 @@ impl Limits {
         self.sets.choose(model);
     }
 
-    /// Lets a model serve knot t of so many.
+    /// Assigns knot t, of `horizon` knots, to a model.
     pub(super) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.sets.serve(t, horizon, model);
     }
@@ -190,7 +191,7 @@ impl Limits {
         self.sets.all_mut().iter_mut().for_each(PerKnot::shift);
     }
 
-    /// The memory that the limits of any knot take.
+    /// Returns the memory that the limits of any knot take.
     pub(super) fn layout(&self) -> KnotLayout {
         self.all().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
@@ -214,7 +215,7 @@ impl Limits {
     }
 }
 
-/// The term of the augmented Lagrangian at knot t.
+/// Term of the augmented Lagrangian at knot t.
 pub(super) struct LimitObjective<'a> {
     pub multipliers: &'a mut Multipliers,
     t: usize,

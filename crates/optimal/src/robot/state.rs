@@ -18,13 +18,14 @@ pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut 
     }
 }
 
-/// The coordinates of each joint of a robot whose positions are no vector space: elsewhere the Jacobians of ⊕ and ⊖ are ±1.
+/// Returns the coordinates of each joint of a robot whose positions are no vector space: elsewhere the Jacobians of ⊕
+/// and ⊖ are ±1.
 pub fn groups(model: &Model) -> Vec<Range<usize>> {
     let group = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
     model.bodies()[1..].iter().filter(|b| group(b.joint)).map(|b| b.idx_v..b.idx_v + b.joint.nv()).collect()
 }
 
-/// Room for the second derivatives of q ⊕ δ along the groups, empty where there are none.
+/// Workspace for the second derivatives of q ⊕ δ along the groups; empty without groups.
 #[derive(Debug)]
 pub(super) struct GroupHessian {
     /// δ, with one coordinate of each group moving. Shape: nv. Written by: `run`.
@@ -44,7 +45,8 @@ impl GroupHessian {
         Self { delta: vec![zero; n], E: DMatrix::from_element(n, n, zero), back: square.clone(), M: square }
     }
 
-    /// The second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) by δ₀ and ε, at zero, of each group.
+    /// Computes the second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) by δ₀ and ε, at zero, of each
+    /// group.
     ///
     /// Let E(δ) = J_exp(δ), M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. In the group θ = λᵀ log(exp(Tδ₀) exp(η)), T = Ad exp(−δ), where
     /// dη = J_log(η) E(δ + ε) dε, thus

@@ -27,7 +27,7 @@ use condyle_spatial::{Matrix, matrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// The law from which accelerations follow.
+/// Law from which accelerations follow.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum DynamicsKind {
     /// Nowhere: time stands still, or the state jumps.
@@ -44,9 +44,9 @@ pub(crate) enum DynamicsKind {
         /// μ.
         damping: f64,
     },
-    /// The controls: q̈ = u, and τ = M q̈ + h follows.
+    /// Controls: q̈ = u, and τ = M q̈ + h follows.
     Inverse,
-    /// The controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
+    /// Controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
     ContactInverse(Vec<Contact>, Actuation),
 }
 
@@ -70,19 +70,19 @@ impl<'a> Group<'a> {
     }
 }
 
-/// A law with the scratch that it takes.
+/// Law with the scratch that it takes.
 #[derive(Debug)]
 pub(crate) enum Pass<S> {
     None,
     Free,
-    /// The constraints, and J. Shape: rows × nv.
+    /// Constraints, and J. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, Matrix<S>),
     Inverse,
     /// As [`Self::Contact`].
     ContactInverse(Box<ConstraintSet<S>>, Matrix<S>),
 }
 
-/// The dynamics of as many knots as a scalar has lanes.
+/// Dynamics of as many knots as a scalar has lanes.
 #[derive(Debug)]
 pub(crate) struct KnotBatch<S> {
     pub data: Data<S>,
@@ -91,7 +91,7 @@ pub(crate) struct KnotBatch<S> {
     residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
-    /// The output that the controls drive: τ, or q̈.
+    /// Output that the controls drive: τ, or q̈.
     tau: Vec<S>,
     a: Vec<S>,
     lambda: Vec<S>,
@@ -133,8 +133,8 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.linear = LinearEquations::new(tableau, eliminations);
     }
 
-    /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
-    /// the residuals see of those that look at the same as the first one.
+    /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and
+    /// what the residuals see of those that read the same as the first one.
     pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: &HorizonTerms, to: &mut [KnotData]) {
         self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
@@ -153,7 +153,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = false;
     }
 
-    /// Accelerations and forces, and their derivatives; those of forces only if they are looked at.
+    /// Computes accelerations and forces, and their derivatives; derivatives of forces only if a residual needs them.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
         let Self { data, pass, q, v, tau, a, lambda, .. } = self;
         match pass {
@@ -211,13 +211,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// The equations of some knots at their states, for the accelerations and forces that the data of each holds.
+    /// Computes the equations of some knots at their states, for the accelerations and forces that the data of each
+    /// holds.
     pub(crate) fn run_equations_at(&mut self, model: &Model, xs: &[f64], to: &mut [KnotData]) {
         self.pack(model, xs, to);
         self.run_equations(model, to);
     }
 
-    /// The equations that accelerations and forces satisfy, which are known, with the limbs and the base solved.
+    /// Computes the equations that accelerations and forces satisfy, which are known, with the limbs and the base
+    /// solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
         let Self { data, pass, q, v, a, lambda, linear, .. } = self;
         pack(to.len(), |k| &to[k].a, a);
@@ -255,7 +257,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.run_residuals(model, group, terms, to);
     }
 
-    /// Computes what the residuals see of those knots that look at the same as the first one.
+    /// Computes what the residuals see of those knots that read the same as the first one.
     fn run_residuals(
         &mut self,
         model: &Model,
@@ -287,14 +289,14 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 }
 
-/// The linear equations of some knots, side by side.
+/// Linear equations of some knots, side by side.
 #[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
-    /// What is solved, one after the other: the limbs, and the base.
+    /// Eliminations in their order: of the limbs, and of the base.
     eliminations: Vec<Arc<LimbElimination>>,
     tableau: Vec<S>,
-    /// The tableau before an elimination.
+    /// Tableau before an elimination.
     before: Vec<S>,
     /// B⁻¹ of each block of an elimination, and Y of one.
     inverses: Vec<S>,

@@ -15,7 +15,7 @@ use std::sync::Arc;
 /// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
 pub type ContactAcceleration = RobotAcceleration<InContact>;
 
-/// A knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
+/// Knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
 ///
 /// ```text
 /// [ M  Jᵀ ] [  q̈ ]   [ S u − h ]
@@ -44,10 +44,10 @@ pub type ContactAcceleration = RobotAcceleration<InContact>;
 pub type ContactDynamics = Integrated<ContactAcceleration>;
 
 impl ContactAcceleration {
-    /// A robot with some drives, in contact, with the damping μ.
+    /// Returns a robot with some drives, in contact, with the damping μ.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular beside another one on the same
+    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular with another one on the same
     /// body without damping; [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for drives of another
     /// robot, or a robot with joints that move no mass.
     pub fn new(
@@ -65,8 +65,9 @@ impl ContactAcceleration {
 }
 
 impl ContactDynamics {
-    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler, without damping.
-    /// For other drives, integrators and damping see [`ContactAcceleration::new`] and [`Integrated::new`].
+    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler,
+    /// without damping. For other drives, integrators and damping see [`ContactAcceleration::new`] and
+    /// [`Integrated::new`].
     ///
     /// # Errors
     /// As [`ContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.

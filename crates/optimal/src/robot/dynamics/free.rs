@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
 pub type FreeAcceleration = RobotAcceleration<Free>;
 
-/// A knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
+/// Knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = aba(q, v, S u),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
@@ -38,7 +38,7 @@ pub type FreeAcceleration = RobotAcceleration<Free>;
 pub type FreeDynamics = Integrated<FreeAcceleration>;
 
 impl FreeAcceleration {
-    /// A robot with some drives.
+    /// Returns a robot with some drives.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for drives of another robot, or a robot with
@@ -50,8 +50,8 @@ impl FreeAcceleration {
 }
 
 impl FreeDynamics {
-    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other
-    /// drives or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
+    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler. For
+    /// other drives or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
@@ -61,7 +61,7 @@ impl FreeDynamics {
         Self::new(FreeAcceleration::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 
-    /// The knot after the last one. Terms of the control must have an empty reference: there is none.
+    /// Creates the terminal knot. Terms of the control must have an empty reference, because it has no controls.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.

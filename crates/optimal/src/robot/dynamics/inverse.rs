@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Inverse dynamics of a robot that touches nothing: q̈ = u, τ = rnea(q, v, u), and costs.
 pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 
-/// A knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
+/// Knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = u,   τ = rnea(q, v, u),   v⁺ = v + u Δt,   q⁺ = q ⊕ (v Δt + u Δt²),   ℓ = Δt Σ w a(r)
@@ -42,7 +42,7 @@ pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 pub type FreeInverseDynamics = Integrated<ControlledAcceleration>;
 
 impl ControlledAcceleration {
-    /// A robot that is driven at every coordinate.
+    /// Returns a robot that is driven at every coordinate.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.
@@ -55,8 +55,8 @@ impl ControlledAcceleration {
 }
 
 impl FreeInverseDynamics {
-    /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`] and
-    /// [`Integrated::new`].
+    /// Returns a knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`]
+    /// and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0.

@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈ + γ = 0.
 pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 
-/// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
+/// Knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
 /// Euler:
 ///
 /// ```text
@@ -28,8 +28,8 @@ pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 ///
 /// The equations are [`Limit`]s that the knot has of itself, called `undriven efforts` and `contact …`, before those that are
 /// given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they are costs.
-/// Nothing is inverted, so that contacts may be redundant and M singular. Solutions are those of
-/// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations where it serves. Without contacts it is
+/// Nothing is inverted, so that contacts may be redundant and M singular. Its solutions equal the solutions with
+/// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations if it applies. Without contacts it is
 /// [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with drives. These are Crocoddyl's rules
 /// (`DifferentialActionModelContactInvDynamics`, and `DifferentialActionModelFreeInvDynamics` without contacts).
 ///
@@ -50,7 +50,7 @@ pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 pub type ContactInverseDynamics = Integrated<ControlledContactAcceleration>;
 
 impl ControlledContactAcceleration {
-    /// A robot with some drives, in contact.
+    /// Returns a robot with some drives, in contact.
     ///
     /// # Errors
     /// [`Error::Contact`] for a contact that does not fit or is named twice; [`Error::Cost`] for a term that does not fit;
@@ -74,8 +74,8 @@ impl ControlledContactAcceleration {
 }
 
 impl ContactInverseDynamics {
-    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other drives and
-    /// integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
+    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler. For
+    /// other drives and integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// As [`ControlledContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.

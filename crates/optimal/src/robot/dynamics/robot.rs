@@ -28,7 +28,7 @@ use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// The promise of this crate, by which it names vectors.
+/// Promise of this crate, by which it names vectors.
 struct Gate;
 
 // SAFETY: vectors are used by the kernels of `condyle_dynamics`, and by what enters through their door.
@@ -50,10 +50,10 @@ pub struct RobotDynamics {
     pub(crate) actuation: Actuation,
     pub(crate) terms: HorizonTerms,
     kind: DynamicsKind,
-    /// The output that the controls drive.
+    /// Output that the controls drive.
     given: Output,
     capabilities: Capabilities,
-    /// The coordinates of each group of positions that is no vector space.
+    /// Coordinates of each group of positions that is no vector space.
     pub(crate) groups: Vec<Range<usize>>,
     work: OnDemand<Work>,
 }
@@ -68,10 +68,10 @@ struct Parts<'a> {
     work: &'a mut Work,
 }
 
-/// The memory in which the dynamics of knots are computed.
+/// Memory in which the dynamics of knots are computed.
 #[derive(Debug)]
 struct Work {
-    /// The dynamics of one knot.
+    /// Dynamics of one knot.
     single: KnotBatch<f64>,
     vectors: Option<VectorBatches>,
     impact: Option<Impact>,
@@ -83,7 +83,7 @@ struct Work {
     da_du: Vec<f64>,
 }
 
-/// The dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for derivatives
+/// Dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for derivatives
 /// they are not: too rarely used to stay in the caches.
 #[derive(Debug)]
 struct VectorBatches {
@@ -91,7 +91,7 @@ struct VectorBatches {
     long: Option<KnotBatch<Long>>,
 }
 
-/// The number of knots that are computed side by side.
+/// Returns the number of knots that are computed side by side.
 fn lanes(kind: &DynamicsKind) -> usize {
     match (kind, level()) {
         (DynamicsKind::None | DynamicsKind::Impact { .. }, _) | (_, Level::Baseline) => 1,
@@ -109,7 +109,7 @@ impl VectorBatches {
         }
     }
 
-    /// The equations of a knot at some posture in which the limbs can be solved.
+    /// Returns the equations of a knot at some posture in which the limbs can be solved.
     fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Vec<f64>> {
         (0..POSTURES).find_map(|posture| {
             let bend: Vec<f64> = (0..model.nv()).map(|k| 0.5 * ((1 + posture + k) as f64).sin()).collect();
@@ -198,7 +198,7 @@ impl Work {
 }
 
 impl RobotDynamics {
-    /// A robot with some drives whose accelerations obey a law.
+    /// Returns a robot with some drives whose accelerations obey a law.
     ///
     /// # Errors
     /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot, [`Error::Cost`]
@@ -233,7 +233,7 @@ impl RobotDynamics {
         Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
     }
 
-    /// The contacts of its law, in the order of their forces.
+    /// Returns the contacts of its law, in the order of their forces.
     pub(crate) fn contacts(&self) -> &[Contact] {
         match &self.kind {
             DynamicsKind::Contact(contacts, _)
@@ -243,12 +243,12 @@ impl RobotDynamics {
         }
     }
 
-    /// Whether its knots are impacts.
+    /// Returns whether its knots are impacts.
     pub(crate) fn is_impact(&self) -> bool {
         self.capabilities.impulse
     }
 
-    /// The number of controls.
+    /// Returns the number of controls.
     pub(crate) fn nu(&self) -> usize {
         self.capabilities.nu
     }
@@ -407,8 +407,8 @@ impl RobotDynamics {
         }
     }
 
-    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q); and
-    /// where accelerations are controls, none of these.
+    /// Returns the smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S
+    /// Jᵀ]⁺ g(q); and where accelerations are controls, none of these.
     #[track_caller]
     pub(crate) fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
@@ -487,7 +487,7 @@ impl RobotDynamics {
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);
     }
 
-    /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
+    /// Computes the second derivatives of λᵀ(q ⊕ δq) by q and δq.
     pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
         let Parts { model, groups, work, .. } = self.parts();
         work.group_hessian.run(model, groups, dq, lambda, hessian);

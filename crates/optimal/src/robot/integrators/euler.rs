@@ -60,7 +60,7 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     }
 }
 
-/// Derivatives of accelerations, nv numbers a column, become those of steps: [a Δt²; a Δt].
+/// Conversion of derivatives of accelerations, nv numbers in each column, to derivatives of steps: [a Δt²; a Δt].
 struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
 
 impl<const N: usize> Vectorized for Steps<'_, N> {

@@ -22,14 +22,14 @@ use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
 pub(super) struct RungeKutta {
-    /// The times of the stages in the step, and their weights.
+    /// Times of the stages in the step, and their weights.
     c: &'static [f64],
     b: &'static [f64],
-    /// The weights of the controls w in those of each stage.
+    /// Weights of the controls w in the controls of each stage.
     l: [[f64; 3]; 4],
-    /// The controls of a stage. Shape: nu.
+    /// Controls of a stage. Shape: nu.
     u: Vec<f64>,
-    /// The state y of a stage. Shape: nq + nv.
+    /// State y of a stage. Shape: nq + nv.
     y: Vec<f64>,
     /// k of a stage, the step to the next one, and Σ b k. Shape: 2 nv.
     k: Vec<f64>,
@@ -39,7 +39,7 @@ pub(super) struct RungeKutta {
     dy: DMatrix<f64>,
     dk: DMatrix<f64>,
     dsum: DMatrix<f64>,
-    /// The cost at a stage.
+    /// Cost at a stage.
     stage: LqKnot,
     /// Products with the stage's Hessian. Shape: (2 nv + nw) × (2 nv + nw) and 2 nv × (2 nv + nw).
     H: DMatrix<f64>,
@@ -47,7 +47,7 @@ pub(super) struct RungeKutta {
 }
 
 impl RungeKutta {
-    /// A method of two, three or four stages.
+    /// Returns a method of two, three or four stages.
     pub(super) fn new<M: ContinuousModel>(stages: usize, model: &M, controls: ControlPolynomial) -> Self {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
         let (c, b): (&[f64], &[f64]) = match stages {

@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 /// M q̈ + h − g at knots with contacts, else −g.
 #[derive(Debug)]
 pub(crate) struct GravityResidual<S> {
-    /// The value. Shape: nv.
+    /// Value. Shape: nv.
     value: Vec<S>,
-    /// The derivative by q. Shape: nv × nv.
+    /// Derivative by q. Shape: nv × nv.
     by_q: DMatrix<S>,
 }
 
