@@ -162,7 +162,7 @@ ARGUMENTS = {
     "dict[str, ContactConstraint]": "contacts",
     "_Scheme": "integrator",
     "_Polynomial": "controls",
-    "_Action": "action Problem.terminal",
+    "_Action": "action Problem.set_knot.model Problem.terminal",
     "Sequence[_Action]": "models",
     "Sequence[int] | None": "knot_models",
     "_Controls": "us",
@@ -261,7 +261,8 @@ RESULTS = {
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
-        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
+        Problem.set_costs Problem.set_duration Problem.set_knot
+        Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",

@@ -158,7 +158,7 @@ impl Gait {
             costs.push(self.place(self.feet[k].0, self.feet[k].1, 1e7));
         }
         let contacts = self.contacts(&landing, 0.0);
-        self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
+        self.models.push(Box::new(ImpulseDynamics::instant(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
         self.knot_models.push(self.models.len() - 1);
         self.touches.extend(vec![true; self.feet.len()]);
         self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact takes no time

@@ -3320,6 +3320,27 @@ class Problem:
         Raises `ProblemError` for a term that does not fit, or if the knot's action does not belong to a robot.
         """
 
+    def set_duration(self, knot: int, dt: float) -> None:
+        """Sets the duration of a knot, whose model keeps its duration at all other knots. Call it between solves. The
+        solver's next iterations do not allocate.
+
+        knot: its index, 0 to N − 1.
+        dt: the duration (s).
+
+        Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
+        """
+
+    def set_knot(self, knot: int, model: _Action) -> None:
+        """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between solves.
+        The solver's next iterations do not allocate.
+
+        knot: its index, 0 to N − 1.
+        model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
+            indices of this problem.
+
+        Raises `ProblemError` if the model does not fit.
+        """
+
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of the terms with this name in all knots, the terminal one included. Call it between solves.
 

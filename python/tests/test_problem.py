@@ -103,6 +103,32 @@ def test_an_action_for_each_knot_gives_the_bits_of_one_for_all() -> None:
     np.testing.assert_array_equal(Fddp(again, max_iterations=6).solve(xs, us).xs, one.xs)
 
 
+def test_a_replaced_knot_is_that_of_a_new_problem() -> None:
+    def problem(dt: float, target: int) -> Problem:
+        times = [dt if t == 2 else 0.02 for t in range(KNOTS)]
+        targets = [target if t == 4 else t for t in range(KNOTS)]
+        knots = [ContactDynamics(QUADRUPED, contacts(), time, costs(t)) for time, t in zip(times, targets, strict=True)]
+        return Problem(STANDING, knots, None, end())
+
+    changed = problem(0.02, 4)
+    solver = Fddp(changed, max_iterations=4)
+    xs, us = start(changed)
+    solver.solve(xs, us)
+    changed.set_duration(2, 0.03)
+    changed.set_knot(4, ContactDynamics(QUADRUPED, contacts(), 0.02, costs(7)))
+    expected = Fddp(problem(0.03, 7), max_iterations=4).solve(xs, us)
+    for same in (changed, Problem.from_json(changed.to_json()), pickle.loads(pickle.dumps(changed))):
+        np.testing.assert_array_equal(Fddp(same, max_iterations=4).solve(xs, us).xs, expected.xs)
+    np.testing.assert_array_equal(solver.solve(xs, us).xs, expected.xs)
+    for dt in (0.0, np.inf):
+        with pytest.raises(ProblemError, match="its duration must be above 0"):
+            changed.set_duration(2, dt)
+    with pytest.raises(ProblemError, match=f"knot {KNOTS}: expected"):
+        changed.set_knot(KNOTS, ContactDynamics(QUADRUPED, contacts(), 0.02, []))
+    with pytest.raises(ProblemError, match="knot 1: expected nx = 37, found 14"):
+        changed.set_knot(1, FreeDynamics(ARM, 0.1, []))
+
+
 def test_an_action_of_each_knot_moves_on_with_it() -> None:
     moving = gait()
     solver = Fddp(moving, max_iterations=3)

@@ -197,7 +197,7 @@ impl Gait {
         }
         let frames: Vec<usize> = landing.iter().map(|&k| self.feet[k].0).collect();
         let contacts = self.contacts(&frames);
-        self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
+        self.models.push(Box::new(ImpulseDynamics::instant(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
         self.knot_models.push(self.models.len() - 1);
         let all = self.touches.last().cloned().unwrap_or_default();
         self.touches.push(all.iter().enumerate().map(|(k, &touches)| touches || landing.contains(&k)).collect());

@@ -187,6 +187,13 @@ pub enum Error {
         dt: f64,
     },
 
+    /// A knot does not have a duration that could be set: an impact, or an action that is not integrated over time.
+    #[error("knot {knot}: its action has no duration")]
+    NoDuration {
+        /// Index of the knot.
+        knot: usize,
+    },
+
     /// A setting is outside its valid range.
     #[error("setting `{name}` is {value}, but it must be {allowed}")]
     Setting {

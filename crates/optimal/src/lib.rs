@@ -5,8 +5,8 @@
 //! ```
 //!
 //! # Overview
-//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. It is evaluated for a group of
-//!   knots, or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
+//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. A [`GroupModel`] computes several
+//!   knots, or step lengths, in one call.
 //! - A [`Problem`] is a horizon of action models.
 //! - Around a trajectory, the problem is approximated as linear-quadratic in the changes δx, δu; each knot is then an
 //!   [`LqKnot`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
@@ -86,7 +86,7 @@ pub use lq::{
 };
 pub use nalgebra;
 pub use problem::{
-    ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, Lqr, NumDiff,
+    ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, GroupModel, Lqr, NumDiff,
     PathConstraint, Problem, Unicycle,
 };
 pub use solvers::{

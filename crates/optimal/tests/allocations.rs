@@ -173,7 +173,7 @@ fn a_gait_allocates_nothing() {
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
     let mut touch = contacts.clone();
     (touch[0].constraint.kind, touch[1].constraint.kind) = (ConstraintKind::Line, ConstraintKind::Plane);
-    let impact = ImpulseDynamics::new(model.clone(), &touch, 0.0, 1e-9, landing).unwrap();
+    let impact = ImpulseDynamics::instant(model.clone(), &touch, 0.0, 1e-9, landing).unwrap();
     let drives = Actuation::joints(&model);
     let flight = FreeAcceleration::new(model.clone(), drives, driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();

@@ -78,7 +78,7 @@ fn gait(apart: bool, limited: bool) -> (Problem, Vec<f64>, Vec<f64>) {
     }
     knot_models[6] = models.len();
     let landing = vec![quadratic("state", 1.0, Residual::State { reference: x0.clone() })];
-    models.push(Box::new(ImpulseDynamics::new(model.clone(), &phases[1].1, 0.0, 1e-9, landing.clone()).unwrap()));
+    models.push(Box::new(ImpulseDynamics::instant(model.clone(), &phases[1].1, 0.0, 1e-9, landing.clone()).unwrap()));
     let end = FreeDynamics::terminal(model.clone(), landing).unwrap();
     let mut problem = Problem::new(x0.clone(), models, knot_models, Box::new(end)).unwrap();
     let xs = x0.repeat(KNOTS + 1);

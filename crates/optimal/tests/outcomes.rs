@@ -9,7 +9,8 @@ use common::{
     unicycle,
 };
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Error, Fddp, Iteration, LqKnot, NumDiff, Observer, Problem, Settings, Status,
+    ActionModel, AugmentedLagrangian, Error, Fddp, GroupModel, Iteration, LqKnot, NumDiff, Observer, Problem, Settings,
+    Status,
 };
 use core::ops::ControlFlow;
 use std::time::Duration;
@@ -160,6 +161,12 @@ struct Bounded {
     broken: bool,
 }
 
+impl GroupModel for Bounded {
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+}
+
 impl ActionModel for Bounded {
     fn nx(&self) -> usize {
         1
@@ -167,8 +174,8 @@ impl ActionModel for Bounded {
     fn nu(&self) -> usize {
         self.nu
     }
-    fn lanes(&self) -> usize {
-        self.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         assert!(x[0].is_finite(), "asked for a state that is not finite");
@@ -335,6 +342,18 @@ struct Noting {
     groups: Vec<usize>,
 }
 
+impl GroupModel for Noting {
+    fn lanes(&self) -> usize {
+        self.action.lanes
+    }
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        if knots.iter().all(|t| *t == 0) {
+            self.groups.push(knots.len());
+        }
+        self.action.calc_group(knots, xs, us, next, costs);
+    }
+}
+
 impl ActionModel for Noting {
     fn nx(&self) -> usize {
         4
@@ -342,20 +361,14 @@ impl ActionModel for Noting {
     fn nu(&self) -> usize {
         1
     }
-    fn lanes(&self) -> usize {
-        self.action.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.action.calc(t, x, u, next)
     }
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.action.calc_diff(t, x, u, knot);
-    }
-    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        if knots.iter().all(|t| *t == 0) {
-            self.groups.push(knots.len());
-        }
-        self.action.calc_group(knots, xs, us, next, costs);
     }
 }
 

@@ -40,7 +40,7 @@ fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Proble
     };
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, driven()).unwrap();
     let us = stance.quasi_static(&x0);
-    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
+    let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
     let flight = FreeAcceleration::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let flying = FreeDynamics::running(model.clone(), 0.01, driven()).unwrap();

@@ -40,12 +40,11 @@ impl KnotFunction {
     /// Creates knot t of an action, or all knots of it if t is `None`; `robot` is the robot of the action, if it has
     /// one. Returns `None` if the action cannot be copied.
     pub(super) fn new(
-        mut action: Box<dyn ActionModel>,
+        action: Box<dyn ActionModel>,
         robot: Option<&Model>,
         t: Option<usize>,
         end: bool,
     ) -> Option<Self> {
-        action.reserve();
         let (nx, nu) = (action.nx(), action.nu());
         let chart = robot.map_or_else(Chart::none, Chart::new);
         let mut calls = KnotCalls::new(action.try_clone()?, chart.clone(), t, end);
@@ -129,8 +128,7 @@ struct KnotCalls {
 }
 
 impl KnotCalls {
-    fn new(mut action: Box<dyn ActionModel>, chart: Chart, t: Option<usize>, end: bool) -> Self {
-        action.reserve();
+    fn new(action: Box<dyn ActionModel>, chart: Chart, t: Option<usize>, end: bool) -> Self {
         let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
         let (next, mu) = (vec![0.0; nx], vec![0.0; ndx]);
         let (knot, hessian) = (LqKnot::zeros(ndx, nu), Hessian::zeros(ndx, nu));

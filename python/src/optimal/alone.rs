@@ -34,7 +34,7 @@ pub(crate) fn alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> 
         None if t == horizon => described.len() - 1,
         None => return Err(ProblemError::new_err(format!("t: expected 0 to {horizon}, found {t}"))),
     };
-    let mut alone = match (&described[k], &problem.objects[k]) {
+    let mut alone = match (&described[k], &lock("problem", &problem.objects)?[k]) {
         (Some(described), _) => robot_alone(described, Some(t))?,
         (None, Some(object)) => action_alone(object.bind(py), Some(t))?,
         (None, None) => unreachable!("a model is a robot's or an object"),

@@ -46,7 +46,7 @@ pub(crate) struct Problem {
     pub(super) described: Mutex<Vec<Option<Arc<Described>>>>,
     /// Objects of the models that are not a robot's, as the user passed them, the terminal model last. The problem's
     /// copies of these models call their functions.
-    pub(super) objects: Vec<Option<Py<PyAny>>>,
+    pub(super) objects: Mutex<Vec<Option<Py<PyAny>>>>,
     /// Residuals of robots that are written in Python, as the user passed them.
     written: Mutex<Vec<Py<PyAny>>>,
     /// First error of the actions.
@@ -80,8 +80,11 @@ impl Problem {
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.objects.iter().try_for_each(|object| visit.call(object))?;
-        let written = self.written.try_lock(); // no Python code runs while it is locked
+        // no Python code runs while these are locked
+        if let Ok(objects) = self.objects.try_lock() {
+            objects.iter().try_for_each(|object| visit.call(object))?;
+        }
+        let written = self.written.try_lock();
         written.map_or(Ok(()), |written| written.iter().try_for_each(|action| visit.call(action)))
     }
 
@@ -144,7 +147,7 @@ impl Problem {
         let described = lock("problem", &this.described)?;
         let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
         let mut parts = Vec::new();
-        for (object, described) in this.objects.iter().zip(&*described) {
+        for (object, described) in lock("problem", &this.objects)?.iter().zip(&*described) {
             let Some(described) = described.as_deref() else {
                 parts.push(object.as_ref().map_or_else(|| py.None(), |object| object.clone_ref(py)));
                 continue;
@@ -268,6 +271,39 @@ impl Problem {
         Ok(())
     }
 
+    /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between solves.
+    /// The solver's next iterations do not allocate.
+    ///
+    /// knot: its index, 0 to N − 1.
+    /// model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
+    ///     indices of this problem.
+    ///
+    /// Raises `ProblemError` if the model does not fit.
+    fn set_knot(&self, py: Python<'_>, knot: usize, model: &Bound<'_, PyAny>) -> PyResult<()> {
+        let new = boxed(model, false, &self.fault)?;
+        let object = new.described.is_none().then(|| model.clone().unbind());
+        self.replace(py, knot, new, object, residuals(model))
+    }
+
+    /// Sets the duration of a knot, whose model keeps its duration at all other knots. Call it between solves. The
+    /// solver's next iterations do not allocate.
+    ///
+    /// knot: its index, 0 to N − 1.
+    /// dt: the duration (s).
+    ///
+    /// Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
+    fn set_duration(&self, py: Python<'_>, knot: usize, dt: f64) -> PyResult<()> {
+        let described = {
+            let (problem, described) = (lock("problem", &self.inner)?, lock("problem", &self.described)?);
+            problem.knot_models().get(knot).and_then(|&k| described[k].as_deref().cloned())
+        };
+        let Some(mut new) = described.filter(|new| new.knot.dynamics.dt().is_some()) else {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot with a duration")));
+        };
+        new.knot.dynamics.set_dt(dt);
+        self.replace(py, knot, new.boxed()?, None, vec![])
+    }
+
     /// Computes the quasi-static controls of all knots, which hold each knot's state still as well as possible: (N,
     /// nu), or a list of N arrays if knots differ in nu. For a robot they follow from statics, for other actions from
     /// Newton's method.
@@ -387,8 +423,42 @@ impl Problem {
         let described: Vec<Option<Arc<Described>>> = described;
         let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
         let (inner, described) = (Mutex::new(problem), Mutex::new(described));
-        let (written, faults) = (Mutex::new(written), Mutex::new(faults));
+        let (objects, written, faults) = (Mutex::new(objects), Mutex::new(written), Mutex::new(faults));
         Ok(Self { inner, described, objects, written, fault, faults, moved: AtomicUsize::new(0) })
+    }
+
+    /// Replaces the model of a knot, and its description.
+    fn replace(
+        &self,
+        py: Python<'_>,
+        knot: usize,
+        Boxed { action, described: new }: Boxed,
+        object: Option<Py<PyAny>>,
+        written: Vec<Py<PyAny>>,
+    ) -> PyResult<()> {
+        let mut problem = lock("problem", &self.inner)?;
+        let horizon = problem.horizon();
+        if knot >= horizon {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {}", horizon - 1)));
+        }
+        problem.set_knot(knot, action).map_err(problem_error)?;
+        let (k, mut described) = (problem.knot_models()[knot], lock("problem", &self.described)?);
+        let mut objects = lock("problem", &self.objects)?;
+        if k == described.len() - 1 {
+            described.insert(k, None); // before the terminal model
+            objects.insert(k, None);
+        }
+        if let Some(new) = &new {
+            lock("problem", &self.faults)?.extend(faults(&new.knot));
+        }
+        described[k] = new;
+        let old = std::mem::replace(&mut objects[k], object);
+        drop((problem, described, objects));
+        if let Some(old) = old {
+            old.drop_ref(py); // may run Python code
+        }
+        lock("problem", &self.written)?.extend(written);
+        Ok(())
     }
 
     /// Shifts the descriptions of the models by a knot.

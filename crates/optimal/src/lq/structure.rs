@@ -39,6 +39,8 @@ pub struct DynamicsStructure {
     /// Δt, if the structure is known.
     dt: Option<f64>,
     blocks: Vec<EulerBlock>,
+    /// Whether the knot is given as equations of inverse dynamics instead of A and B.
+    inverse_dynamics: bool,
 }
 
 /// Blocks of T and E of one joint; see [`DynamicsStructure`].
@@ -55,7 +57,17 @@ pub struct EulerBlock {
 impl DynamicsStructure {
     /// Sets the structure to unknown. Keeps the memory of blocks.
     pub fn set_dense(&mut self) {
-        self.dt = None;
+        (self.dt, self.inverse_dynamics) = (None, false);
+    }
+
+    /// Marks the knot as given by equations of inverse dynamics, until the structure is unknown again.
+    pub(crate) fn set_inverse_dynamics(&mut self) {
+        self.inverse_dynamics = true;
+    }
+
+    /// Returns whether the knot is given by equations of inverse dynamics.
+    pub(crate) fn is_inverse_dynamics(&self) -> bool {
+        self.inverse_dynamics
     }
 
     /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for a block
@@ -91,14 +103,6 @@ impl EulerBlock {
 /// `Q` for δq are taken from the knot; its `A`, `B`, `S` and `R` are not used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
-    /// Whether the solver can use the equations.
-    pub(crate) wanted: bool,
-    /// Whether the action wrote the equations, instead of A and B.
-    pub(crate) active: bool,
-    /// Motion of the knot (q̈, and the forces of its contacts), as computed by the rollout that led to it.
-    pub(crate) motion: Vec<f64>,
-    /// Whether `motion` belongs to the point at which derivatives are computed.
-    pub(crate) knows_motion: bool,
     /// Distance between consecutive rows, the same for all rows.
     pub(crate) stride: usize,
     /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, and the number of both.
@@ -133,10 +137,10 @@ impl InverseDynamicsForm {
 
     /// Takes U and D out while G is being written.
     pub(crate) fn lend(&mut self) -> Self {
-        let Self { wanted, active, stride, .. } = *self;
+        let stride = self.stride;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
         let diagonal = core::mem::take(&mut self.diagonal);
-        core::mem::replace(self, Self { wanted, active, stride, costs, slopes, diagonal, ..Self::default() })
+        core::mem::replace(self, Self { stride, costs, slopes, diagonal, ..Self::default() })
     }
 
     /// Puts back the parts that [`lend`](Self::lend) took out.

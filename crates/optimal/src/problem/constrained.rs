@@ -1,9 +1,9 @@
 //! Actions with constraints, as terms of an augmented Lagrangian.
 
 use super::action::ActionModel;
+use super::group::{Evaluation, KnotGroup, Results, evaluate, lanes};
 use super::multipliers::{Bounded, Multipliers, Visit};
 use super::path_constraint::{self, PathConstraint};
-use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
 use core::fmt;
 use nalgebra::DMatrix;
@@ -121,10 +121,6 @@ impl ActionModel for Constrained {
         self.action.nu()
     }
 
-    fn lanes(&self) -> usize {
-        self.action.lanes()
-    }
-
     fn is_terminal(&self) -> bool {
         self.action.is_terminal()
     }
@@ -143,37 +139,16 @@ impl ActionModel for Constrained {
         self.add_derivatives(t, x, u, knot);
     }
 
-    #[track_caller]
-    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        let (nx, nu) = (self.nx(), self.nu());
-        self.action.calc_group(knots, xs, us, next, costs);
-        for (i, &t) in knots.iter().enumerate() {
-            costs[i] += self.term(t, &xs[i * nx..][..nx], &us[i * nu..][..nu]);
-        }
+    fn knot_group(&self) -> Option<&dyn KnotGroup> {
+        Some(self)
     }
 
-    #[track_caller]
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
-        let (nx, nu) = (self.nx(), self.nu());
-        assert_length("lq_knots", lq_knots.len(), knots.len());
-        self.action.calc_diff_group(knots, xs, us, lq_knots);
-        for (i, &t) in knots.iter().enumerate() {
-            self.add_derivatives(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut lq_knots[i]);
-        }
-    }
-
-    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
-        self.action.constraints(t, visit);
-        let (lower, upper) = self.constraint.bounds(t);
-        visit(Bounded { count: self.g.len(), lower, upper, parts: &[], multipliers: &mut self.multipliers });
+    fn knot_group_mut(&mut self) -> Option<&mut dyn KnotGroup> {
+        Some(self)
     }
 
     fn shift(&mut self) {
         self.action.shift();
-    }
-
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        self.action.outputs(t, x, u, show);
     }
 
     fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
@@ -191,10 +166,6 @@ impl ActionModel for Constrained {
         Some(Box::new(Self { action, constraint, multipliers, g, d, dd, gx: gx.clone(), gu: gu.clone() }))
     }
 
-    fn reserve(&mut self) {
-        self.action.reserve();
-    }
-
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         self.action.dynamics_hessian(t, x, u, lambda, hessian)
     }
@@ -209,5 +180,34 @@ impl ActionModel for Constrained {
 
     fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
         self.action.difference(x0, x1, out);
+    }
+}
+
+impl KnotGroup for Constrained {
+    fn lanes(&mut self) -> usize {
+        lanes(&mut *self.action)
+    }
+
+    /// Evaluates the action, and adds the term of each knot.
+    #[track_caller]
+    fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
+        let (nx, nu) = (self.nx(), self.nu());
+        let what = if what == Evaluation::Values { what } else { Evaluation::Derivatives };
+        evaluate(&mut *self.action, knots, xs, us, what, results);
+        for (i, &t) in knots.iter().enumerate() {
+            let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
+            match what {
+                Evaluation::Values => results.costs[i] += self.term(t, x, u),
+                _ => self.add_derivatives(t, x, u, &mut results.lq_knots[i]),
+            }
+        }
+    }
+
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        if let Some(group) = self.action.knot_group_mut() {
+            group.constraints(t, visit);
+        }
+        let (lower, upper) = self.constraint.bounds(t);
+        visit(Bounded { count: self.g.len(), lower, upper, parts: &[], multipliers: &mut self.multipliers });
     }
 }

@@ -2,7 +2,8 @@
 
 use super::action::ActionModel;
 use super::action_view::{ActionView, Actions};
-use super::models::{Models, check};
+use super::group::{Evaluation, Results, evaluate, innermost};
+use super::models::{Models, check, reserve};
 use super::shape::Shape;
 use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
@@ -92,7 +93,7 @@ impl Problem {
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
         let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
-        terminal.reserve();
+        reserve(&mut *terminal);
         let mut problem = Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread };
         problem.arrange();
         Ok(problem)
@@ -106,7 +107,9 @@ impl Problem {
         offsets.push(0);
         for (knot, &index) in knot_models.iter().enumerate() {
             let [action, own] = models.place(index);
-            models.actions[action].serve(knot, knot_models.len(), own);
+            if let Some(group) = models.actions[action].knot_group_mut() {
+                group.serve(knot, knot_models.len(), own);
+            }
             copies.serve(action, knot, knot_models.len(), own);
             offsets.push(offsets[knot] + models.actions[action].nu());
             match runs.last_mut() {
@@ -142,7 +145,63 @@ impl Problem {
         Ok(())
     }
 
-    /// Returns the index of the model of each knot.
+    /// Replaces the model of knot t, as an MPC does when a contact is made earlier than planned. The solver needs no other
+    /// changes, and its next iterations do not allocate. This function allocates; a model that was given to knot t in the
+    /// same way before is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
+    ///
+    /// Costs and limits that the model has for a single knot count for that index.
+    ///
+    /// # Errors
+    /// [`Error::Dimension`] if nx, ndx or nu differ from those of the old model, [`Error::NoNextState`] for a terminal
+    /// model; the problem is then unchanged.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn set_knot(&mut self, t: usize, model: Box<dyn ActionModel>) -> Result<(), Error> {
+        self.assert_running(t);
+        let Self { models, knot_models, shape, copies, .. } = self;
+        let sizes = [("nx", shape.nx, model.nx()), ("ndx", shape.ndx, model.ndx()), ("nu", shape.nu(t), model.nu())];
+        for (name, expected, found) in sizes {
+            if expected != found {
+                return Err(Error::Dimension { knot: t, name, expected, found });
+            }
+        }
+        if model.is_terminal() {
+            return Err(Error::NoNextState { knot: t, index: models.len() });
+        }
+        let uses = |index: usize| knot_models.iter().enumerate().any(|(knot, own)| *own == index && knot != t);
+        let unused = models.added().find(|&index| !uses(index));
+        knot_models[t] = models.add(model, unused);
+        copies.forget(models.place(knot_models[t])[0]);
+        self.arrange();
+        Ok(())
+    }
+
+    /// Sets the duration Δt (s) of knot t, whose model keeps its duration at all other knots. The solver's next
+    /// iterations do not allocate.
+    ///
+    /// # Errors
+    /// [`Error::TimeStep`] if Δt is not above 0, [`Error::NoDuration`] if the knot has no duration; the problem is then
+    /// unchanged.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn set_duration(&mut self, t: usize, dt: f64) -> Result<(), Error> {
+        self.assert_running(t);
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::TimeStep { dt });
+        }
+        let index = self.knot_models[t];
+        match self.chosen(index).and_then(innermost).is_some_and(|group| group.set_duration(t, dt)) {
+            true => Ok(()),
+            false => Err(Error::NoDuration { knot: t }),
+        }
+    }
+
+    /// Returns the index of the model of each knot. Models that [`set_knot`](Self::set_knot) added have the indices after
+    /// the models with which the problem was created.
     pub fn knot_models(&self) -> &[usize] {
         &self.knot_models
     }
@@ -232,7 +291,7 @@ impl Problem {
         let Self { x0, models, knot_models, terminal, shape, runs: own_runs, knots, unread, .. } = self;
         let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
         let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
-        terminal.reserve();
+        reserve(&mut *terminal);
         let mut runs = Vec::with_capacity(knot_models.len()); // capacity that a shift may need
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
@@ -283,13 +342,13 @@ impl Problem {
     /// If a length is wrong.
     #[track_caller]
     pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        self.calc_with_motion(xs, us, next, costs, &mut []);
+        self.calc_with_motions(xs, us, next, costs, &mut []);
     }
 
     /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`: N equal parts, which
     /// are empty or have [`motion_size`](Self::motion_size) numbers.
     #[track_caller]
-    pub(crate) fn calc_with_motion(
+    pub(crate) fn calc_with_motions(
         &mut self,
         xs: &[f64],
         us: &[f64],
@@ -298,44 +357,50 @@ impl Problem {
         motions: &mut [f64],
     ) {
         let (nx, horizon) = (self.nx(), self.horizon());
-        let room = motions.len() / horizon;
+        let size = motions.len() / horizon;
         self.assert_trajectory(xs, us);
         assert_length("next", next.len(), horizon * nx);
         assert_length("costs", costs.len(), horizon + 1);
-        for (model, knots) in &self.runs {
+        for (action, knots) in &self.runs {
             let (x, u) = self.places(knots);
-            let (next, costs) = (&mut next[x.clone()], &mut costs[knots.clone()]);
-            let motions = &mut motions[knots.start * room..knots.end * room];
-            let (action, t) = (&mut self.models.actions[*model], &self.knots[knots.clone()]);
-            match room {
-                0 => action.calc_group(t, &xs[x], &us[u], next, costs),
-                _ => action.calc_group_with_motion(t, &xs[x], &us[u], next, costs, motions),
-            }
+            let motions = &mut motions[knots.start * size..knots.end * size];
+            let mut results = Results::values(&mut next[x.clone()], &mut costs[knots.clone()], motions);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], Evaluation::Values, &mut results);
         }
+        let mut results = Results::values(&mut self.unread, &mut costs[horizon..], &mut []);
         let x = &xs[self.shape.x(horizon)];
-        self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Values, &mut results);
     }
 
-    /// Computes the derivatives at all knots of a trajectory into `knots` (N + 1, the terminal one last). Allocates
+    /// Computes the derivatives at all knots of a trajectory into `lq_knots` (N + 1, the terminal one last). Allocates
     /// nothing.
     ///
     /// # Panics
     /// If a length is wrong.
     #[track_caller]
     pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
-        let horizon = self.horizon();
-        self.begin_derivatives(xs, us, lq_knots);
-        for (model, knots) in &self.runs {
-            let (x, u) = self.places(knots);
-            let (t, lq_knots) = (&self.knots[knots.clone()], &mut lq_knots[knots.clone()]);
-            self.models.actions[*model].calc_diff_group(t, &xs[x], &us[u], lq_knots);
-        }
-        let x = &xs[self.shape.x(horizon)];
-        self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut lq_knots[horizon..]);
+        self.calc_diff_as(Evaluation::Derivatives, xs, us, lq_knots);
     }
 
-    /// Computes [`calc_diff`](Self::calc_diff) on `gains.len()` threads of the rayon pool in which it is called, or
-    /// else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
+    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics where knots support
+    /// them.
+    #[track_caller]
+    pub(crate) fn calc_diff_as(&mut self, what: Evaluation<'_>, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        let horizon = self.horizon();
+        self.begin_derivatives(xs, us, lq_knots);
+        for (action, knots) in &self.runs {
+            let (x, u) = self.places(knots);
+            let mut results = Results::derivatives(&mut lq_knots[knots.clone()]);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], what.part(knots.clone(), horizon), &mut results);
+        }
+        let (x, mut results) = (&xs[self.shape.x(horizon)], Results::derivatives(&mut lq_knots[horizon..]));
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Derivatives, &mut results);
+    }
+
+    /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool in which it is called,
+    /// or else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
     /// group (model, first index, knots, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
     /// are written afterwards. Models that cannot be [copied](ActionModel::try_clone) are evaluated on the calling
     /// thread.
@@ -345,6 +410,7 @@ impl Problem {
     #[track_caller]
     pub(crate) fn calc_diff_on(
         &mut self,
+        what: Evaluation<'_>,
         [xs, us]: [&[f64]; 2],
         lq_knots: &mut [LqKnot],
         found: &mut [KnotFeedback],
@@ -355,10 +421,11 @@ impl Problem {
         let Self { models, runs, copies, knots, shape, terminal, .. } = self;
         let t = shape.horizon();
         let ((lq_knots, end), (found, found_there)) = (lq_knots.split_at_mut(t), found.split_at_mut(t));
-        terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
+        let mut results = Results::derivatives(&mut *end);
+        evaluate(&mut **terminal, &knots[t..], &xs[shape.x(t)], &[], Evaluation::Derivatives, &mut results);
         sweep(&**terminal, t, end, found_there);
-        let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
-        copies.calc_diff(&mut models.actions, runs, all, lq_knots, found, gains, sweep);
+        let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets, what };
+        copies.calc_diff(models, runs, all, lq_knots, found, gains, sweep);
     }
 
     /// Copies the multipliers of models to the copies that other threads use.
@@ -366,17 +433,14 @@ impl Problem {
         self.copies.share_multipliers(&mut self.models.actions, &self.runs);
     }
 
-    /// Checks the lengths, and resets the structures of A and B, which the action sets. Requests the equations of
-    /// inverse dynamics only from actions that support them.
+    /// Checks the lengths, and resets the structures of A and B, which the actions set.
     #[track_caller]
     fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         self.assert_trajectory(xs, us);
         assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
-        for (t, knot) in lq_knots.iter_mut().enumerate() {
+        for knot in lq_knots {
             knot.structure.set_dense();
             knot.rows.clear();
-            knot.inverse_dynamics.active = false;
-            knot.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
         }
     }
 
@@ -408,8 +472,10 @@ impl Problem {
         self.terminal.difference(x0, x1, out);
     }
 
-    /// Passes the vectors that the dynamics of knot t compute at (x, u), besides the next state, to `show`: see
-    /// [`outputs`](ActionModel::outputs).
+    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute at (x, u) besides the next
+    /// state. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of each
+    /// contact. A contact's force is expressed in the axes of its rows; at an impact it is an impulse. User-defined
+    /// accelerations have `acceleration`; other actions have no such vectors.
     ///
     /// # Panics
     /// If t > N or a length is wrong.
@@ -417,7 +483,9 @@ impl Problem {
     pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         assert_length("x", x.len(), self.nx());
         assert_length("u", u.len(), self.nu(t));
-        self.action_mut(t).outputs(t, x, u, show);
+        if let Some(group) = innermost(self.action_mut(t)) {
+            group.show_outputs(t, x, u, show);
+        }
     }
 
     /// Creates knots of zeros with the dimensions of the knots, the terminal one last.
@@ -427,19 +495,23 @@ impl Problem {
 
     /// Returns the maximum number of entries of a knot's motion that a rollout stores for the derivatives.
     pub(crate) fn motion_size(&self) -> usize {
-        self.models.actions.iter().map(|model| model.motion_size()).max().unwrap_or(0)
+        self.inverse_dynamics().map(|(size, _)| size).max().unwrap_or(0)
     }
 
-    /// Allocates memory in knots for the equations of inverse dynamics, for any order of the actions in the horizon.
+    /// Returns the sizes of the equations of inverse dynamics of all actions that support them.
+    fn inverse_dynamics(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
+        self.models.actions.iter().filter_map(|action| action.knot_group()?.inverse_dynamics())
+    }
+
+    /// Allocates memory in LQ knots for the equations of inverse dynamics, for any order of the actions in the horizon.
     /// Returns whether an action supports them.
     pub(crate) fn reserve_inverse_dynamics(&self, lq_knots: &mut [LqKnot]) -> bool {
-        let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
+        let sizes = self.inverse_dynamics().map(|(_, sizes)| sizes);
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
-        let (nv, horizon, motion) = (self.ndx() / 2, self.horizon(), self.motion_size());
+        let (nv, horizon) = (self.ndx() / 2, self.horizon());
         for knot in &mut lq_knots[..horizon] {
             let nu = knot.nu();
             knot.inverse_dynamics.reserve(nv, nu, most);
-            knot.inverse_dynamics.motion.resize(motion, 0.0);
         }
         true
     }
@@ -502,7 +574,7 @@ impl Problem {
 
     /// Returns the largest number of lanes that one of the models uses.
     pub(crate) fn lanes(&self) -> usize {
-        self.models.actions.iter().map(|action| action.lanes()).max().unwrap_or(1).max(1)
+        self.models.lanes.iter().copied().max().unwrap_or(1)
     }
 
     /// Returns the ranges of the states and controls of a run of knots in flat trajectories.
@@ -515,6 +587,12 @@ impl Problem {
     #[track_caller]
     pub(crate) fn assert_knot(&self, t: usize) {
         assert!(t <= self.horizon(), "`t` is {t}, expected at most the horizon {}", self.horizon());
+    }
+
+    /// Panics if t ≥ N.
+    #[track_caller]
+    fn assert_running(&self, t: usize) {
+        assert!(t < self.horizon(), "`t` is {t}, expected less than the horizon {}", self.horizon());
     }
 
     #[track_caller]

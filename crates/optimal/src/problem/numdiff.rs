@@ -66,14 +66,6 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         self.0.shift();
     }
 
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        self.0.outputs(t, x, u, show);
-    }
-
-    fn reserve(&mut self) {
-        self.0.reserve();
-    }
-
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }

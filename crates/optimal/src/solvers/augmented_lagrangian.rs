@@ -343,9 +343,6 @@ impl AugmentedLagrangian {
         let Self { settings, solver: SolverLoop { iterate, knots, .. }, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
         let Solution { xs, us, gap, cost, .. } = &iterate.solution;
-        for knot in &mut *knots {
-            knot.inverse_dynamics.wanted = false; // r and B are read
-        }
         problem.calc_diff(xs, us, knots);
         let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
         let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);

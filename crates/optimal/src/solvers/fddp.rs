@@ -27,7 +27,7 @@ use crate::problem::Problem;
 /// K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
 ///
 /// The first step length is tried alone. If it fails, the next four are tried side by side, and then the others. The
-/// number tried at once is limited by the [`lanes`](crate::ActionModel::lanes) of the actions. The longest good step is
+/// number tried at once is limited by the [`lanes`](crate::GroupModel::lanes) of the actions. The longest good step is
 /// taken, as in a search of one length after the other.
 ///
 /// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace, and workspaces for

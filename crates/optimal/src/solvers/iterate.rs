@@ -60,7 +60,7 @@ impl Iterate {
     pub(super) fn evaluate(&mut self, problem: &mut Problem) -> f64 {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
-        problem.calc_with_motion(xs, us, next, costs, motions);
+        problem.calc_with_motions(xs, us, next, costs, motions);
         self.knows_motions = true;
         let mut sum = Sum::default();
         self.costs.iter().for_each(|cost| sum.add(*cost));

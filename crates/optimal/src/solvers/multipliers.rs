@@ -2,7 +2,7 @@
 
 use super::outcome::{Violation, ViolationKind};
 use crate::error::Error;
-use crate::problem::{PENALTY, Problem};
+use crate::problem::{PENALTY, Problem, Visit};
 
 /// State of all constraints at a trajectory.
 #[derive(Debug, Default)]
@@ -20,6 +20,13 @@ pub(super) struct Measured {
 }
 
 impl Problem {
+    /// Passes the constraints of knot t to `visit`, in their order.
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        if let Some(group) = self.action_mut(t).knot_group_mut() {
+            group.constraints(t, visit);
+        }
+    }
+
     /// Sets all multipliers to zero, and the penalty to 1/μ.
     ///
     /// # Errors
@@ -28,7 +35,7 @@ impl Problem {
         let horizon = self.horizon();
         for t in 0..=horizon {
             let mut result = Ok(());
-            self.action_mut(t).constraints(t, &mut |bounded| {
+            self.constraints(t, &mut |bounded| {
                 result = result.clone().and(bounded.check(t));
                 bounded.multipliers.start(t, horizon + 1, mu);
             });
@@ -42,12 +49,12 @@ impl Problem {
     pub(super) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
         for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
             let mut all = 0;
-            self.action_mut(t).constraints(t, &mut |bounded| all += bounded.count);
+            self.constraints(t, &mut |bounded| all += bounded.count);
             if all != y.len() {
                 continue;
             }
             let mut rest = &y[..];
-            self.action_mut(t).constraints(t, &mut |bounded| {
+            self.constraints(t, &mut |bounded| {
                 let (own, others) = rest.split_at(bounded.count);
                 bounded.multipliers.set(t, own);
                 rest = others;
@@ -60,7 +67,7 @@ impl Problem {
     pub(super) fn forget_multipliers(&mut self) {
         let knots = self.horizon() + 1;
         for t in 0..knots {
-            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.start(t, knots, 1.0 / PENALTY));
+            self.constraints(t, &mut |bounded| bounded.multipliers.start(t, knots, 1.0 / PENALTY));
         }
         self.share_multipliers();
     }
@@ -68,14 +75,14 @@ impl Problem {
     /// Returns whether any knot has a constraint.
     pub(super) fn has_constraints(&mut self) -> bool {
         let mut any = false;
-        (0..=self.horizon()).for_each(|t| self.action_mut(t).constraints(t, &mut |bounded| any |= bounded.count > 0));
+        (0..=self.horizon()).for_each(|t| self.constraints(t, &mut |bounded| any |= bounded.count > 0));
         any
     }
 
     /// Sets the penalty 1/μ.
     pub(super) fn set_penalty(&mut self, mu: f64) {
         for t in 0..=self.horizon() {
-            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.set_mu(mu));
+            self.constraints(t, &mut |bounded| bounded.multipliers.set_mu(mu));
         }
         self.share_multipliers();
     }
@@ -83,7 +90,7 @@ impl Problem {
     /// Updates y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
     pub(super) fn update_multipliers(&mut self) {
         for t in 0..=self.horizon() {
-            self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.update(t));
+            self.constraints(t, &mut |bounded| bounded.multipliers.update(t));
         }
         self.share_multipliers();
     }
@@ -95,7 +102,7 @@ impl Problem {
         for t in 0..=self.horizon() {
             let without_controls = self.nu(t) == 0;
             let mut before = 0; // number of this knot's constraints visited before
-            self.action_mut(t).constraints(t, &mut |bounded| {
+            self.constraints(t, &mut |bounded| {
                 let (excess, next, term) = bounded.multipliers.measured(t, bounded.count);
                 all.terms += term;
                 for (i, (excess, y)) in excess.iter().zip(next).enumerate() {
@@ -132,7 +139,7 @@ impl Problem {
         out.resize(self.horizon() + 1, vec![]);
         for (t, out) in out.iter_mut().enumerate() {
             out.clear();
-            self.action_mut(t).constraints(t, &mut |bounded| {
+            self.constraints(t, &mut |bounded| {
                 out.extend_from_slice(bounded.multipliers.of(t, bounded.count));
             });
         }

@@ -3,7 +3,7 @@
 use super::iterate::{Iterate, Sum};
 use super::solution::Solution;
 use crate::lq::{DIVERGED, KnotFeedback};
-use crate::problem::{ActionView, Problem, Shape};
+use crate::problem::{ActionView, Evaluation, Problem, Results, Shape, evaluate};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
 
@@ -19,7 +19,7 @@ pub(super) struct Trials {
     us: Vec<f64>,
     /// φₜ(xₜ, uₜ), N knots. It differs from the next x by the remaining gap.
     next: Vec<f64>,
-    /// Motion of each knot, in equal parts: see [`ActionModel::motion_size`](crate::ActionModel::motion_size).
+    /// Motion of each knot (accelerations and forces), in equal parts.
     motions: Vec<f64>,
     motion_size: usize,
     /// Sum of the costs of each trial; meaningless if the trial `failed`.
@@ -142,14 +142,9 @@ impl Trials {
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
             let action = view.action_mut(t);
             let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
-            match size {
-                _ if t == horizon => action.calc_group(knot, x_all, u_all, next_all, costs_all),
-                0 => action.calc_group(knot, x_all, u_all, next_all, costs_all),
-                _ => {
-                    let motions = &mut motions[t * size * count..][..size * count];
-                    action.calc_group_with_motion(knot, x_all, u_all, next_all, costs_all, motions);
-                }
-            }
+            let motions = if t < horizon { &mut motions[t * size * count..][..size * count] } else { &mut [] };
+            let mut results = Results::values(next_all, costs_all, motions);
+            evaluate(action, knot, x_all, u_all, Evaluation::Values, &mut results);
             for i in 0..count {
                 costs[i].add(knot_costs[i]);
                 let bounded = |x: f64| x.abs() < DIVERGED; // false for NaN

@@ -13,7 +13,7 @@ use super::solution::{Iteration, Solution, Status, Timings};
 use super::watch::{Clock, Phase, Watch};
 use crate::error::Error;
 use crate::lq::{LqKnot, Sweep, SweepError};
-use crate::problem::{ActionModel, Problem};
+use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::time::Instant;
 use std::time::Duration;
 
@@ -286,17 +286,12 @@ impl SolverLoop {
         regularisation: f64,
     ) -> Option<Result<(), SweepError>> {
         let clock = Instant::now();
-        for knot in &mut self.knots {
-            knot.inverse_dynamics.wanted = self.inverse_dynamics;
-            knot.inverse_dynamics.knows_motion = self.iterate.knows_motions;
-        }
-        let size = self.iterate.motions.len() / problem.horizon();
-        for (knot, motion) in self.knots.iter_mut().zip(self.iterate.motions.chunks_exact(size.max(1))) {
-            knot.inverse_dynamics.motion.resize(size, 0.0);
-            knot.inverse_dynamics.motion.copy_from_slice(motion);
-        }
         let follows = self.follows(settings);
-        let Self { iterate: Iterate { solution, gaps, .. }, knots, sweep, .. } = self;
+        let Self { iterate: Iterate { solution, gaps, motions, knows_motions, .. }, knots, sweep, .. } = self;
+        let what = match self.inverse_dynamics {
+            true => Evaluation::Equations(if *knows_motions { motions } else { &[] }),
+            false => Evaluation::Derivatives,
+        };
         let (Solution { xs, us, .. }, shape) = (&*solution, solution.shape());
         let complete = |model: &dyn ActionModel, first: usize, knots: &mut [LqKnot]| {
             for (t, knot) in (first..).zip(knots) {
@@ -320,13 +315,13 @@ impl SolverLoop {
         };
         let (mut outcome, mut sweeping) = (Ok(()), Duration::ZERO);
         if settings.threads == 1 {
-            problem.calc_diff(xs, us, knots);
+            problem.calc_diff_as(what, xs, us, knots);
             for (t, knot) in knots.chunks_exact_mut(1).enumerate() {
                 complete(problem.action(t), t, knot);
             }
         } else {
             let (mut following, feedback, gains) = sweep.follow(settings.threads);
-            problem.calc_diff_on([xs, us], knots, feedback, gains, |model, first, knots, feedback| {
+            problem.calc_diff_on(what, [xs, us], knots, feedback, gains, |model, first, knots, feedback| {
                 complete(model, first, knots);
                 if follows && outcome.is_ok() {
                     let clock = Instant::now();

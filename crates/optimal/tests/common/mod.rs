@@ -2,7 +2,7 @@
 #![allow(dead_code)] // each test file uses some of them
 #![allow(non_snake_case)] // A, B, T, E
 
-use condyle_optimal::{ActionModel, LqKnot, Problem};
+use condyle_optimal::{ActionModel, GroupModel, LqKnot, Problem};
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt, SeedableRng, rngs::StdRng};
 use std::ops::Range;
@@ -88,6 +88,12 @@ pub(crate) struct Unicycle {
     pub(crate) lanes: usize,
 }
 
+impl GroupModel for Unicycle {
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+}
+
 const UNICYCLE_STEP: f64 = 0.1;
 const UNICYCLE_WEIGHT: f64 = 100.0;
 
@@ -98,8 +104,8 @@ impl ActionModel for Unicycle {
     fn nu(&self) -> usize {
         self.nu
     }
-    fn lanes(&self) -> usize {
-        self.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         if let [v, w] = u {
@@ -135,15 +141,21 @@ pub(crate) struct Limited<A> {
     pub(crate) upper: Vec<f64>,
 }
 
-impl<A: ActionModel> ActionModel for Limited<A> {
+impl<A: GroupModel> GroupModel for Limited<A> {
+    fn lanes(&self) -> usize {
+        self.action.lanes()
+    }
+}
+
+impl<A: GroupModel> ActionModel for Limited<A> {
     fn nx(&self) -> usize {
         self.action.nx()
     }
     fn nu(&self) -> usize {
         self.action.nu()
     }
-    fn lanes(&self) -> usize {
-        self.action.lanes()
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
         Some((&self.lower, &self.upper))
@@ -157,7 +169,7 @@ impl<A: ActionModel> ActionModel for Limited<A> {
 }
 
 /// Creates a problem whose knots are all the same.
-fn horizon_of<A: ActionModel>(
+fn horizon_of<A: GroupModel>(
     x0: &[f64],
     horizon: usize,
     action: A,
@@ -195,6 +207,12 @@ pub(crate) struct Cartpole {
     pub(crate) weights: [f64; 5],
 }
 
+impl GroupModel for Cartpole {
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+}
+
 const CART: f64 = 1.0;
 const POLE: f64 = 0.1;
 const LENGTH: f64 = 0.5;
@@ -217,8 +235,8 @@ impl ActionModel for Cartpole {
     fn nu(&self) -> usize {
         self.nu
     }
-    fn lanes(&self) -> usize {
-        self.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         if let [f] = u {

@@ -202,10 +202,6 @@ impl ActionModel for Wrapper {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        self.0.outputs(t, x, u, show);
-        show("something else", &[1.0; 5]);
-    }
 }
 
 #[test]
@@ -281,7 +277,7 @@ fn a_copy_of_a_quadrupeds_problem_has_the_same_derivatives() {
     let contacts = feet(&model, ReferenceFrame::Local);
     let stand = ContactDynamics::running(model.clone(), &contacts, DT, contact_costs(&model, &contacts, 12, &mut rng));
     let inverse = ContactInverseDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
-    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
+    let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
     let models: Vec<Box<dyn ActionModel>> = vec![Box::new(stand.unwrap()), Box::new(inverse), Box::new(impact)];
     let end = Box::new(FreeDynamics::terminal(model.clone(), vec![]).unwrap());
     let mut problem = Problem::new(random_state(&model, &mut rng), models, vec![0, 0, 2, 1], end).unwrap();

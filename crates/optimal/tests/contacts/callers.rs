@@ -3,7 +3,7 @@
 
 use super::*;
 use condyle_optimal::robot::{OwnResidual, RobotProblem};
-use condyle_optimal::{AugmentedLagrangian, DdpMethod, Hessian, Lqr, Settings, Solution};
+use condyle_optimal::{AugmentedLagrangian, DdpMethod, GroupModel, Hessian, Lqr, Settings, Solution};
 
 #[path = "../../../../tests/common/panics.rs"]
 mod panics;
@@ -56,7 +56,7 @@ fn a_panic_is_at_the_callers_line() {
     panics!("`upper` has length 6, expected 7", knot.clone().with_bounds(vec![0.0; 7], vec![0.0; 6]));
     let free = || FreeAcceleration::new(arm.clone(), Actuation::joints(&arm), vec![]).unwrap();
     panics!("`model` has 7 controls, expected 0 at the end", Integrated::without_time(free()));
-    let mut impact = ImpulseDynamics::new(arm.clone(), &[], 0.0, 0.0, vec![]).unwrap();
+    let mut impact = ImpulseDynamics::instant(arm.clone(), &[], 0.0, 0.0, vec![]).unwrap();
     panics!("`x` has length 3, expected 14", impact.calc(0, &[0.0; 3], &[], &mut next[..14]));
     panics!("`next` has length 1, expected 14", impact.calc(0, &x0, &[], &mut next[..1]));
     let weighted = Activation::Weighted(vec![1.0; 2]);

@@ -5,7 +5,7 @@ use condyle_dynamics::{Model, ReferenceFrame, Vec3, robots};
 use condyle_optimal::robot::{
     Activation, ContactDynamics, Cost, FrameName, FreeDynamics, FreeInverseDynamics, Limit, Residual,
 };
-use condyle_optimal::{ActionModel, LqKnot};
+use condyle_optimal::{GroupModel, LqKnot};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -68,7 +68,7 @@ fn knots_with_costs_of_their_own_are_single_knots() {
     check_group(stance, &model, &mut rng);
 }
 
-fn check_group(mut action: impl ActionModel, model: &Model, rng: &mut StdRng) {
+fn check_group(mut action: impl GroupModel, model: &Model, rng: &mut StdRng) {
     for count in [1, 2, 3, 8, 21] {
         let knots: Vec<usize> = (0..count).collect();
         let xs = knots.iter().flat_map(|_| random_state(model, rng)).collect::<Vec<_>>();

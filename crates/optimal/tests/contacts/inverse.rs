@@ -4,11 +4,13 @@ use super::limits::check_gradient;
 use super::{DT, check_derivatives, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, Vec3, integrate, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, ContactInverseDynamics,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, ContactInverseDynamics, ContinuousModel,
     ControlledContactAcceleration, Cost, FreeDynamics, FreeInverseDynamics, FrictionCone, Integrated, Integrator,
     Limit, Residual,
 };
-use condyle_optimal::{ActionModel, AugmentedLagrangian, ConstraintSettings, Fddp, Problem, Settings, Status};
+use condyle_optimal::{
+    ActionModel, AugmentedLagrangian, ConstraintSettings, Fddp, GroupModel, Problem, Settings, Status,
+};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, rngs::StdRng};
 use std::collections::BTreeMap;
@@ -96,7 +98,7 @@ fn derivatives_of_an_arm_are_those_of_the_action() {
     }
 }
 
-fn outputs(action: &mut dyn ActionModel, x: &[f64], u: &[f64]) -> BTreeMap<String, Vec<f64>> {
+fn outputs<M: ContinuousModel>(action: &mut Integrated<M>, x: &[f64], u: &[f64]) -> BTreeMap<String, Vec<f64>> {
     let mut all = BTreeMap::new();
     action.outputs(0, x, u, &mut |name, numbers| {
         all.insert(name.to_owned(), numbers.to_vec());

@@ -6,7 +6,7 @@ use condyle_optimal::robot::{
     Activation, Actuation, ContactDynamics, Cost, FrameName, FreeAcceleration, FreeDynamics, FreeInverseDynamics,
     ImpulseDynamics, Integrated, Integrator, Limit, Residual,
 };
-use condyle_optimal::{ActionModel, Error, LqKnot};
+use condyle_optimal::{ActionModel, Error, GroupModel, LqKnot};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -122,7 +122,8 @@ fn derivatives_of_limits_are_those_of_the_terms() {
         let of_dynamics = 3;
         let kinds = none.len() - 1 - of_forces - of_dynamics;
         assert_eq!(check(&format!("end of the {name}"), &model, &none, end, 0.0, &mut rng), kinds);
-        let impact = |l| ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, still(0)).unwrap().with_limits(l);
+        let impact =
+            |l| ImpulseDynamics::instant(model.clone(), &contacts, 0.3, 1e-9, still(0)).unwrap().with_limits(l);
         let kinds = check(&format!("impact of the {name}"), &model, &none, impact, 0.0, &mut rng);
         assert_eq!(kinds, none.len() - of_dynamics);
     }

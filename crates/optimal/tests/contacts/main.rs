@@ -212,7 +212,7 @@ fn derivatives_in_contact_along_axes_are_those_of_the_action() {
             check_derivatives(&what, action, &model, 5.0, &mut rng);
             let kept = ["state", "com", "momentum", "force", "cone"];
             costs.retain(|cost| kept.contains(&cost.name.as_str()));
-            let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 0.0, costs).unwrap();
+            let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.3, 0.0, costs).unwrap();
             check_derivatives(&format!("impact, {what}"), impact, &model, 0.0, &mut rng);
         }
     }
@@ -240,7 +240,7 @@ fn derivatives_of_an_impact_are_those_of_the_action() {
         let mut costs = contact_costs(&model, &contacts, 0, &mut rng);
         costs.retain(|cost| kept.contains(&cost.name.as_str()));
         costs.push(Cost::new("jump", 0.4, Residual::ImpulseCenterOfMass, Activation::Quadratic));
-        let action = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, costs).unwrap();
+        let action = ImpulseDynamics::instant(model.clone(), &contacts, 0.3, 1e-9, costs).unwrap();
         check_derivatives(&format!("impact of the {}", model.name()), action, &model, 0.0, &mut rng);
     }
 }
@@ -409,7 +409,7 @@ fn what_does_not_fit_is_refused_by_name() {
         refused(&point, term(Residual::WrenchCone { contact: "toe".into(), cone: flat })),
         "cost `grip`: a wrench cone needs a rigid contact, of 6 rows; this one has 3"
     );
-    let bounce = ImpulseDynamics::new(model.clone(), &contacts, 2.0, 0.0, vec![]).unwrap_err();
+    let bounce = ImpulseDynamics::instant(model.clone(), &contacts, 2.0, 0.0, vec![]).unwrap_err();
     assert_eq!(bounce.to_string(), "contact `restitution`: ε is 2, not from 0 to 1");
     let drives = Actuation::matrix(&model, DMatrix::zeros(3, 2)).unwrap_err();
     assert_eq!(drives.to_string(), format!("actuation: its map is 3 × 2, expected {} rows", model.nv()));
@@ -456,7 +456,7 @@ fn derivatives_have_the_form_of_euler_steps() {
         let (ndx, nu) = (2 * model.nv(), model.nv() - 6);
         let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
         let mut stand = ContactDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
-        let mut impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
+        let mut impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
         let mut lq_knots = [nu, 0, nu, 0].map(|nu| LqKnot::zeros(ndx, nu));
         for (t, knot) in lq_knots.iter_mut().enumerate() {
             let (x, u) = (random_state(&model, &mut rng), random(knot.nu(), 5.0, &mut rng));

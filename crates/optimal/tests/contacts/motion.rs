@@ -196,7 +196,7 @@ fn impulses_change_velocities() {
         set.proximal = Proximal { mu: 0.0, iterations: 1 };
         let after = impulse_dynamics(&model, &mut data, &mut set, q, v, 0.2).v.to_vec();
         let change: Vec<_> = after.iter().zip(v).map(|(after, before)| after - before).collect();
-        let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.2, 0.0, vec![]).unwrap();
+        let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.2, 0.0, vec![]).unwrap();
         let motion = single(Box::new(impact.clone()), &model, &x).motion_at(0, &x, &[]).unwrap();
         assert!(motion.is_impact() && motion.acceleration.is_empty() && motion.effort.is_empty());
         assert!(largest_difference(&motion.velocity_change, &change) < SAME);
@@ -235,7 +235,7 @@ fn a_solution_of_a_trot_has_forces_at_the_feet_that_stand() {
     let stand = |pair: [&str; 2]| -> Box<dyn ActionModel> {
         Box::new(ContactDynamics::running(model.clone(), &pair.map(foot), DT, costs()).unwrap())
     };
-    let touch = ImpulseDynamics::new(model.clone(), &pairs[1].map(foot), 0.0, 1e-9, vec![]).unwrap();
+    let touch = ImpulseDynamics::instant(model.clone(), &pairs[1].map(foot), 0.0, 1e-9, vec![]).unwrap();
     let models = vec![stand(pairs[0]), Box::new(touch) as Box<dyn ActionModel>, stand(pairs[1])];
     let end = Box::new(FreeDynamics::terminal(model.clone(), costs().drain(..1).collect()).unwrap());
     let knot_models = vec![0, 0, 0, 0, 1, 2, 2, 2];

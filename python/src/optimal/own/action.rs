@@ -13,7 +13,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rust::{ActionModel, LqKnot};
+use rust::{ActionModel, GroupModel, LqKnot};
 use std::any::Any;
 use std::sync::Arc;
 
@@ -254,21 +254,43 @@ impl ActionModel for Own {
         self.written.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
-    /// Returns whether `other` is a copy of the same action, so that their knots form one group.
-    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
-        let other: &mut dyn Any = other;
-        let same = |other: &mut Self| {
-            self.written.functions.are(&other.written.functions)
-                && self.written.space.is(&other.written.space)
-                && Arc::ptr_eq(&self.fault, &other.fault)
-        };
-        other.downcast_mut::<Self>().is_some_and(same)
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         let mut cost = [0.0];
         let done = unless_failed(&self.fault, |py| self.try_calc(py, &[t], [x, u], next, &mut cost));
         done.map_or(f64::NAN, |()| cost[0])
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.calc_diff_group(&[t], x, u, std::slice::from_mut(knot));
+    }
+
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        self.written.space.check(x)
+    }
+
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        self.written.space.integrate(x, dx, out, &self.fault);
+    }
+
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        self.written.space.difference(x0, x1, out, &self.fault);
+    }
+}
+
+impl GroupModel for Own {
+    /// Returns whether `other` is a copy of the same action, so that their knots form one group.
+    fn is_same(&self, other: &dyn ActionModel) -> bool {
+        let other: &dyn Any = other;
+        let same = |other: &Self| {
+            self.written.functions.are(&other.written.functions)
+                && self.written.space.is(&other.written.space)
+                && Arc::ptr_eq(&self.fault, &other.fault)
+        };
+        other.downcast_ref::<Self>().is_some_and(same)
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
@@ -283,10 +305,6 @@ impl ActionModel for Own {
         for (i, &t) in knots.iter().enumerate() {
             costs[i] = self.calc(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut next[i * nx..][..nx]);
         }
-    }
-
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
-        self.calc_diff_group(&[t], x, u, std::slice::from_mut(knot));
     }
 
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
@@ -307,17 +325,5 @@ impl ActionModel for Own {
             }
             None => lq_knots.iter_mut().for_each(|knot| knot.q.fill(f64::NAN)),
         }
-    }
-
-    fn check_state(&self, x: &[f64]) -> Result<(), String> {
-        self.written.space.check(x)
-    }
-
-    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
-        self.written.space.integrate(x, dx, out, &self.fault);
-    }
-
-    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
-        self.written.space.difference(x0, x1, out, &self.fault);
     }
 }

@@ -102,7 +102,7 @@ impl Forms {
 
     /// Returns the form for a step at a knot.
     pub(super) fn of_step(&mut self, knot: &LqKnot, regularisation: f64) -> &mut dyn KnotForm {
-        match knot.inverse_dynamics.active && Driven::takes(knot, regularisation) {
+        match knot.structure.is_inverse_dynamics() && Driven::takes(knot, regularisation) {
             true => &mut self.driven,
             false => self.of(knot),
         }
@@ -110,7 +110,7 @@ impl Forms {
 
     /// Returns the form of a knot, among the forms that support rows below H.
     pub(super) fn of(&mut self, knot: &LqKnot) -> &mut dyn KnotForm {
-        if knot.inverse_dynamics.active {
+        if knot.structure.is_inverse_dynamics() {
             &mut self.inverse_dynamics
         } else if knot.structure.euler().is_some() && knot.ndx() >= EULER_FROM {
             &mut self.euler

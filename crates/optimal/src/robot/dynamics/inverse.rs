@@ -1,20 +1,20 @@
 //! Dynamics of a robot whose accelerations are the controls, and whose efforts follow by inverse dynamics.
 
+use super::acceleration::{Controlled, RobotAcceleration};
 use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Inverse dynamics of a robot that touches nothing: q̈ = u, τ = rnea(q, v, u), and costs.
-#[derive(Clone, Debug)]
-pub struct ControlledAcceleration(pub(super) RobotDynamics);
+pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 
-/// A knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
+/// Knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = u,   τ = rnea(q, v, u),   v⁺ = v + u Δt,   q⁺ = q ⊕ (v Δt + u Δt²),   ℓ = Δt Σ w a(r)
@@ -42,7 +42,7 @@ pub struct ControlledAcceleration(pub(super) RobotDynamics);
 pub type FreeInverseDynamics = Integrated<ControlledAcceleration>;
 
 impl ControlledAcceleration {
-    /// A robot that is driven at every coordinate.
+    /// Returns a robot that is driven at every coordinate.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.
@@ -50,13 +50,13 @@ impl ControlledAcceleration {
         let (nu, undriven) = (model.nv(), Actuation::joints(&model).undriven());
         let capabilities = Capabilities { nu, effort: true, inverse: true, undriven, ..Capabilities::default() };
         let actuation = Actuation::all(&model);
-        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Inverse, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Inverse, costs).map(Self::of)
     }
 }
 
 impl FreeInverseDynamics {
-    /// A knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`] and
-    /// [`Integrated::new`].
+    /// Returns a knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`]
+    /// and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0.

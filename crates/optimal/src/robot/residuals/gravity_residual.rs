@@ -1,7 +1,7 @@
 //! Gravity residual: the efforts of a knot beyond those that hold the robot still, for several knots side by side or for one.
 
 use super::kernel::KnotGroup;
-use crate::robot::knot::unpack;
+use crate::robot::knot_data::unpack;
 use condyle_dynamics::{Data, Model, gravity, rnea, rnea_derivatives, static_torque_derivative};
 use condyle_spatial::block::Block;
 use condyle_spatial::{Scalar, kernel};
@@ -10,9 +10,9 @@ use nalgebra::DMatrix;
 /// M q̈ + h − g at knots with contacts, else −g.
 #[derive(Debug)]
 pub(crate) struct GravityResidual<S> {
-    /// The value. Shape: nv.
+    /// Value. Shape: nv.
     value: Vec<S>,
-    /// The derivative by q. Shape: nv × nv.
+    /// Derivative by q. Shape: nv × nv.
     by_q: DMatrix<S>,
 }
 

@@ -1,4 +1,4 @@
-//! Residuals: what costs and limits look at, and how it is computed.
+//! Residuals: what costs and limits read, and how it is computed.
 
 pub(super) mod autodiff;
 pub(super) mod cones;

@@ -8,11 +8,11 @@ use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
 pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[f64], dd: &[f64]) {
-    let (n, form) = (knot.ndx(), &mut knot.inverse_dynamics);
+    let (n, inverse, form) = (knot.ndx(), knot.structure.is_inverse_dynamics(), &mut knot.inverse_dynamics);
     for i in entries.clone() {
         knot.q[i] += d[i];
     }
-    let explicit = if form.active { n / 2 } else { n };
+    let explicit = if inverse { n / 2 } else { n };
     for i in entries.start..entries.end.min(explicit) {
         knot.Q.as_mut_slice()[i * (n + 1)] += dd[i];
     }
@@ -23,45 +23,46 @@ pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[
 
 /// r += d and R += diag(dd).
 pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
-    let (n, m, form) = (knot.ndx(), knot.nu(), &mut knot.inverse_dynamics);
+    let (n, m, inverse) = (knot.ndx(), knot.nu(), knot.structure.is_inverse_dynamics());
+    let form = &mut knot.inverse_dynamics;
     for i in 0..m {
         knot.r[i] += d[i];
-        match form.active {
+        match inverse {
             true => form.diagonal[n / 2 + i] += dd[i],
             false => knot.R.as_mut_slice()[i * (m + 1)] += dd[i],
         }
     }
 }
 
-/// A row of a Jacobian with respect to (u, v, q), to be added to.
+/// Row of a Jacobian with respect to (u, v, q), to be added to.
 pub(crate) struct Row<'a> {
     pub u: &'a mut [f64],
     pub v: &'a mut [f64],
     pub q: &'a mut [f64],
 }
 
-/// The rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In
-/// a knot in inverse-dynamics form u stands for the unknowns that replace the controls.
+/// Rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In a
+/// knot in inverse-dynamics form u stands for the unknowns that replace the controls.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     nu: usize,
     nv: usize,
-    /// The distance from one row to the next.
+    /// Distance from one row to the next.
     stride: usize,
-    /// The rows of residuals that depend on more than q, and from the end of the memory backwards those of the others.
+    /// Rows of residuals that depend on more than q; from the end of the memory backwards, rows of the other residuals.
     rows: Vec<f64>,
     /// a′ and a″.
     slopes: Vec<[f64; 2]>,
-    /// The number of rows of both kinds.
+    /// Number of rows of both kinds.
     whole: usize,
     positions: usize,
-    /// The rows times √|a″|, and the same with the sign of a″.
+    /// Rows times √|a″|, and the same with the sign of a″.
     left: Vec<f64>,
     right: Vec<f64>,
 }
 
 impl Rows {
-    /// Memory for so many rows with respect to (u, v, q), and to q alone, of a robot with nv coordinates and nu controls.
+    /// Allocates `whole` rows with respect to (u, v, q) and `positions` rows with respect to q alone.
     pub(crate) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
         let (most, stride) = (whole + positions, nu + 2 * nv + SLACK);
         let rows = vec![0.0; most.max(1) * stride];
@@ -74,7 +75,7 @@ impl Rows {
         (self.whole, self.positions) = (0, 0);
     }
 
-    /// A row of zeros, to be written, for the a′ and a″ that it is worth.
+    /// Returns a row of zeros, to be written, for the a′ and a″ that it is worth.
     pub(crate) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
         let k = self.whole;
         self.slopes[k] = worth;
@@ -86,7 +87,7 @@ impl Rows {
         Row { u, v, q }
     }
 
-    /// A row of a Jacobian with respect to q alone.
+    /// Computes a row of a Jacobian with respect to q alone.
     pub(crate) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
         self.positions += 1;
         let k = self.slopes.len() - self.positions;
@@ -99,7 +100,7 @@ impl Rows {
     pub(crate) fn write(&mut self, knot: &mut LqKnot) {
         knot.q.as_mut_slice().fill(0.0);
         knot.r.as_mut_slice().fill(0.0);
-        if knot.inverse_dynamics.active {
+        if knot.structure.is_inverse_dynamics() {
             knot.inverse_dynamics.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
         }
         at_level(Write { rows: self, knot });
@@ -116,7 +117,7 @@ impl Vectorized for Write<'_> {
     fn run<V: Vector>(self) {
         let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, knot } = self;
         let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
-        let inverse = knot.inverse_dynamics.active;
+        let inverse = knot.structure.is_inverse_dynamics();
         let (some, all) = if inverse { (0, *positions) } else { (*whole, *whole + *positions) };
         let first = slopes.len() - *positions;
         for k in 0..all {

@@ -6,8 +6,8 @@ use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
 use crate::lq::{Hessian, LARGEST_BLOCK, LqKnot};
-use crate::robot::capabilities::Output;
-use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
+use crate::robot::knot_data::Output;
+use crate::robot::knot_data::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::state::{groups, state_difference};
 use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian_groups};
 use core::ops::Range;
@@ -16,19 +16,19 @@ use nalgebra::DMatrix;
 /// Scratch of the residuals of a knot.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// The residual, its worth's gradient and the diagonal of its worth's Hessian.
+    /// Residual, its worth's gradient and the diagonal of its worth's Hessian.
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
-    /// The rows of all Jacobians.
+    /// Rows of all Jacobians.
     pub rows: Rows,
-    /// The Jacobian of the difference of configurations, of which the blocks of groups are read. Shape: nv × nv.
+    /// Jacobian of the difference of configurations, of which the blocks of groups are read. Shape: nv × nv.
     D: DMatrix<f64>,
-    /// The coordinates of each group of positions that is no vector space.
+    /// Coordinates of each group of positions that is no vector space.
     groups: Vec<Range<usize>>,
-    /// ∂r/∂x and ∂r/∂u of a user's own residual, row after row.
+    /// ∂r/∂x and ∂r/∂u of a user-defined residual, row after row.
     own: [Vec<f64>; 2],
-    /// Second derivatives of a user's own residual, and the sum of those of all, where there are any.
+    /// Second derivatives of a user-defined residual, and the sum over all such residuals, if they have any.
     hessians: Option<Box<[Hessian; 2]>>,
 }
 
@@ -69,10 +69,10 @@ fn product(r: &mut [f64], W: &[f64], x: &[f64]) {
     }
 }
 
-/// The residuals of a knot: those of its costs, or those of its limits.
+/// Residuals of a knot: of its costs, or of its limits.
 pub(crate) struct ResidualView<'a> {
     pub model: &'a Model,
-    /// The knot.
+    /// Knot.
     pub t: usize,
     pub state: KnotState<'a>,
     pub kinematics: &'a KinematicData,
@@ -144,7 +144,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes the rows of a user's own residual of n numbers.
+    /// Pushes the rows of a user-defined residual of n numbers.
     fn push_own_rows(&mut self, own: &OwnResidual, n: usize, sensitivities: &dyn Sensitivities) {
         let Scratch { rows, d, dd, own: [by_x, by_u], hessians, .. } = &mut *self.scratch;
         let (KnotState { x, u, .. }, nv) = (self.state, self.model.nv());
@@ -184,7 +184,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes row i of ∂r/∂(u, v, q) of a residual that looks at outputs of the dynamics.
+    /// Pushes row i of ∂r/∂(u, v, q) of a residual that reads outputs of the dynamics.
     fn push_row(&mut self, residual: &Residual, plan: &Plan, i: usize, sensitivities: &dyn Sensitivities) {
         let (Scratch { rows, d, dd, .. }, data) = (&mut *self.scratch, &self.state.data.residuals);
         let (g, nv) = (&mut rows.push([d[i], dd[i]]), self.model.nv());
@@ -231,7 +231,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity but for the groups' blocks of q.
+    /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity, except the groups' blocks of q.
     fn add_state(&mut self, knot: &mut LqKnot) {
         let Self { model, scratch: s, .. } = self;
         let nv = model.nv();
