@@ -23,10 +23,14 @@ BASELINE = Path(__file__).with_suffix(".json")
 ROBOTS = ("arm7", "quadruped", "humanoid")
 STATES, KNOTS, ITERATIONS = 16, 32, 5
 """Numbers of states, knots and iterations, equal to the numbers in instructions.rs."""
-PHASES = {"Fddp::calc_diff": "fddp_derivatives", "Fddp::sweep": "fddp_sweep", "LineSearch::run": "fddp_rollout"}
+PHASES = {
+    "SolverLoop::calc_diff": "fddp_derivatives",
+    "SolverLoop::sweep": "fddp_sweep",
+    "LineSearch::run": "fddp_rollout",
+}
 """Names of the parts of an FDDP iteration, by the function of the solver."""
 GROWTH = 1.03
-LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured::(\w+)|((?:Fddp|LineSearch)::\w+))")
+LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured::(\w+)|((?:SolverLoop|LineSearch)::\w+))")
 
 
 def run(*command: str | Path, **options: object) -> str:

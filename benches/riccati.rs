@@ -14,7 +14,7 @@
 //! the time of whole sweeps, on one thread and on all threads.
 #![allow(non_snake_case)]
 
-use condyle::optimal::{LqNode, Sweep};
+use condyle::optimal::{LqKnot, Sweep};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
@@ -30,52 +30,52 @@ const DT: f64 = 0.02;
 const SIZES: [(usize, usize, usize); 4] = [(76, 32, 6), (36, 12, 6), (14, 7, 0), (18, 9, 0)];
 
 /// Returns a knot of a problem with semi-implicit Euler steps and a convex cost.
-fn node(rng: &mut StdRng, ndx: usize, nu: usize, free: usize) -> LqNode {
+fn knot(rng: &mut StdRng, ndx: usize, nu: usize, free: usize) -> LqKnot {
     let nv = ndx / 2;
     let mut random = |rows, columns| DMatrix::from_fn(rows, columns, |_, _| 2.0 * rng.random::<f64>() - 1.0);
-    let mut node = LqNode::zeros(ndx, nu);
+    let mut knot = LqKnot::zeros(ndx, nu);
     let root = random(ndx + nu, ndx + nu);
     let hessian = &root * root.transpose() * DT + DMatrix::identity(ndx + nu, ndx + nu);
-    node.Q.copy_from(&hessian.view((0, 0), (ndx, ndx)));
-    node.S.copy_from(&hessian.view((0, ndx), (ndx, nu)));
-    node.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
-    node.q.copy_from(&random(ndx, 1).column(0));
-    node.r.copy_from(&random(nu, 1).column(0));
+    knot.Q.copy_from(&hessian.view((0, 0), (ndx, ndx)));
+    knot.S.copy_from(&hessian.view((0, ndx), (ndx, nu)));
+    knot.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
+    knot.q.copy_from(&random(ndx, 1).column(0));
+    knot.r.copy_from(&random(nu, 1).column(0));
     let lower =
         DMatrix::identity(nv, ndx).map_with_location(|r, c, _: f64| f64::from(c == nv + r)) + random(nv, ndx) * DT;
     let control = random(nv, nu) * DT;
-    node.A.rows_mut(0, nv).copy_from(&(&lower * DT + DMatrix::identity(nv, ndx)));
-    node.A.rows_mut(nv, nv).copy_from(&lower);
-    node.B.rows_mut(0, nv).copy_from(&(&control * DT));
-    node.B.rows_mut(nv, nv).copy_from(&control);
+    knot.A.rows_mut(0, nv).copy_from(&(&lower * DT + DMatrix::identity(nv, ndx)));
+    knot.A.rows_mut(nv, nv).copy_from(&lower);
+    knot.B.rows_mut(0, nv).copy_from(&(&control * DT));
+    knot.B.rows_mut(nv, nv).copy_from(&control);
     let root = 0..free;
-    node.structure.set_euler(DT, if free > 0 { std::slice::from_ref(&root) } else { &[] }); // T and E are the identity
-    node
+    knot.structure.set_euler(DT, if free > 0 { std::slice::from_ref(&root) } else { &[] }); // T and E are the identity
+    knot
 }
 
-fn nodes(horizon: usize, (ndx, nu, free): (usize, usize, usize)) -> Vec<LqNode> {
+fn lq_knots(horizon: usize, (ndx, nu, free): (usize, usize, usize)) -> Vec<LqKnot> {
     let mut rng = StdRng::seed_from_u64(1);
-    let mut nodes: Vec<_> = (0..horizon).map(|_| node(&mut rng, ndx, nu, free)).collect();
-    let mut end = LqNode::zeros(ndx, 0);
+    let mut lq_knots: Vec<_> = (0..horizon).map(|_| knot(&mut rng, ndx, nu, free)).collect();
+    let mut end = LqKnot::zeros(ndx, 0);
     end.Q.fill_with_identity();
-    nodes.push(end);
-    nodes
+    lq_knots.push(end);
+    lq_knots
 }
 
 fn sweep(c: &mut Criterion) {
     let mut group = c.benchmark_group("sweep");
     group.throughput(Throughput::Elements(HORIZON as u64));
     for (ndx, nu, free) in SIZES {
-        let mut nodes = nodes(HORIZON, (ndx, nu, free));
-        let mut sweep = Sweep::new(&nodes);
+        let mut lq_knots = lq_knots(HORIZON, (ndx, nu, free));
+        let mut sweep = Sweep::new(&lq_knots);
         for form in ["Euler", "dense"] {
             if form == "dense" {
-                for node in &mut nodes {
-                    node.structure.set_dense();
+                for knot in &mut lq_knots {
+                    knot.structure.set_dense();
                 }
             }
             let id = BenchmarkId::new(form, format!("ndx {ndx}, nu {nu}"));
-            group.bench_function(id, |b| b.iter(|| sweep.run(black_box(&nodes), 1e-9)));
+            group.bench_function(id, |b| b.iter(|| sweep.run(black_box(&lq_knots), 1e-9)));
         }
     }
     group.finish();
@@ -88,12 +88,12 @@ fn segments(c: &mut Criterion) {
     for threads in [1, all] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         for (ndx, nu, free) in &SIZES[..3] {
-            let nodes = nodes(LONG, (*ndx, *nu, *free));
-            let mut sweep = Sweep::new(&nodes);
+            let lq_knots = lq_knots(LONG, (*ndx, *nu, *free));
+            let mut sweep = Sweep::new(&lq_knots);
             for segments in [1, 2, 4, 8] {
                 sweep.set_segments(segments);
                 let id = BenchmarkId::new(format!("{segments} on {threads} threads"), format!("ndx {ndx}, nu {nu}"));
-                group.bench_function(id, |b| pool.install(|| b.iter(|| sweep.run(black_box(&nodes), 1e-9))));
+                group.bench_function(id, |b| pool.install(|| b.iter(|| sweep.run(black_box(&lq_knots), 1e-9))));
             }
         }
     }

@@ -47,7 +47,7 @@ ALIASES = {
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
     "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
-    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | InverseDynamics | ContactInverseDynamics"
+    "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | FreeInverseDynamics | ContactInverseDynamics"
     " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction",
 }
 
@@ -162,9 +162,9 @@ ARGUMENTS = {
     "dict[str, ContactConstraint]": "contacts",
     "_Scheme": "integrator",
     "_Polynomial": "controls",
-    "_Action": "action Problem.terminal",
+    "_Action": "action Problem.set_knot.model Problem.terminal",
     "Sequence[_Action]": "models",
-    "Sequence[int] | None": "stages",
+    "Sequence[int] | None": "knot_models",
     "_Controls": "us",
     "Problem": "problem",
     # functions that get arrays of floats, or arrays of numbers that carry their derivatives
@@ -173,7 +173,7 @@ ARGUMENTS = {
         Action.calc_diff DifferentialAction.calc_diff Residual.own_cost.calc_diff""",
     "_Space": "space",
     "Callable[[Iteration], object]": "callback",
-    "Sequence[LqNode]": "nodes",
+    "Sequence[LqKnot]": "knots",
     "Callable[[int, _Array, _Array], ArrayLike]": "ConstrainedAction.calc",
     "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc Residual.own_cost.calc",
     "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
@@ -208,7 +208,7 @@ RESULTS = {
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
-        InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
+        FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
@@ -260,7 +260,8 @@ RESULTS = {
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
-        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
+        Problem.set_costs Problem.set_duration Problem.set_knot
+        Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",
@@ -295,7 +296,7 @@ RESULTS = {
     "GroundContacts": "Simulation.contacts",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
     "Evaluation": "Problem.evaluate Problem._evaluate",
-    "list[LqNode]": "Problem.derivatives",
+    "list[LqKnot]": "Problem.derivatives",
     "SweepResult": "Sweep.run",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",

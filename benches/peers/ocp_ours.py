@@ -110,9 +110,9 @@ class Ours:
         """Returns Condyle's `Problem`."""
         spec, bounded = self.spec, solver.startswith("box")
         model = our_robot(robot) if robot else None
-        models, stages = self.phases(model, bounded)
+        models, knot_models = self.phases(model, bounded)
         terminal = our_action(spec["stage_models"][spec["terminal"]], model, spec, bounded, terminal=True)
-        return optimal.Problem(spec["x0"], models, stages, terminal)
+        return optimal.Problem(spec["x0"], models, knot_models, terminal)
 
     def settings(self, solver):
         """Returns the settings with which Condyle's solver works like Crocoddyl's solver of this name."""

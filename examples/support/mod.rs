@@ -33,7 +33,7 @@ pub(crate) struct Gait {
     feet: Vec<(usize, Vec3<f64>)>,
     com: Vec3<f64>,
     models: Vec<Box<dyn ActionModel>>,
-    stages: Vec<usize>,
+    knot_models: Vec<usize>,
     us: Vec<f64>,
     times: Vec<f64>,
     /// Whether each foot touches the ground, for each knot.
@@ -51,8 +51,8 @@ impl Gait {
         let ground = feet[0].1.z;
         feet.iter_mut().for_each(|foot| foot.1.z -= ground); // the robot stands at height 0
         (com.z, x0[2]) = (com.z - ground, x0[2] - ground);
-        let (models, stages, us) = (Vec::new(), Vec::new(), Vec::new());
-        Self { x0, dt, foot, feet, com, models, stages, us, times: vec![0.0], touches: Vec::new(), model }
+        let (models, knot_models, us) = (Vec::new(), Vec::new(), Vec::new());
+        Self { x0, dt, foot, feet, com, models, knot_models, us, times: vec![0.0], touches: Vec::new(), model }
     }
 
     fn contacts(&self, frames: &[usize], kd: f64) -> Vec<Contact> {
@@ -120,10 +120,10 @@ impl Gait {
         let mut action = ContactDynamics::running(self.model.clone(), &contacts, self.dt, costs(self, 0))?;
         let hold = action.quasi_static(&self.x0);
         for k in 0..knots {
-            action.set_costs(self.stages.len() + k, costs(self, k))?;
+            action.set_costs(self.knot_models.len() + k, costs(self, k))?;
         }
         self.us.extend(hold.repeat(knots));
-        self.stages.extend(vec![self.models.len(); knots]);
+        self.knot_models.extend(vec![self.models.len(); knots]);
         let touching: Vec<bool> = self.feet.iter().map(|foot| support.contains(&foot.0)).collect();
         self.touches.extend(touching.repeat(knots));
         let last = self.times.last().copied().unwrap_or(0.0);
@@ -159,8 +159,8 @@ impl Gait {
             costs.push(self.place(self.feet[k].0, self.feet[k].1, 1e7));
         }
         let contacts = self.contacts(&landing, 0.0);
-        self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
-        self.stages.push(self.models.len() - 1);
+        self.models.push(Box::new(ImpulseDynamics::instant(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
+        self.knot_models.push(self.models.len() - 1);
         self.touches.extend(vec![true; self.feet.len()]);
         self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact takes no time
         Ok(())
@@ -176,8 +176,8 @@ impl Gait {
     pub(crate) fn solve(self) -> Result<(Solution, Vec<f64>), Error> {
         let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
         let end = FreeDynamics::terminal(self.model.clone(), terminal)?;
-        let xs = self.x0.repeat(self.stages.len() + 1);
-        let mut problem = Problem::new(self.x0, self.models, self.stages, Box::new(end))?;
+        let xs = self.x0.repeat(self.knot_models.len() + 1);
+        let mut problem = Problem::new(self.x0, self.models, self.knot_models, Box::new(end))?;
         let mut solver = Fddp::new(&problem);
         solver.settings.tolerance = TOLERANCE;
         let solution = solver.solve_with(&mut problem, &xs, &self.us, |i: &Iteration| {

@@ -252,7 +252,7 @@ fn problems() -> Vec<RobotProblem> {
     reach.limits = vec![Limit::new("effort", effort(7), vec![-30.0; 7], vec![f64::INFINITY; 7])];
     reach.costs_at.insert(1, reach.costs.clone());
     reach.bounds = Some(ControlBounds { lower: vec![f64::NEG_INFINITY; 7], upper: vec![40.0; 7] });
-    let end = Knot::new(Dynamics::End, vec![Cost::new("rest", 1.0, rest(&arm), Activation::Quadratic)]);
+    let end = Knot::new(Dynamics::Terminal, vec![Cost::new("rest", 1.0, rest(&arm), Activation::Quadratic)]);
     let inverse = Knot::new(Dynamics::Inverse { integrator, dt: 0.02 }, reach.costs[..1].to_vec());
     let foot = |name: &str| Contact::new(name, ContactConstraint::point(quadruped.frame(name).expect("has feet")));
     let contacts = vec![foot("LF_foot"), foot("RH_foot")];
@@ -261,14 +261,20 @@ fn problems() -> Vec<RobotProblem> {
         vec![Cost::new("rest", 1.0, rest(&quadruped), Activation::Quadratic)],
     );
     let land = Knot::new(Dynamics::Impulse { contacts, restitution: 0.0, damping: 1e-8 }, stand.costs.clone());
-    let still = Knot::new(Dynamics::End, stand.costs.clone());
+    let still = Knot::new(Dynamics::Terminal, stand.costs.clone());
     vec![
-        RobotProblem { x0: state(&arm), model: arm, knots: vec![reach, inverse], stages: vec![0, 0, 1], terminal: end },
+        RobotProblem {
+            x0: state(&arm),
+            model: arm,
+            knots: vec![reach, inverse],
+            knot_models: vec![0, 0, 1],
+            terminal: end,
+        },
         RobotProblem {
             x0: state(&quadruped),
             model: quadruped,
             knots: vec![stand, land],
-            stages: vec![0, 1, 0],
+            knot_models: vec![0, 1, 0],
             terminal: still,
         },
     ]

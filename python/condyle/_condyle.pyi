@@ -38,7 +38,7 @@ from ._types import (
     ImpulseDerivatives,
     Iteration,
     Limits,
-    LqNode,
+    LqKnot,
     Mimic,
     ModelWarning,
     Outcome,
@@ -79,7 +79,7 @@ __all__ = [
     "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
-    "InverseDynamics",
+    "FreeInverseDynamics",
     "Joint",
     "Limit",
     "Lqr",
@@ -249,7 +249,7 @@ _Action: TypeAlias = (
     FreeDynamics
     | ContactDynamics
     | ImpulseDynamics
-    | InverseDynamics
+    | FreeInverseDynamics
     | ContactInverseDynamics
     | Lqr
     | Unicycle
@@ -3192,7 +3192,7 @@ class ImpulseDynamics:
         """Returns an empty array, since an impact has no controls."""
 
 @final
-class InverseDynamics:
+class FreeInverseDynamics:
     """A knot of a robot whose nv controls are the robot's accelerations: q̈ = u, τ = rnea(q, v, u). Integrator and cost
     are as for `FreeDynamics`.
 
@@ -3215,9 +3215,9 @@ class InverseDynamics:
         upper: ArrayLike | None = None,
         limits: Sequence[Limit] | None = None,
         controls: _Polynomial = "constant",
-    ) -> InverseDynamics: ...
+    ) -> FreeInverseDynamics: ...
     @staticmethod
-    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> InverseDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> FreeInverseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """Returns the accelerations that hold the robot still: nv zeros."""
 
@@ -3273,10 +3273,11 @@ class Problem:
     """An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
 
     x0: the initial state, nx numbers.
-    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
-        `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-    stages: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed as a group
-        if they have the same model, or if their models belong to one robot and differ only in their costs and limits.
+    models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
+        `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+    knot_models: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed
+        as a group if they have the same model, or if their models belong to one robot and differ only in their
+        costs and limits.
     terminal: the model of the terminal knot, without controls.
 
     Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
@@ -3285,7 +3286,7 @@ class Problem:
     """
 
     def __new__(
-        cls, x0: ArrayLike, models: Sequence[_Action], stages: Sequence[int] | None, terminal: _Action
+        cls, x0: ArrayLike, models: Sequence[_Action], knot_models: Sequence[int] | None, terminal: _Action
     ) -> Problem: ...
     @property
     def horizon(self) -> int:
@@ -3307,10 +3308,10 @@ class Problem:
         """Computes the evaluation of a solution; an error if the horizon was shifted after the solve."""
 
     @staticmethod
-    def _from_parts(x0: ArrayLike, parts: Sequence[Any], stages: Sequence[int] | None) -> Problem: ...
-    def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqNode]:
+    def _from_parts(x0: ArrayLike, parts: Sequence[Any], knot_models: Sequence[int] | None) -> Problem: ...
+    def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqKnot]:
         """Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
-        `LqNode`s, which a `Sweep` solves.
+        `LqKnot`s, which a `Sweep` solves.
 
         xs, us: as for `evaluate`.
         """
@@ -3357,6 +3358,27 @@ class Problem:
         Raises `ProblemError` if a term does not fit the robot, or if the knot's action does not belong to a robot.
         """
 
+    def set_duration(self, knot: int, dt: float) -> None:
+        """Sets the duration of a knot, whose model keeps its duration at all other knots. Call it between solves. The
+        solver's next iterations do not allocate.
+
+        knot: its index, 0 to N − 1.
+        dt: the duration (s).
+
+        Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
+        """
+
+    def set_knot(self, knot: int, model: _Action) -> None:
+        """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between solves.
+        The solver's next iterations do not allocate.
+
+        knot: its index, 0 to N − 1.
+        model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
+            indices of this problem.
+
+        Raises `ProblemError` if the model does not fit.
+        """
+
     def set_weight(self, name: str, weight: float) -> None:
         """Changes the weight of all cost terms with this name, in all knots including the terminal one. Call this method
         between solves.
@@ -3371,7 +3393,7 @@ class Problem:
         """
 
     def to_json(self) -> str:
-        """Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
+        """Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An infinite bound
         is written as null.
 
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
@@ -3529,10 +3551,11 @@ class Sweep:
     """The backward Riccati sweep over a horizon of linear-quadratic knots: an iteration of `Fddp` without derivatives and
     line search.
 
-    nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
+    knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
     controls.
 
-    Raises `ProblemError` if the shapes of the nodes do not fit together.
+    Raises `ProblemError` if the shapes of the nodes do not fit together. `run` raises it for a knot with constraint rows, which
+    the sweep does not treat.
 
     >>> from condyle.optimal import Lqr, Problem, Sweep
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
@@ -3542,7 +3565,7 @@ class Sweep:
     True
     """
 
-    def __new__(cls, nodes: Sequence[LqNode]) -> Sweep: ...
+    def __new__(cls, knots: Sequence[LqKnot]) -> Sweep: ...
     def run(self, regularisation: float = 0.0) -> SweepResult:
         """Computes the feedback and the value functions, as a `SweepResult`.
 

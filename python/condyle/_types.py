@@ -685,7 +685,22 @@ class Solution(_Solution):
         return type(self), tuple(self)
 
 
-class LqNode(NamedTuple):
+class ConstraintRows(NamedTuple):
+    """Constraints of an `LqKnot`: lower ≤ C δx + D δu + c ≤ upper, row by row."""
+
+    C: ArrayLike
+    """∂g/∂x, (rows, ndx)."""
+    D: ArrayLike
+    """∂g/∂u, (rows, nu)."""
+    c: ArrayLike
+    """Values at δx = 0, δu = 0, one for each row."""
+    lower: ArrayLike
+    """Lower bounds, one for each row; −∞ for none."""
+    upper: ArrayLike
+    """Upper bounds, one for each row; ∞ for none."""
+
+
+class LqKnot(NamedTuple):
     """The linear-quadratic problem of a knot: dynamics δx⁺ = A δx + B δu + f, and cost ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu +
     qᵀδx + rᵀδu.
     """
@@ -706,6 +721,8 @@ class LqNode(NamedTuple):
     """∂ℓ/∂x, ndx numbers."""
     r: ArrayLike
     """∂ℓ/∂u, nu numbers."""
+    rows: ConstraintRows | None = None
+    """General constraints; None without constraints."""
 
 
 class SweepResult(NamedTuple):
@@ -852,7 +869,8 @@ _MODULES = {
     "Solution": "optimal",
     "Evaluation": "optimal",
     "SweepResult": "optimal",
-    "LqNode": "optimal",
+    "LqKnot": "optimal",
+    "ConstraintRows": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
     "Ground": "simulation",

@@ -48,7 +48,7 @@ from ._condyle import (
     ContactInverseDynamics,
     FreeDynamics,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Lqr,
     Model,
     Problem,
@@ -163,7 +163,7 @@ _Knot = (
     | ContactInverseDynamics
     | FreeDynamics
     | ImpulseDynamics
-    | InverseDynamics
+    | FreeInverseDynamics
     | Lqr
     | Problem
     | Unicycle
@@ -188,7 +188,7 @@ def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
     First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. For a robot, the Hessian of the
     cost is the Gauss–Newton approximation w (∂r)ᵀ a″ ∂r, with residual r and activation a; for an `Lqr` and a
     `Unicycle` it is exact. The Hessian of the next state is exact for `Lqr` and `Unicycle`, and for `FreeDynamics` and
-    `InverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are treated as linear in the
+    `FreeInverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are treated as linear in the
     tangent space of the state. An approximate Hessian does not change the optimum, but an optimiser may need more
     iterations.
 

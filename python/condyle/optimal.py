@@ -40,7 +40,7 @@ from ._condyle import (
     FreeDynamics,
     FrictionCone,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Limit,
     Lqr,
     Problem,
@@ -50,13 +50,14 @@ from ._condyle import (
     Unicycle,
     WrenchCone,
 )
-from ._types import Evaluation, Iteration, LqNode, Outcome, Solution, SweepResult, Timings
+from ._types import ConstraintRows, Evaluation, Iteration, LqKnot, Outcome, Solution, SweepResult, Timings
 
 __all__ = [
     "Action",
     "Activation",
     "AugmentedLagrangian",
     "ConstrainedAction",
+    "ConstraintRows",
     "ContactDynamics",
     "ContactInverseDynamics",
     "Cost",
@@ -66,10 +67,10 @@ __all__ = [
     "FreeDynamics",
     "FrictionCone",
     "ImpulseDynamics",
-    "InverseDynamics",
+    "FreeInverseDynamics",
     "Iteration",
     "Limit",
-    "LqNode",
+    "LqKnot",
     "Lqr",
     "Outcome",
     "Problem",

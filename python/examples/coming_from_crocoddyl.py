@@ -16,7 +16,7 @@ The example needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names of Crocoddyl,
     ActivationModelWeightedQuad, QuadraticBarrier   Activation.weighted, barrier
     DifferentialActionModelFreeFwdDynamics          FreeDynamics(model, dt, costs)
     DifferentialActionModelContactFwdDynamics       ContactDynamics(model, contacts, dt, costs, damping)
-    DifferentialActionModelFreeInvDynamics          InverseDynamics(model, dt, costs), driven everywhere
+    DifferentialActionModelFreeInvDynamics          FreeInverseDynamics(model, dt, costs), driven everywhere
     DifferentialActionModelContactInvDynamics       ContactInverseDynamics(model, contacts, dt, costs)
     ActionModelImpulseFwdDynamics                   ImpulseDynamics(model, contacts, costs, restitution, damping)
     IntegratedActionModelEuler(…, dt)               a knot has its dt; integrator="semi_implicit_euler"

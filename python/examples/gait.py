@@ -33,7 +33,7 @@ class Gait:
         self.com, self.x0 = condyle.com(model, data, q), np.r_[q, np.zeros(model.nv)]
         for height in self.places[:, 2], self.com[2:], self.x0[2:3]:
             height -= ground  # the feet are at height 0
-        self.models, self.stages, self.us, self.times, self.touches = [], [], [], [0.0], []
+        self.models, self.knot_models, self.us, self.times, self.touches = [], [], [], [0.0], []
 
     def _contacts(self, feet, kd):
         names = [self.feet[k] for k in feet]
@@ -57,11 +57,11 @@ class Gait:
         return [*costs, Cost("effort", 1e-1, Residual.control(np.zeros(self.model.nv - 6)))]
 
     def _phase(self, support, knots, costs):
-        first = len(self.stages)
+        first = len(self.knot_models)
         costs_at = {first + k: costs(k) for k in range(knots)}
         action = ContactDynamics(self.model, self._contacts(support, HOLD), self.dt, costs(0), costs_at=costs_at)
         self.us += [action.quasi_static(self.x0)] * knots
-        self.stages += [len(self.models)] * knots
+        self.knot_models += [len(self.models)] * knots
         self.models.append(action)
         self.touches += [[k in support for k in range(len(self.feet))]] * knots
         self.times += [self.times[-1] + (k + 1) * self.dt for k in range(knots)]
@@ -92,7 +92,7 @@ class Gait:
         self.places[swinging] += ahead
         landing = [self._rest(1e0, 1e1, 1e0, 1e1, 1e1, 1e1)]
         landing += [self._place(k, self.places[k], 1e7) for k in swinging]
-        self.stages.append(len(self.models))
+        self.knot_models.append(len(self.models))
         self.models.append(ImpulseDynamics(self.model, self._contacts(swinging, 0.0), landing, damping=1e-12))
         self.us.append(np.zeros(0))
         self.touches.append([True] * len(self.feet))
@@ -101,5 +101,5 @@ class Gait:
     def solve(self):
         """Solves the problem and returns the solution."""
         end = FreeDynamics(self.model, None, [self._rest(0.0, 1e3, 1e-1, 1e2, 1e2, 1e2)])
-        problem = Problem(self.x0, self.models, self.stages, end)
-        return Fddp(problem, tolerance=1e-4).solve(np.tile(self.x0, (len(self.stages) + 1, 1)), self.us)
+        problem = Problem(self.x0, self.models, self.knot_models, end)
+        return Fddp(problem, tolerance=1e-4).solve(np.tile(self.x0, (len(self.knot_models) + 1, 1)), self.us)

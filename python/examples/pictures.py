@@ -32,7 +32,7 @@ gait.step([1, 2], 0.08, 0.06, 20)  # moves the right front and the left hind foo
 gait.step([0, 3], 0.08, 0.06, 20)
 gait.stand(20)
 solution = gait.solve()
-print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.stages)} knots")
+print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.knot_models)} knots")
 
 # Plots of positions, velocities and controls, and of the solver's iterations.
 viz.plot(solution, robot, DT).savefig("plot.png", dpi=110)

@@ -29,7 +29,7 @@ def main() -> None:
     gait.step([1, 2], 0.08, 0.06, 20)
     gait.stand(20)
     solution = gait.solve()
-    print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.stages)} knots")
+    print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.knot_models)} knots")
     plan = plan_of(robot, solution, gait.times, gait.touches, fade=0.02)
 
     contacts = [FrictionContact.point(foot, FRICTION) for foot in FEET]

@@ -19,7 +19,7 @@ pub(crate) use actions::{ContactDynamics, FreeDynamics, ImpulseDynamics};
 pub(crate) use alone::{Alone, alone};
 pub(crate) use cones::{FrictionCone, WrenchCone};
 pub(crate) use costs::{Activation, Cost, Limit};
-pub(crate) use inverse::{ContactInverseDynamics, InverseDynamics};
+pub(crate) use inverse::{ContactInverseDynamics, FreeInverseDynamics};
 pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycle};
 pub(crate) use problem::{Problem, lock};
 pub(crate) use residuals::Residual;

@@ -28,7 +28,7 @@ from condyle.optimal import (  # noqa: E402
     Fddp,
     FreeDynamics,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Limit,
     Lqr,
     Problem,
@@ -89,7 +89,7 @@ STANCE = [*OF_QUADRUPED, effort(DRIVEN), Cost("force", 1e-3, Residual.contact_fo
 KNOTS: dict[str, tuple[Any, condyle.Model | None]] = {
     "arm": (FreeDynamics(ARM, 0.05, [*OF_ARM, effort(7)]), ARM),
     "arm, Runge-Kutta": (FreeDynamics(ARM, 0.05, OF_ARM, integrator="runge_kutta_4"), ARM),
-    "arm, accelerations": (InverseDynamics(ARM, 0.05, OF_ARM), ARM),
+    "arm, accelerations": (FreeInverseDynamics(ARM, 0.05, OF_ARM), ARM),
     "quadruped flies": (FreeDynamics(QUADRUPED, 0.02, OF_QUADRUPED), QUADRUPED),
     "quadruped stands": (ContactDynamics(QUADRUPED, FEET, 0.02, STANCE), QUADRUPED),
     "quadruped stands, forces are controls": (ContactInverseDynamics(QUADRUPED, FEET, 0.02, OF_QUADRUPED), QUADRUPED),
@@ -327,8 +327,8 @@ def test_a_step_of_a_quadruped_by_shooting_is_that_of_fddp() -> None:
     gait.step([0, 3], 0.05, 0.03, 5)
     gait.stand(2)
     rest = Cost("rest", 1e2, Residual.state(gait.x0), Activation.weighted(np.full(36, 1.0)))
-    problem = Problem(gait.x0, gait.models, gait.stages, FreeDynamics(QUADRUPED, None, [rest]))
-    xs = np.tile(gait.x0, (len(gait.stages) + 1, 1))
+    problem = Problem(gait.x0, gait.models, gait.knot_models, FreeDynamics(QUADRUPED, None, [rest]))
+    xs = np.tile(gait.x0, (len(gait.knot_models) + 1, 1))
     found = Fddp(problem, tolerance=1e-8).solve(xs, gait.us)
     assert found.status == "converged"
     cost, states = shot(problem, xs, gait.us)

@@ -18,7 +18,7 @@ from condyle.optimal import (
     FreeDynamics,
     FrictionCone,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Limit,
     Problem,
     ProblemError,
@@ -192,7 +192,7 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
     with pytest.raises(ProblemError, match="limit `effort` of knot 3: another limit has this name"):
         FreeDynamics(ARM, DT, [], limits_at={3: [effort, effort]})
     with pytest.raises(ProblemError, match="limit `com`: its lower bound has 2 numbers, expected 3"):
-        InverseDynamics(ARM, DT, [], limits=[Limit("com", Residual.center_of_mass(np.zeros(3)), lower=np.zeros(2))])
+        FreeInverseDynamics(ARM, DT, [], limits=[Limit("com", Residual.center_of_mass(np.zeros(3)), lower=np.zeros(2))])
     turn = Limit("turn", Residual.frame_rotation(ARM, "tool", np.eye(3)), lower=[0, 1, 0], upper=[0, -1, 0])
     with pytest.raises(ProblemError, match="limit `turn`: entry 1 must be at least 1 and at most -1"):
         FreeDynamics(ARM, None, [], limits=[turn])

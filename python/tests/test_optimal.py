@@ -16,7 +16,7 @@ from condyle.optimal import (
     FreeDynamics,
     FrictionCone,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Limit,
     Lqr,
     Problem,
@@ -89,8 +89,8 @@ def test_knots_may_have_costs_of_their_own() -> None:
     def effort(weight: float) -> list[Cost]:
         return [Cost("effort", weight, Residual.control(np.zeros(7)))]
 
-    def solve(models: list[Any], stages: list[int]) -> float:
-        problem = Problem(X0, models, stages, end())
+    def solve(models: list[Any], knot_models: list[int]) -> float:
+        problem = Problem(X0, models, knot_models, end())
         return Fddp(problem).solve(np.tile(X0, (4, 1)), np.ones((3, 7))).cost
 
     one = FreeDynamics(ARM, 0.05, effort(1.0), {1: effort(5.0)})
@@ -114,7 +114,7 @@ def test_controls_of_unlike_knots_are_lists() -> None:
 
 
 def test_accelerations_may_be_the_controls() -> None:
-    knot = InverseDynamics(ARM, 0.1, [Cost("effort", 1e-2, Residual.joint_effort(np.zeros(7)))])
+    knot = FreeInverseDynamics(ARM, 0.1, [Cost("effort", 1e-2, Residual.joint_effort(np.zeros(7)))])
     problem = Problem(X0, [knot], [0], end())
     np.testing.assert_allclose(problem.rollout(np.ones((1, 7)))[1, 7:], 0.1)
 
@@ -211,10 +211,10 @@ def test_what_no_file_can_hold() -> None:
     with pytest.raises(ProblemError, match=r"knot 1: models\[1\] has no next state"):
         Problem(X0, [knot, last], [0, 1], last)
     text = Problem(X0, [knot], [0], last).to_json()
-    with pytest.raises(ProblemError, match="no problem: missing field `stages`"):
-        Problem.from_json(text.replace('"stages":[0],', ""))
+    with pytest.raises(ProblemError, match="no problem: missing field `knot_models`"):
+        Problem.from_json(text.replace('"knot_models":[0],', ""))
     with pytest.raises(ProblemError, match="there is no action model 3"):
-        Problem.from_json(text.replace('"stages":[0]', '"stages":[3]'))
+        Problem.from_json(text.replace('"knot_models":[0]', '"knot_models":[3]'))
 
 
 def test_costs_of_a_knot_move_with_it() -> None:

@@ -186,7 +186,7 @@ def test_states_of_a_robot_have_its_tangent_space() -> None:
     """
     nq, nv = QUADRUPED.nq, QUADRUPED.nv
     rest = np.r_[condyle.neutral(QUADRUPED), np.zeros(nv)]
-    ours = condyle.optimal.InverseDynamics(QUADRUPED, 0.05, [])
+    ours = condyle.optimal.FreeInverseDynamics(QUADRUPED, 0.05, [])
 
     def calc(t: Any, x: Any, u: Any) -> Any:
         v = x[nq:] + 0.05 * u

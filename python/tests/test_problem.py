@@ -14,6 +14,7 @@ from condyle.optimal import (
     Activation,
     AugmentedLagrangian,
     ConstrainedAction,
+    ConstraintRows,
     ContactDynamics,
     ContactInverseDynamics,
     Cost,
@@ -22,10 +23,10 @@ from condyle.optimal import (
     FreeDynamics,
     FrictionCone,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Iteration,
     Limit,
-    LqNode,
+    LqKnot,
     Lqr,
     Problem,
     ProblemError,
@@ -101,6 +102,32 @@ def test_an_action_for_each_knot_gives_the_bits_of_one_for_all() -> None:
     np.testing.assert_array_equal(one.xs, other.xs)
     again = Problem.from_json(apart.to_json())
     np.testing.assert_array_equal(Fddp(again, max_iterations=6).solve(xs, us).xs, one.xs)
+
+
+def test_a_replaced_knot_is_that_of_a_new_problem() -> None:
+    def problem(dt: float, target: int) -> Problem:
+        times = [dt if t == 2 else 0.02 for t in range(KNOTS)]
+        targets = [target if t == 4 else t for t in range(KNOTS)]
+        knots = [ContactDynamics(QUADRUPED, contacts(), time, costs(t)) for time, t in zip(times, targets, strict=True)]
+        return Problem(STANDING, knots, None, end())
+
+    changed = problem(0.02, 4)
+    solver = Fddp(changed, max_iterations=4)
+    xs, us = start(changed)
+    solver.solve(xs, us)
+    changed.set_duration(2, 0.03)
+    changed.set_knot(4, ContactDynamics(QUADRUPED, contacts(), 0.02, costs(7)))
+    expected = Fddp(problem(0.03, 7), max_iterations=4).solve(xs, us)
+    for same in (changed, Problem.from_json(changed.to_json()), pickle.loads(pickle.dumps(changed))):
+        np.testing.assert_array_equal(Fddp(same, max_iterations=4).solve(xs, us).xs, expected.xs)
+    np.testing.assert_array_equal(solver.solve(xs, us).xs, expected.xs)
+    for dt in (0.0, np.inf):
+        with pytest.raises(ProblemError, match="its duration must be above 0"):
+            changed.set_duration(2, dt)
+    with pytest.raises(ProblemError, match=f"knot {KNOTS}: expected"):
+        changed.set_knot(KNOTS, ContactDynamics(QUADRUPED, contacts(), 0.02, []))
+    with pytest.raises(ProblemError, match="knot 1: expected nx = 37, found 14"):
+        changed.set_knot(1, FreeDynamics(ARM, 0.1, []))
 
 
 def test_an_action_of_each_knot_moves_on_with_it() -> None:
@@ -256,30 +283,41 @@ def test_targets_that_are_no_rotations(residual: Any) -> None:
 
 def test_a_sweep_is_the_solvers() -> None:
     problem, xs, us = reach()
-    nodes = problem.derivatives(xs, us)
-    assert len(nodes) == KNOTS + 1 and isinstance(nodes[0], LqNode)
-    assert np.shape(nodes[0].B) == (14, 7) and np.shape(nodes[-1].B) == (14, 0)
-    found = Sweep(nodes).run(1e-9)
+    knots = problem.derivatives(xs, us)
+    assert len(knots) == KNOTS + 1 and isinstance(knots[0], LqKnot)
+    assert np.shape(knots[0].B) == (14, 7) and np.shape(knots[-1].B) == (14, 0)
+    found = Sweep(knots).run(1e-9)
     solution = Fddp(problem, max_iterations=1, inverse_dynamics_form=False).solve(xs, us)
     for t in range(KNOTS):
         np.testing.assert_allclose(found.K[t], solution.K[t], rtol=0, atol=1e-6 * abs(solution.K[t]).max())
     # for a linear-quadratic problem, the first step u + k + K dx gives the optimum; here it is computed by hand
-    dx, cost = np.zeros(14) + np.array(nodes[0].f) * 0.0, 0.0
-    for node, K, k in zip(nodes, found.K, found.k, strict=False):
-        A, B, f, Q, S, R, q, r = (np.array(part) for part in node)
+    dx, cost = np.zeros(14) + np.array(knots[0].f) * 0.0, 0.0
+    for knot, K, k in zip(knots, found.K, found.k, strict=False):
+        A, B, f, Q, S, R, q, r = (np.array(part) for part in knot[:8])
         du = k + K @ dx
         cost += 0.5 * dx @ Q @ dx + dx @ S @ du + 0.5 * du @ R @ du + q @ dx + r @ du
         dx = A @ dx + B @ du + f
-    cost += 0.5 * dx @ np.array(nodes[-1].Q) @ dx + np.array(nodes[-1].q) @ dx
+    cost += 0.5 * dx @ np.array(knots[-1].Q) @ dx + np.array(knots[-1].q) @ dx
     assert cost < 0.0 and found.Vxx.shape == (KNOTS + 1, 14, 14) and found.Vx.shape == (KNOTS + 1, 14)
-    with pytest.raises(ProblemError, match=r"nodes\[0\]: expected no controls at the end, found 7"):
-        Sweep(nodes[:1])
-    with pytest.raises(ProblemError, match="nodes: expected at least one"):
+    with pytest.raises(ProblemError, match=r"knots\[0\]: expected no controls at the end, found 7"):
+        Sweep(knots[:1])
+    with pytest.raises(ProblemError, match="knots: expected at least one"):
         Sweep([])
-    with pytest.raises(ProblemError, match=r"nodes\[0\]: expected ndx = 1, found 14"):
+    with pytest.raises(ProblemError, match=r"knots\[0\]: expected ndx = 1, found 14"):
         Sweep(
-            [nodes[0], LqNode([[1.0]], np.zeros((1, 0)), [0.0], [[1.0]], np.zeros((1, 0)), np.zeros((0, 0)), [0], [])]
+            [knots[0], LqKnot([[1.0]], np.zeros((1, 0)), [0.0], [[1.0]], np.zeros((1, 0)), np.zeros((0, 0)), [0], [])]
         )
+
+
+def test_a_sweep_refuses_constraint_rows() -> None:
+    problem, xs, us = reach()
+    knots = problem.derivatives(xs, us)
+    assert all(knot.rows is None for knot in knots)
+    rows = ConstraintRows(np.eye(2, 14), np.ones((2, 7)), [0.5, 0.0], [-np.inf, 0.0], [1.0, 0.0])
+    with pytest.raises(ProblemError, match="knot 2: the sweep does not treat constraint rows"):
+        Sweep([*knots[:2], knots[2]._replace(rows=rows), *knots[3:]]).run()
+    with pytest.raises(ValueError, match=r"rows\.D"):
+        Sweep([knots[0]._replace(rows=rows._replace(D=np.ones((2, 6)))), *knots[1:]])
 
 
 def power(t: Any, x: Any, u: Any) -> Any:
@@ -400,7 +438,7 @@ def test_a_limit_of_ones_own_holds() -> None:
 
 
 def test_quasi_static_of_every_kind() -> None:
-    assert InverseDynamics(ARM, 0.1, []).quasi_static(X0).tolist() == [0.0] * 7
+    assert FreeInverseDynamics(ARM, 0.1, []).quasi_static(X0).tolist() == [0.0] * 7
     assert ImpulseDynamics(QUADRUPED, contacts(), []).quasi_static(STANDING).shape == (0,)
     stance = ContactInverseDynamics(QUADRUPED, contacts(), 0.02, [])
     u = stance.quasi_static(STANDING)
@@ -425,7 +463,7 @@ def test_quasi_static_of_every_kind() -> None:
 KINDS: dict[str, Any] = {
     "FreeDynamics": lambda: FreeDynamics(ARM, 0.1, [Cost("rest", 1.0, Residual.state(X0))]),
     "end": lambda: FreeDynamics(ARM, None, []),
-    "InverseDynamics": lambda: InverseDynamics(ARM, 0.1, [], lower=np.full(7, -3.0), controls="linear"),
+    "FreeInverseDynamics": lambda: FreeInverseDynamics(ARM, 0.1, [], lower=np.full(7, -3.0), controls="linear"),
     "ContactDynamics": lambda: ContactDynamics(QUADRUPED, contacts(), 0.02, costs(3)),
     "ContactInverseDynamics": lambda: ContactInverseDynamics(QUADRUPED, contacts(), 0.02, [], lower=np.full(30, -9.0)),
     "ImpulseDynamics": lambda: ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), []),

@@ -16,7 +16,7 @@ from condyle.optimal import (
     Fddp,
     FreeDynamics,
     FrictionCone,
-    InverseDynamics,
+    FreeInverseDynamics,
     Lqr,
     Problem,
     ProblemError,
@@ -109,7 +109,7 @@ def test_nothing_to_control() -> None:
     robot = condyle.Model.from_urdf_str(FIXED)
     knot = FreeDynamics(robot, 0.1, [])
     assert knot.quasi_static([]).shape == (0,)
-    for other in (knot, InverseDynamics(robot, 0.1, []), ContactDynamics(robot, {}, 0.1, [])):
+    for other in (knot, FreeInverseDynamics(robot, 0.1, []), ContactDynamics(robot, {}, 0.1, [])):
         with pytest.raises(ProblemError, match="the states have no numbers: a problem needs at least one"):
             Problem([], [other], [0] * 3, FreeDynamics(robot, None, []))
     with pytest.raises(ProblemError, match="the states have no numbers"):

@@ -25,7 +25,7 @@ pub(crate) struct Gait {
     feet: Vec<(usize, Vec3<f64>)>,
     com: Vec3<f64>,
     models: Vec<Box<dyn ActionModel>>,
-    stages: Vec<usize>,
+    knot_models: Vec<usize>,
     us: Vec<f64>,
     times: Vec<f64>,
     touches: Vec<Vec<bool>>,
@@ -91,7 +91,7 @@ impl Gait {
             feet,
             com,
             models: Vec::new(),
-            stages: Vec::new(),
+            knot_models: Vec::new(),
             us: Vec::new(),
             times: vec![0.0],
             touches: Vec::new(),
@@ -159,7 +159,7 @@ impl Gait {
         count: usize,
         costs: &dyn Fn(&Self, usize) -> Vec<Cost>,
     ) -> Result<(), Error> {
-        let first = self.stages.len();
+        let first = self.knot_models.len();
         let limits = [self.limits.clone(), self.efforts.clone()].concat();
         let (action, hold): (Box<dyn ActionModel>, Vec<f64>) = if support.is_empty() {
             let mut action = FreeDynamics::running(self.model.clone(), self.dt, costs(self, 0))?.with_limits(limits)?;
@@ -178,7 +178,7 @@ impl Gait {
             (Box::new(action), hold)
         };
         self.us.extend(hold.repeat(count));
-        self.stages.extend(vec![self.models.len(); count]);
+        self.knot_models.extend(vec![self.models.len(); count]);
         let touching: Vec<bool> = self.feet.iter().map(|foot| support.contains(&foot.0)).collect();
         self.touches.extend(vec![touching; count]);
         let last = self.times.last().copied().unwrap_or(0.0);
@@ -199,8 +199,8 @@ impl Gait {
         }
         let frames: Vec<usize> = landing.iter().map(|&k| self.feet[k].0).collect();
         let contacts = self.contacts(&frames);
-        self.models.push(Box::new(ImpulseDynamics::new(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
-        self.stages.push(self.models.len() - 1);
+        self.models.push(Box::new(ImpulseDynamics::instant(self.model.clone(), &contacts, 0.0, 1e-12, costs)?));
+        self.knot_models.push(self.models.len() - 1);
         let all = self.touches.last().cloned().unwrap_or_default();
         self.touches.push(all.iter().enumerate().map(|(k, &touches)| touches || landing.contains(&k)).collect());
         self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact has no duration
@@ -247,8 +247,8 @@ impl Gait {
     pub(crate) fn pose(self) -> Result<Posed, Error> {
         let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
         let end = FreeDynamics::terminal(self.model.clone(), terminal)?.with_limits(self.limits.clone())?;
-        let xs = self.x0.repeat(self.stages.len() + 1);
-        let problem = Problem::new(self.x0, self.models, self.stages, Box::new(end))?;
+        let xs = self.x0.repeat(self.knot_models.len() + 1);
+        let problem = Problem::new(self.x0, self.models, self.knot_models, Box::new(end))?;
         let feet = self.feet.iter().map(|foot| foot.0).collect();
         Ok(Posed { problem, xs, us: self.us, times: self.times, touches: self.touches, feet })
     }

@@ -44,7 +44,7 @@ pub enum Error {
     },
 
     /// A problem cannot be copied, because one of its actions cannot.
-    #[error("{}: cannot be copied, as its `fork` returns `None`", model_name(*.model))]
+    #[error("{}: cannot be copied, as its `try_clone` returns `None`", model_name(*.model))]
     NoCopy {
         /// Index of the model; `None` for the terminal one.
         model: Option<usize>,
@@ -55,10 +55,10 @@ pub enum Error {
     NothingToResume,
 
     /// A dimension of one knot's action model differs from the expected one.
-    #[error("node {node}: expected {name} = {expected}, found {found}")]
+    #[error("knot {knot}: expected {name} = {expected}, found {found}")]
     Dimension {
         /// Index of the knot; N for the terminal one.
-        node: usize,
+        knot: usize,
         /// Name of the dimension: `nx`, `ndx`, `nu`, or the name of the bounds.
         name: &'static str,
         /// Dimension that the problem or the solver expects.
@@ -185,6 +185,13 @@ pub enum Error {
     TimeStep {
         /// Duration (s).
         dt: f64,
+    },
+
+    /// A knot does not have a duration that could be set: an impact, or an action that is not integrated over time.
+    #[error("knot {knot}: its action has no duration")]
+    NoDuration {
+        /// Index of the knot.
+        knot: usize,
     },
 
     /// A setting is outside its valid range.

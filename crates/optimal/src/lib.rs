@@ -5,11 +5,11 @@
 //! ```
 //!
 //! # Overview
-//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. It is evaluated for a group of
-//!   knots, or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
+//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. A [`GroupModel`] computes several
+//!   knots, or step lengths, in one call.
 //! - A [`Problem`] is a horizon of action models.
 //! - Around a trajectory, the problem is approximated as linear-quadratic in the changes δx, δu; each knot is then an
-//!   [`LqNode`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
+//!   [`LqKnot`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
 //!   value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
@@ -71,25 +71,28 @@
 //! ```
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-mod constrained;
-mod ddp;
 mod error;
 mod lq;
 mod problem;
 #[cfg(feature = "serde")]
 mod read;
 pub mod robot;
+mod solvers;
 mod time;
 
-pub use constrained::{
-    AugmentedLagrangian, AutoDiffConstraint, Constrained, ConstraintSettings, GenericConstraint, Outcome,
-    PathConstraint, Violation, ViolationKind,
-};
-pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
-pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
+pub use lq::{
+    ConstraintRow, ConstraintRows, DynamicsStructure, EulerBlock, Hessian, KnotFeedback, LqKnot, Sweep, SweepError,
+};
 pub use nalgebra;
-pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
+pub use problem::{
+    ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, GroupModel, Lqr, NumDiff,
+    PathConstraint, Problem, Unicycle,
+};
+pub use solvers::{
+    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, Iteration, Observer, Outcome, Settings, Solution, Status,
+    Timings, Verdict, Violation, ViolationKind,
+};
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;
 

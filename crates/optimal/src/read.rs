@@ -1,7 +1,7 @@
 //! Matrices from files of serde's formats, as nalgebra writes them: (numbers column after column, rows, columns). The
 //! number of entries must equal rows × columns.
 
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use nalgebra::DMatrix;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
@@ -12,7 +12,7 @@ struct Written(Vec<f64>, usize, usize);
 
 impl Written {
     fn matrix<E: Error>(self) -> Result<DMatrix<f64>, E> {
-        let (Self(numbers, rows, columns), most) = (self, LqNode::MOST_SIZE);
+        let (Self(numbers, rows, columns), most) = (self, LqKnot::MOST_SIZE);
         if rows.max(columns) > most || rows * columns != numbers.len() {
             let found = numbers.len();
             return Err(E::custom(format!("a matrix of {rows} × {columns} with {found} numbers, at most {most} rows")));

@@ -4,7 +4,7 @@ mod common;
 #[path = "../../../tests/common/counting.rs"]
 mod counting;
 
-use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight};
+use common::{HANGING, cartpole, limited_cartpole, random, random_knot, straight};
 use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, ContactInverseDynamics, ControlPolynomial, Cost, FreeAcceleration,
@@ -17,23 +17,23 @@ use counting::{allocated, allocations};
 #[test]
 fn a_sweep_allocates_nothing() {
     let mut random = random();
-    let nodes: Vec<_> = [7, 0, 3, 0].map(|nu| random_node(&mut random, 11, nu)).into();
-    let mut sweep = Sweep::new(&nodes);
-    assert_eq!(allocations(|| sweep.run(&nodes, 1e-9).unwrap()), 0);
+    let lq_knots: Vec<_> = [7, 0, 3, 0].map(|nu| random_knot(&mut random, 11, nu)).into();
+    let mut sweep = Sweep::new(&lq_knots);
+    assert_eq!(allocations(|| sweep.run(&lq_knots, 1e-9).unwrap()), 0);
 }
 
 /// Runs on one thread, because rayon itself allocates to share work.
 #[test]
 fn a_sweep_in_segments_allocates_nothing() {
     let mut random = random();
-    let nodes: Vec<_> = (0..=12).map(|t| random_node(&mut random, 11, if t < 12 { t % 5 } else { 0 })).collect();
-    let mut sweep = Sweep::new(&nodes);
+    let lq_knots: Vec<_> = (0..=12).map(|t| random_knot(&mut random, 11, if t < 12 { t % 5 } else { 0 })).collect();
+    let mut sweep = Sweep::new(&lq_knots);
     sweep.set_segments(4);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let count = pool.install(|| {
         allocations(|| {
             sweep.set_segments(4);
-            sweep.run(&nodes, 1e-9).unwrap();
+            sweep.run(&lq_knots, 1e-9).unwrap();
         })
     });
     assert_eq!(count, 0);
@@ -173,7 +173,7 @@ fn a_gait_allocates_nothing() {
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, pushing).unwrap();
     let mut touch = contacts.clone();
     (touch[0].constraint.kind, touch[1].constraint.kind) = (ConstraintKind::Line, ConstraintKind::Plane);
-    let impact = ImpulseDynamics::new(model.clone(), &touch, 0.0, 1e-9, landing).unwrap();
+    let impact = ImpulseDynamics::instant(model.clone(), &touch, 0.0, 1e-9, landing).unwrap();
     let drives = Actuation::joints(&model);
     let flight = FreeAcceleration::new(model.clone(), drives, driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();

@@ -6,7 +6,7 @@ use condyle_optimal::robot::{
     Activation, Actuation, Cost, FreeAcceleration, FreeDynamics, Integrated, Integrator, Residual,
 };
 use condyle_optimal::{
-    ActionModel, AutoDiff, AutoDiffConstraint, Fddp, GenericAction, GenericConstraint, Hessian, LqNode, NumDiff,
+    ActionModel, AutoDiff, AutoDiffConstraint, Fddp, GenericAction, GenericConstraint, Hessian, LqKnot, NumDiff,
     PathConstraint, Problem, Status,
 };
 use condyle_spatial::Scalar;
@@ -96,8 +96,8 @@ fn first_derivatives_are_those_by_hand() {
         let mut by_hand = Integrated::new(free, Integrator::SemiImplicitEuler, DT).unwrap();
         let mut by_duals = AutoDiff::new(Steps { model: model.clone(), nu, x0 });
         let (x, u) = (state(&model, &mut rng), random(nu, 5.0, &mut rng));
-        let mut nodes = [(); 2].map(|()| LqNode::zeros(2 * model.nv(), nu));
-        let [a, b] = &mut nodes;
+        let mut lq_knots = [(); 2].map(|()| LqKnot::zeros(2 * model.nv(), nu));
+        let [a, b] = &mut lq_knots;
         by_duals.calc_diff(0, &x, &u, a);
         by_hand.calc_diff(0, &x, &u, b);
         close("A", &a.A, &b.A, EXACT);
@@ -132,7 +132,7 @@ fn hessians_of_costs_are_those_by_differences() {
     let model = Arc::new(robots::quadruped());
     let action = Steps { model: model.clone(), nu: 12, x0: state(&model, &mut rng) };
     let (x, u) = (state(&model, &mut rng), random(12, 5.0, &mut rng));
-    let (mut exact, mut numeric) = (LqNode::zeros(36, 12), LqNode::zeros(36, 12));
+    let (mut exact, mut numeric) = (LqKnot::zeros(36, 12), LqKnot::zeros(36, 12));
     AutoDiff::new(action.clone()).calc_diff(0, &x, &u, &mut exact);
     NumDiff(AutoDiff::new(action)).calc_diff(0, &x, &u, &mut numeric);
     close("Q", &exact.Q, &numeric.Q, DIFFERENCES);

@@ -66,8 +66,8 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         // the iterate before the divergence: its cost and its gap are in consecutive records of the trace
         assert!(solution.cost < 1e5, "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
-        let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
-        problem.calc(&solution.xs, &solution.us, &mut nodes, &mut numbers);
+        let (mut lq_knots, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
+        problem.calc(&solution.xs, &solution.us, &mut lq_knots, &mut numbers);
         assert!((numbers.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
         assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
         assert!(solution.k.iter().any(|k| k.amax() > 0.0));
@@ -124,17 +124,17 @@ fn the_feedback_is_that_of_the_iterate() {
         (solution.status == Status::NotFinite).then_some((problem, solver, solution))
     });
     let (mut problem, solver, solution) = blown_up.next().expect("one of them blows up");
-    let (mut nodes, mut next, mut costs) = (problem.nodes(), vec![0.0; 50 * 14], vec![0.0; 51]);
+    let (mut lq_knots, mut next, mut costs) = (problem.lq_knots(), vec![0.0; 50 * 14], vec![0.0; 51]);
     problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
-    problem.calc_diff(&solution.xs, &solution.us, &mut nodes);
-    for (t, node) in nodes.iter_mut().enumerate() {
-        for (i, f) in node.f.iter_mut().enumerate() {
+    problem.calc_diff(&solution.xs, &solution.us, &mut lq_knots);
+    for (t, knot) in lq_knots.iter_mut().enumerate() {
+        for (i, f) in knot.f.iter_mut().enumerate() {
             *f = if t < 50 { next[14 * t + i] - solution.x(t + 1)[i] } else { 0.0 };
         }
     }
-    let mut sweep = Sweep::new(&nodes);
-    sweep.run(&nodes, solver.settings.regularisation_start).unwrap();
-    for (t, knot) in sweep.knots()[..50].iter().enumerate() {
+    let mut sweep = Sweep::new(&lq_knots);
+    sweep.run(&lq_knots, solver.settings.regularisation_start).unwrap();
+    for (t, knot) in sweep.feedback()[..50].iter().enumerate() {
         assert!((&knot.K - &solution.K[t]).amax() < 1e-6 * (1.0 + knot.K.amax()), "knot {t}");
         assert!((&knot.k - &solution.k[t]).amax() < 1e-6 * (1.0 + knot.k.amax()), "knot {t}");
     }

@@ -235,8 +235,9 @@ fn file(change: impl FnOnce(&mut Value)) -> Result<(), String> {
     let mut knot = Knot::new(step, vec![effort.clone()]);
     knot.costs_at = BTreeMap::from([(1, vec![effort])]);
     knot.limits = vec![Limit::equality("still", Residual::JointAcceleration { reference: vec![0.0; 7] })];
-    let end = Knot::new(Dynamics::End, vec![]);
-    let data = RobotProblem { model: arm, x0: vec![0.1; 14], knots: vec![knot], stages: vec![0; 3], terminal: end };
+    let end = Knot::new(Dynamics::Terminal, vec![]);
+    let data =
+        RobotProblem { model: arm, x0: vec![0.1; 14], knots: vec![knot], knot_models: vec![0; 3], terminal: end };
     let mut json = serde_json::to_value(&data).unwrap();
     change(&mut json);
     let data: RobotProblem = serde_json::from_str(&json.to_string()).map_err(|error| error.to_string())?;
@@ -264,7 +265,7 @@ fn problem_files_are_checked_before_memory_is_asked_for() {
         refused(|json| json["knots"][0]["costs"][0]["weight"] = json!(-2.0)),
         "cost `effort`: its weight is -2, expected a finite number of at least 0"
     );
-    assert!(refused(|json| json["stages"] = json!([0, 1])).contains("there is no action model 1"));
+    assert!(refused(|json| json["knot_models"] = json!([0, 1])).contains("there is no action model 1"));
     assert!(refused(|json| json["x0"] = json!([0.0, 0.0, 0.0])).contains("expected length 14, found 3"));
     let cone = json!({"friction_cone": {"contact": "foot", "cone": {"rotation": Mat3::<f64>::identity(), "mu": 0.5,
         "facets": 1_000_000_000, "inner": false, "least": 0.0, "greatest": null}}});

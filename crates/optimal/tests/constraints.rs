@@ -4,9 +4,9 @@
 
 mod common;
 
-use common::{Linear, Unicycle, cartpole_action, random, random_matrix, random_node};
+use common::{Linear, Unicycle, cartpole_action, random, random_knot, random_matrix};
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, LqNode, NumDiff, PathConstraint, Problem,
+    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, LqKnot, NumDiff, PathConstraint, Problem,
     Status, ViolationKind,
 };
 use nalgebra::{DMatrix, DVector};
@@ -140,15 +140,15 @@ fn catching_a_pole_is_ipopts() {
 fn equalities_of_a_linear_problem_are_a_linear_system() {
     let mut random = random();
     let (n, m, horizon) = (4, 2, 5);
-    let mut node = random_node(&mut random, n, m);
-    node.A *= 0.5;
-    let end = random_node(&mut random, n, 0);
+    let mut knot = random_knot(&mut random, n, m);
+    knot.A *= 0.5;
+    let end = random_knot(&mut random, n, 0);
     let c = random_matrix(&mut random, 2, n);
     let d = [0.3, -0.7];
     let rows = Rows { c: c.clone(), lower: d.to_vec(), upper: d.to_vec(), disc: None };
     let x0 = random_matrix(&mut random, n, 1).column(0).into_owned();
     let terminal = Constrained::new(Box::new(Linear(end.clone())), Box::new(rows));
-    let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Linear(node.clone()))];
+    let models: Vec<Box<dyn ActionModel>> = vec![Box::new(Linear(knot.clone()))];
     let mut problem = Problem::new(x0.as_slice().to_vec(), models, vec![0; horizon], Box::new(terminal)).unwrap();
     let mut solver = AugmentedLagrangian::new(&problem);
     let solution = solver.solve(&mut problem, &vec![0.0; n * (horizon + 1)], &vec![0.0; m * horizon]).unwrap();
@@ -160,23 +160,23 @@ fn equalities_of_a_linear_problem_are_a_linear_system() {
     let (mut kkt, mut rhs) = (DMatrix::zeros(size, size), DVector::zeros(size));
     for t in 0..horizon {
         let (u, next, lambda) = (t * block, t * block + m, primal + t * n);
-        kkt.view_mut((u, u), (m, m)).copy_from(&node.R);
-        rhs.rows_mut(u, m).copy_from(&-&node.r);
-        kkt.view_mut((u, lambda), (m, n)).copy_from(&node.B.transpose());
+        kkt.view_mut((u, u), (m, m)).copy_from(&knot.R);
+        rhs.rows_mut(u, m).copy_from(&-&knot.r);
+        kkt.view_mut((u, lambda), (m, n)).copy_from(&knot.B.transpose());
         kkt.view_mut((next, lambda), (n, n)).copy_from(&-DMatrix::identity(n, n));
-        rhs.rows_mut(lambda, n).copy_from(&-&node.f);
-        let (Q, q) = if t + 1 < horizon { (&node.Q, &node.q) } else { (&end.Q, &end.q) };
+        rhs.rows_mut(lambda, n).copy_from(&-&knot.f);
+        let (Q, q) = if t + 1 < horizon { (&knot.Q, &knot.q) } else { (&end.Q, &end.q) };
         kkt.view_mut((next, next), (n, n)).copy_from(Q);
         rhs.rows_mut(next, n).copy_from(&-q);
         if t == 0 {
-            let moved = rhs.rows(u, m) - node.S.transpose() * &x0;
+            let moved = rhs.rows(u, m) - knot.S.transpose() * &x0;
             rhs.rows_mut(u, m).copy_from(&moved);
-            let moved = rhs.rows(lambda, n) - &node.A * &x0;
+            let moved = rhs.rows(lambda, n) - &knot.A * &x0;
             rhs.rows_mut(lambda, n).copy_from(&moved);
         } else {
             let x = u - n;
-            kkt.view_mut((x, u), (n, m)).copy_from(&node.S);
-            kkt.view_mut((x, lambda), (n, n)).copy_from(&node.A.transpose());
+            kkt.view_mut((x, u), (n, m)).copy_from(&knot.S);
+            kkt.view_mut((x, lambda), (n, n)).copy_from(&knot.A.transpose());
         }
     }
     let last = primal - n;
@@ -205,7 +205,7 @@ fn derivatives_are_those_of_the_terms() {
     };
     let action = || Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows()));
     for x in [[0.3, -0.2, 0.7], [1.7, -0.2, 0.7], [2.7, 0.2, 0.7]] {
-        let (mut ours, mut numeric) = (LqNode::zeros(3, 2), LqNode::zeros(3, 2));
+        let (mut ours, mut numeric) = (LqKnot::zeros(3, 2), LqKnot::zeros(3, 2));
         action().calc_diff(0, &x, &[0.5, -1.5], &mut ours);
         NumDiff(action()).calc_diff(0, &x, &[0.5, -1.5], &mut numeric);
         assert!((&ours.q - &numeric.q).amax() < 1e-5 && (&ours.r - &numeric.r).amax() < 1e-5);
@@ -306,8 +306,8 @@ fn what_is_infeasible_is_proved() {
         let then = Box::new(Unicycle { nu: 2, lanes: 1 });
         let end = Rows::new(&[(&[1.0, 0.0, 0.0], 0.5, 0.5)]);
         let end = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
-        let stages = [vec![0], vec![1; 9]].concat();
-        let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(first), then], stages, Box::new(end)).unwrap();
+        let knot_models = [vec![0], vec![1; 9]].concat();
+        let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(first), then], knot_models, Box::new(end)).unwrap();
         let mut solver = AugmentedLagrangian::new(&problem);
         let us = vec![0.0; problem.control_range(10).end];
         let solution = solver.solve(&mut problem, &[0.0; 33], &us).unwrap().clone();

@@ -10,11 +10,11 @@ use condyle_dynamics::{
     Vec3, WORLD, constrained_dynamics, forward_kinematics, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FrictionCone, Integrated,
-    Integrator, InverseDynamics, Limit, Residual,
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, FreeInverseDynamics,
+    FrictionCone, Integrated, Integrator, Limit, Residual,
 };
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, Fddp, LqNode, PathConstraint, Problem, Status,
+    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, Fddp, LqKnot, PathConstraint, Problem, Status,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -141,7 +141,7 @@ fn reaching_is_ipopts() {
     };
     let mut free = FreeDynamics::running(arm.clone(), dt, costs()).unwrap().with_limits(limits()).unwrap();
     let hold = free.quasi_static(&x0).repeat(horizon);
-    let inverse = InverseDynamics::running(arm.clone(), dt, costs()).unwrap().with_limits(limits()).unwrap();
+    let inverse = FreeInverseDynamics::running(arm.clone(), dt, costs()).unwrap().with_limits(limits()).unwrap();
     let knots: [(Box<dyn ActionModel>, _); 2] = [(Box::new(free), hold), (Box::new(inverse), vec![0.0; 7 * horizon])];
     for (k, (knot, us)) in knots.into_iter().enumerate() {
         let mut problem = Problem::new(x0.clone(), vec![knot], vec![0; horizon], Box::new(end())).unwrap();
@@ -409,10 +409,10 @@ fn constraints_need_no_derivatives() {
     let [written, other] = [true, false].map(|written| {
         let frame = model.frame("RH_foot").unwrap();
         let step = Step { model: model.clone(), frame, data: Data::new(&model), written };
-        let knot = FreeDynamics::running(model.clone(), 0.02, vec![]).unwrap();
-        let mut node = LqNode::zeros(36, 12);
-        Constrained::new(Box::new(knot), Box::new(step)).calc_diff(0, &x, &u, &mut node);
-        node
+        let action = FreeDynamics::running(model.clone(), 0.02, vec![]).unwrap();
+        let mut knot = LqKnot::zeros(36, 12);
+        Constrained::new(Box::new(action), Box::new(step)).calc_diff(0, &x, &u, &mut knot);
+        knot
     });
     for (name, a, b) in
         [("q", written.q.as_slice(), other.q.as_slice()), ("r", written.r.as_slice(), other.r.as_slice())]

@@ -5,7 +5,7 @@ use condyle_dynamics::{ContactConstraint, Model, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, ImpulseDynamics, Knot, Limit, Residual, RobotProblem,
 };
-use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqNode, Problem, Solution};
+use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqKnot, Problem, Solution};
 use std::sync::Arc;
 
 const KNOTS: usize = 13;
@@ -57,15 +57,15 @@ fn gait(apart: bool, limited: bool) -> (Problem, Vec<f64>, Vec<f64>) {
         let knot = ContactDynamics::running(model.clone(), contacts, 0.02, costs(&model, t)).unwrap();
         if limited { knot.with_limits(limits(t)).unwrap() } else { knot }
     };
-    let (mut models, mut stages): (Vec<Box<dyn ActionModel>>, Vec<usize>) = (vec![], vec![0; KNOTS]);
+    let (mut models, mut knot_models): (Vec<Box<dyn ActionModel>>, Vec<usize>) = (vec![], vec![0; KNOTS]);
     for (phase, contacts) in &phases {
         if apart {
             for t in phase.clone() {
-                stages[t] = models.len();
+                knot_models[t] = models.len();
                 models.push(Box::new(stance(contacts, t)));
             }
         } else {
-            stages[phase.clone()].fill(models.len());
+            knot_models[phase.clone()].fill(models.len());
             let mut knot = stance(contacts, phase.start);
             for t in phase.clone() {
                 knot.set_costs(t, costs(&model, t)).unwrap();
@@ -76,11 +76,11 @@ fn gait(apart: bool, limited: bool) -> (Problem, Vec<f64>, Vec<f64>) {
             models.push(Box::new(knot));
         }
     }
-    stages[6] = models.len();
+    knot_models[6] = models.len();
     let landing = vec![quadratic("state", 1.0, Residual::State { reference: x0.clone() })];
-    models.push(Box::new(ImpulseDynamics::new(model.clone(), &phases[1].1, 0.0, 1e-9, landing.clone()).unwrap()));
+    models.push(Box::new(ImpulseDynamics::instant(model.clone(), &phases[1].1, 0.0, 1e-9, landing.clone()).unwrap()));
     let end = FreeDynamics::terminal(model.clone(), landing).unwrap();
-    let mut problem = Problem::new(x0.clone(), models, stages, Box::new(end)).unwrap();
+    let mut problem = Problem::new(x0.clone(), models, knot_models, Box::new(end)).unwrap();
     let xs = x0.repeat(KNOTS + 1);
     let us = problem.quasi_static(&xs).unwrap();
     (problem, xs, us)
@@ -108,17 +108,17 @@ fn an_action_for_each_knot_gives_the_bits_of_one_for_all() {
 #[test]
 fn derivatives_of_each_knot_are_those_of_its_own_action() {
     let (mut problem, xs, us) = gait(true, true);
-    let mut nodes = problem.nodes();
-    problem.calc_diff(&xs, &us, &mut nodes);
+    let mut lq_knots = problem.lq_knots();
+    problem.calc_diff(&xs, &us, &mut lq_knots);
     let model = Arc::new(robots::quadruped());
     for t in (0..6).chain(7..KNOTS) {
         let names = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
         let contacts = if t < 6 { contacts(&model, &[names[0], names[3]]) } else { contacts(&model, &names) };
         let alone = ContactDynamics::running(model.clone(), &contacts, 0.02, costs(&model, t)).unwrap();
-        let mut expected = LqNode::zeros(36, 12);
+        let mut expected = LqKnot::zeros(36, 12);
         let u = &us[problem.control_range(t)];
         alone.with_limits(limits(t)).unwrap().calc_diff(t, &xs[..37], u, &mut expected);
-        let (q, r) = (&nodes[t].q, &nodes[t].r);
+        let (q, r) = (&lq_knots[t].q, &lq_knots[t].r);
         assert!((q - &expected.q).amax() <= 1e-9 * (1.0 + expected.q.amax()), "knot {t}");
         assert!((r - &expected.r).amax() <= 1e-9 * (1.0 + expected.r.amax()), "knot {t}");
     }
@@ -179,7 +179,7 @@ fn models_move_with_their_knots() {
     for (step, last) in [(1, 5), (2, 8), (3, 0)] {
         moving.shift(last).unwrap();
         let times: Vec<usize> = (step..6).chain([8, 0]).take(5).collect();
-        assert_eq!(moving.stages(), times);
+        assert_eq!(moving.knot_models(), times);
         let expected = solve(&mut build(&times), &xs, &us, 1);
         for threads in [1, 2] {
             assert!(solve(&mut moving, &xs, &us, threads) == expected, "{threads} threads");
@@ -229,9 +229,9 @@ fn an_end_serves_no_knot_before() {
     let data = RobotProblem {
         model: robots::arm7(),
         x0: vec![0.0; 14],
-        knots: vec![Knot::new(condyle_optimal::robot::Dynamics::End, vec![])],
-        stages: vec![0],
-        terminal: Knot::new(condyle_optimal::robot::Dynamics::End, vec![]),
+        knots: vec![Knot::new(condyle_optimal::robot::Dynamics::Terminal, vec![])],
+        knot_models: vec![0],
+        terminal: Knot::new(condyle_optimal::robot::Dynamics::Terminal, vec![]),
     };
     assert_eq!(data.build().unwrap_err(), Error::NoNextState { knot: 0, index: 0 });
 }
@@ -254,9 +254,9 @@ fn what_holds_a_state_still_is_found() {
     let arm = Arc::new(robots::arm7());
     let x = [vec![0.3, 0.4, -0.2, 1.2, 0.1, 0.8, 0.5], vec![0.0; 7]].concat();
     let mut knot = FreeDynamics::running(arm.clone(), 0.1, vec![]).unwrap();
-    let held = ActionModel::hold(&mut knot, 0, &x);
+    let held = ActionModel::quasi_static(&mut knot, 0, &x);
     assert_eq!(held, knot.quasi_static(&x));
-    let by_newton = condyle_optimal::NumDiff(knot.clone()).hold(0, &x);
+    let by_newton = condyle_optimal::NumDiff(knot.clone()).quasi_static(0, &x);
     assert!(held.iter().zip(&by_newton).all(|(a, b)| (a - b).abs() < 1e-6), "{held:?} {by_newton:?}");
     let mut seen = vec![];
     knot.outputs(0, &x, &held, &mut |name, numbers| seen.push((name.to_owned(), numbers.to_vec())));
@@ -271,9 +271,9 @@ fn a_unicycle_has_the_derivatives_of_differences() {
     use condyle_optimal::{Hessian, NumDiff, Unicycle};
     let (x, u, lambda) = ([0.3, -0.2, 0.7], [0.9, -0.4], [0.5, -1.5, 2.0]);
     let action = Unicycle::new(0.2, [3.0, 0.7]);
-    for action in [action.clone(), action.at_the_end()] {
+    for action in [action.clone(), action.terminal()] {
         let nu = action.nu();
-        let (mut ours, mut theirs) = (LqNode::zeros(3, nu), LqNode::zeros(3, nu));
+        let (mut ours, mut theirs) = (LqKnot::zeros(3, nu), LqKnot::zeros(3, nu));
         let (mut one, mut other) = (Hessian::zeros(3, nu), Hessian::zeros(3, nu));
         action.clone().calc_diff(0, &x, &u[..nu], &mut ours);
         NumDiff(action.clone()).calc_diff(0, &x, &u[..nu], &mut theirs);

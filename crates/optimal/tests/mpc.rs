@@ -6,7 +6,7 @@ mod common;
 #[path = "mpc/recovery.rs"]
 mod recovery;
 
-use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, straight};
+use common::{HANGING, Linear, cartpole, random, random_knot, random_matrix, straight};
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
 use condyle_optimal::{ActionModel, Error, Fddp, Iteration, Problem, Settings, Solution, Status};
@@ -19,22 +19,22 @@ use std::time::Duration;
 const SAME: f64 = 1e-5;
 
 /// Creates linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin at any of them.
-fn linear(stages: &[usize], x0: &[f64]) -> Problem {
+fn linear(knot_models: &[usize], x0: &[f64]) -> Problem {
     let mut random = random();
     let models = [3, 0, 2].map(|nu| {
-        let mut node = random_node(&mut random, 4, nu);
-        node.A *= 0.5;
-        Box::new(Linear(node)) as Box<dyn ActionModel>
+        let mut knot = random_knot(&mut random, 4, nu);
+        knot.A *= 0.5;
+        Box::new(Linear(knot)) as Box<dyn ActionModel>
     });
-    let end = Box::new(Linear(random_node(&mut random, 4, 0)));
-    Problem::new(x0.to_vec(), models.into(), stages.to_vec(), end).unwrap()
+    let end = Box::new(Linear(random_knot(&mut random, 4, 0)));
+    Problem::new(x0.to_vec(), models.into(), knot_models.to_vec(), end).unwrap()
 }
 
 #[test]
 fn a_shifted_horizon_is_solved_like_a_new_one() {
-    let mut stages = vec![0, 1, 2, 2, 0, 1, 0, 0];
+    let mut knot_models = vec![0, 1, 2, 2, 0, 1, 0, 0];
     let x0 = random_matrix(&mut random(), 4, 1).as_slice().to_vec();
-    let mut problem = linear(&stages, &x0);
+    let mut problem = linear(&knot_models, &x0);
     let mut solver = Fddp::new(&problem);
     let us = vec![0.0; problem.control_range(8).end];
     solver.solve(&mut problem, &x0.repeat(9), &us).unwrap();
@@ -42,9 +42,9 @@ fn a_shifted_horizon_is_solved_like_a_new_one() {
         let before = solver.solution().clone();
         problem.shift(next).unwrap();
         solver.shift(&mut problem).unwrap();
-        stages.rotate_left(1);
-        stages[7] = next;
-        assert_eq!(problem.stages(), stages);
+        knot_models.rotate_left(1);
+        knot_models[7] = next;
+        assert_eq!(problem.knot_models(), knot_models);
         let moved = solver.solution();
         assert!((0..7).all(|t| moved.u(t) == before.u(t + 1) && moved.x(t) == before.x(t + 1)));
         assert!((0..7).all(|t| moved.K[t] == before.K[t + 1] && moved.k[t] == before.k[t + 1]));
@@ -53,7 +53,7 @@ fn a_shifted_horizon_is_solved_like_a_new_one() {
         let measured: Vec<f64> = moved.x(0).iter().map(|x| x + 0.1).collect();
         problem.set_x0(&measured).unwrap();
         let ours = solver.resume(&mut problem).unwrap().clone();
-        let mut fresh = linear(&stages, &measured);
+        let mut fresh = linear(&knot_models, &measured);
         let us = vec![0.0; fresh.control_range(8).end];
         let mut other = Fddp::new(&fresh);
         let expected = other.solve(&mut fresh, &measured.repeat(9), &us).unwrap();
@@ -137,10 +137,10 @@ fn a_horizon_moves_by_one_knot_at_a_time() {
     problem.shift(1).unwrap();
     let us = vec![0.0; problem.control_range(4).end];
     let error = solver.solve(&mut problem, &[0.0; 20], &us).unwrap_err();
-    assert_eq!(error, Error::Dimension { node: 0, name: "nu", expected: 3, found: 0 });
+    assert_eq!(error, Error::Dimension { knot: 0, name: "nu", expected: 3, found: 0 });
     problem.shift(1).unwrap();
     let error = solver.shift(&mut problem).unwrap_err();
-    assert_eq!(error, Error::Dimension { node: 0, name: "nu", expected: 0, found: 2 });
+    assert_eq!(error, Error::Dimension { knot: 0, name: "nu", expected: 0, found: 2 });
     assert!(solver.shift(&mut linear(&[0, 1, 2], &[0.0; 4])).is_err());
 }
 

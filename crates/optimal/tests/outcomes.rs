@@ -9,7 +9,8 @@ use common::{
     unicycle,
 };
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Error, Fddp, Iteration, LqNode, NumDiff, Observer, Problem, Settings, Status,
+    ActionModel, AugmentedLagrangian, Error, Fddp, GroupModel, Iteration, LqKnot, NumDiff, Observer, Problem, Settings,
+    Status,
 };
 use core::ops::ControlFlow;
 use std::time::Duration;
@@ -19,7 +20,7 @@ const FIRST: f64 = 1e-6;
 const SECOND: f64 = 1e-3;
 
 fn compare_with_numdiff<A: ActionModel>(mut action: A, x: &[f64], u: &[f64]) {
-    let mut ours = LqNode::zeros(action.ndx(), action.nu());
+    let mut ours = LqKnot::zeros(action.ndx(), action.nu());
     let mut expected = ours.clone();
     action.calc_diff(0, x, u, &mut ours);
     let terminal = action.nu() == 0;
@@ -133,12 +134,12 @@ impl ActionModel for Concave {
         next[0] = x[0] + u.iter().sum::<f64>();
         -0.5 * self.curvature * u.iter().map(|u| u * u).sum::<f64>()
     }
-    fn calc_diff(&mut self, _: usize, _: &[f64], u: &[f64], node: &mut LqNode) {
-        node.A[0] = 1.0;
-        node.B.fill(1.0);
-        node.R.fill(-self.curvature);
-        node.r.copy_from_slice(u);
-        node.r *= -self.curvature;
+    fn calc_diff(&mut self, _: usize, _: &[f64], u: &[f64], knot: &mut LqKnot) {
+        knot.A[0] = 1.0;
+        knot.B.fill(1.0);
+        knot.R.fill(-self.curvature);
+        knot.r.copy_from_slice(u);
+        knot.r *= -self.curvature;
     }
 }
 
@@ -160,6 +161,12 @@ struct Bounded {
     broken: bool,
 }
 
+impl GroupModel for Bounded {
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+}
+
 impl ActionModel for Bounded {
     fn nx(&self) -> usize {
         1
@@ -167,20 +174,20 @@ impl ActionModel for Bounded {
     fn nu(&self) -> usize {
         self.nu
     }
-    fn lanes(&self) -> usize {
-        self.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         assert!(x[0].is_finite(), "asked for a state that is not finite");
         next[0] = if x[0].abs() < self.limit { x[0] + u.iter().sum::<f64>() } else { f64::NAN };
         0.5 * ((x[0] - 3.0).powi(2) + u.iter().map(|u| u * u).sum::<f64>())
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        (node.A[0], node.Q[0], node.q[0]) = (if self.broken { f64::NAN } else { 1.0 }, 1.0, x[0] - 3.0);
-        node.B.fill(1.0);
-        node.S.fill(0.0);
-        node.R.fill(1.0);
-        node.r.copy_from_slice(u);
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        (knot.A[0], knot.Q[0], knot.q[0]) = (if self.broken { f64::NAN } else { 1.0 }, 1.0, x[0] - 3.0);
+        knot.B.fill(1.0);
+        knot.S.fill(0.0);
+        knot.R.fill(1.0);
+        knot.r.copy_from_slice(u);
     }
 }
 
@@ -227,7 +234,7 @@ fn errors_name_the_thing_and_the_numbers() {
         "terminal: expected an action without controls (a robot's has no duration), found one of nu = 2"
     );
     let e = error(Problem::new(vec![0.0; 3], vec![Box::new(Circle { nu: 1 })], vec![0], end()));
-    assert_eq!(e.to_string(), "node 0: expected nx = 3, found 2");
+    assert_eq!(e.to_string(), "knot 0: expected nx = 3, found 2");
 
     let mut problem = unicycle(&[0.0; 3], 5, 1);
     let mut solver = Fddp::new(&problem);
@@ -236,9 +243,9 @@ fn errors_name_the_thing_and_the_numbers() {
     let e = solver.solve(&mut problem, &[0.0; 18], &[f64::INFINITY; 10]).unwrap_err();
     assert_eq!(e.to_string(), "`us[0]` is inf, which is not finite");
     let e = solver.solve(&mut unicycle(&[0.0; 3], 6, 1), &[0.0; 21], &[0.0; 12]).unwrap_err();
-    assert_eq!(e, Error::Length { name: "stages", expected: 5, found: 6 });
+    assert_eq!(e, Error::Length { name: "knot_models", expected: 5, found: 6 });
     let e = solver.solve(&mut cartpole(&[0.0; 4], 5, 1), &[0.0; 24], &[0.0; 5]).unwrap_err();
-    assert_eq!(e, Error::Dimension { node: 0, name: "nx", expected: 3, found: 4 });
+    assert_eq!(e, Error::Dimension { knot: 0, name: "nx", expected: 3, found: 4 });
     solver.settings = Settings { regularisation_factor: 1.0, ..Settings::default() };
     let e = solver.solve(&mut problem, &[0.0; 18], &[0.0; 10]).unwrap_err();
     assert_eq!(e.to_string(), "setting `regularisation_factor` is 1, but it must be above 1");
@@ -274,8 +281,8 @@ fn bounds_that_leave_no_control_are_refused_by_knot_and_number() {
     assert_eq!(error(&[f64::NAN, 0.0], &[1.0, 1.0]), "knot 0: control 0 must be at least NaN and at most 1");
     let infinite = f64::INFINITY;
     assert_eq!(error(&[infinite, 0.0], &[infinite, 1.0]), "knot 0: control 0 must be at least inf and at most inf");
-    assert_eq!(error(&[0.0], &[1.0, 1.0]), "node 0: expected lower bounds = 2, found 1");
-    assert_eq!(error(&[0.0, 0.0], &[1.0; 3]), "node 0: expected upper bounds = 2, found 3");
+    assert_eq!(error(&[0.0], &[1.0, 1.0]), "knot 0: expected lower bounds = 2, found 1");
+    assert_eq!(error(&[0.0, 0.0], &[1.0; 3]), "knot 0: expected upper bounds = 2, found 3");
     assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // a single allowed control is valid
 }
 
@@ -314,13 +321,13 @@ fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     let mut solver = Fddp::new(&problem);
     (solver.settings.max_iterations, solver.settings.tolerance_bounded) = (300, 1e-12);
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
-    let mut nodes = problem.nodes();
-    problem.calc_diff(&solution.xs, &solution.us, &mut nodes);
-    let mut adjoint = nodes[50].q.clone();
+    let mut lq_knots = problem.lq_knots();
+    problem.calc_diff(&solution.xs, &solution.us, &mut lq_knots);
+    let mut adjoint = lq_knots[50].q.clone();
     let mut at_bounds = 0;
     for t in (0..50).rev() {
-        let slope = nodes[t].r[0] + nodes[t].B.column(0).dot(&adjoint);
-        adjoint = &nodes[t].q + nodes[t].A.transpose() * &adjoint;
+        let slope = lq_knots[t].r[0] + lq_knots[t].B.column(0).dot(&adjoint);
+        adjoint = &lq_knots[t].q + lq_knots[t].A.transpose() * &adjoint;
         let u = solution.u(t)[0];
         at_bounds += usize::from(u == -8.0 || u == 6.0);
         let projected = u - (u - slope).clamp(-8.0, 6.0);
@@ -335,6 +342,18 @@ struct Noting {
     groups: Vec<usize>,
 }
 
+impl GroupModel for Noting {
+    fn lanes(&self) -> usize {
+        self.action.lanes
+    }
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        if knots.iter().all(|t| *t == 0) {
+            self.groups.push(knots.len());
+        }
+        self.action.calc_group(knots, xs, us, next, costs);
+    }
+}
+
 impl ActionModel for Noting {
     fn nx(&self) -> usize {
         4
@@ -342,20 +361,14 @@ impl ActionModel for Noting {
     fn nu(&self) -> usize {
         1
     }
-    fn lanes(&self) -> usize {
-        self.action.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.action.calc(t, x, u, next)
     }
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.action.calc_diff(t, x, u, node);
-    }
-    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        if knots.iter().all(|t| *t == 0) {
-            self.groups.push(knots.len());
-        }
-        self.action.calc_group(knots, xs, us, next, costs);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.action.calc_diff(t, x, u, knot);
     }
 }
 
@@ -408,7 +421,7 @@ impl ActionModel for Slow {
         0.5 * (x[0] * x[0] + u * u) + x[0].powi(4)
     }
 
-    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut LqKnot) {
         unreachable!("is differentiated by differences")
     }
 }

@@ -8,7 +8,7 @@ use condyle_dynamics::{
 use condyle_optimal::robot::{
     Activation, Cost, Dynamics, FrameName, FreeDynamics, Knot, Limit, OwnResidual, Residual, ResidualFunction,
 };
-use condyle_optimal::{ActionModel, Error, Fddp, Hessian, LqNode, NumDiff, Problem, Sweep};
+use condyle_optimal::{ActionModel, Error, Fddp, Hessian, LqKnot, NumDiff, Problem, Sweep};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -80,7 +80,7 @@ fn derivatives_are_those_of_the_action() {
         let mut action = FreeDynamics::running(model.clone(), DT, costs).unwrap();
         let mut oracle = NumDiff(action.clone());
         let ndx = action.ndx();
-        let (mut exact, mut numeric) = (LqNode::zeros(ndx, nu), LqNode::zeros(ndx, nu));
+        let (mut exact, mut numeric) = (LqKnot::zeros(ndx, nu), LqKnot::zeros(ndx, nu));
         for _ in 0..5 {
             let (x, u) = (random_state(&model, &mut rng), random(nu, 5.0, &mut rng));
             action.calc_diff(0, &x, &u, &mut exact);
@@ -107,24 +107,24 @@ fn derivatives_have_the_form_of_euler_steps() {
         let costs = all_costs(&model, nu, &mut rng).into_iter().filter(|c| c.weight > 0.0).collect();
         let mut action = FreeDynamics::running(model.clone(), DT, costs).unwrap();
         let ndx = action.ndx();
-        let mut nodes = vec![LqNode::zeros(ndx, nu); 3];
-        nodes.push(LqNode::zeros(ndx, 0));
-        nodes[3].Q.fill_with_identity();
-        for node in &mut nodes[..3] {
+        let mut lq_knots = vec![LqKnot::zeros(ndx, nu); 3];
+        lq_knots.push(LqKnot::zeros(ndx, 0));
+        lq_knots[3].Q.fill_with_identity();
+        for knot in &mut lq_knots[..3] {
             let (x, u) = (random_state(&model, &mut rng), random(nu, 5.0, &mut rng));
-            action.calc_diff(0, &x, &u, node);
-            node.R.fill_diagonal(1.0);
-            node.Q += nalgebra::DMatrix::identity(ndx, ndx);
+            action.calc_diff(0, &x, &u, knot);
+            knot.R.fill_diagonal(1.0);
+            knot.Q += nalgebra::DMatrix::identity(ndx, ndx);
         }
-        let mut sweep = Sweep::new(&nodes);
-        sweep.run(&nodes, 1e-6).unwrap();
-        let structured = sweep.knots().to_vec();
-        assert!(nodes[0].structure != condyle_optimal::Structure::default());
-        for node in &mut nodes {
-            node.structure.set_dense();
+        let mut sweep = Sweep::new(&lq_knots);
+        sweep.run(&lq_knots, 1e-6).unwrap();
+        let structured = sweep.feedback().to_vec();
+        assert!(lq_knots[0].structure != condyle_optimal::DynamicsStructure::default());
+        for knot in &mut lq_knots {
+            knot.structure.set_dense();
         }
-        sweep.run(&nodes, 1e-6).unwrap();
-        for (a, b) in structured.iter().zip(sweep.knots()) {
+        sweep.run(&lq_knots, 1e-6).unwrap();
+        for (a, b) in structured.iter().zip(sweep.feedback()) {
             for (name, a, b) in [("K", a.K.as_slice(), b.K.as_slice()), ("Vxx", a.Vxx.as_slice(), b.Vxx.as_slice())] {
                 let error = largest_difference(a, b);
                 assert!(error < SAME, "{}: {name} is off by {error:e}", model.name());
@@ -142,7 +142,7 @@ fn hessians_of_linear_residuals_are_exact() {
     costs.retain(|c| !matches!(c.residual, Residual::FramePlacement { .. } | Residual::FrameTranslation { .. }));
     let mut action = FreeDynamics::running(model.clone(), DT, costs).unwrap();
     let mut oracle = NumDiff(action.clone());
-    let (mut exact, mut numeric) = (LqNode::zeros(14, 7), LqNode::zeros(14, 7));
+    let (mut exact, mut numeric) = (LqKnot::zeros(14, 7), LqKnot::zeros(14, 7));
     let (x, u) = (random_state(&model, &mut rng), random(7, 1.0, &mut rng));
     action.calc_diff(0, &x, &u, &mut exact);
     oracle.calc_diff(0, &x, &u, &mut numeric);
@@ -201,7 +201,7 @@ fn frames_travel_by_name() {
         let limit = Limit::equality("reach", reach.residual.clone());
         unknown(end.with_limits(vec![limit]).map(|_| ()).unwrap_err());
         // and so is a file with this cost
-        let knot = serde_json::to_string(&Knot::new(Dynamics::End, vec![reach.clone()])).unwrap();
+        let knot = serde_json::to_string(&Knot::new(Dynamics::Terminal, vec![reach.clone()])).unwrap();
         let read: Knot = serde_json::from_str(&knot).unwrap();
         assert_eq!(read.costs, [reach]);
         assert!(read.build(&two).is_ok());
@@ -309,14 +309,14 @@ impl ResidualFunction for OwnCost {
     }
 }
 
-/// The node contains the gradient and Hessian of a user-defined cost, times Δt and the weight. With another activation
+/// The knot contains the gradient and Hessian of a user-defined cost, times Δt and the weight. With another activation
 /// than the sum, here ½ r², it contains the whole Hessian of the activation's value.
 #[test]
 fn a_cost_of_ones_own_has_its_hessian() {
     let (arm, mut rng) = (Arc::new(robots::arm7()), StdRng::seed_from_u64(31));
     let (x, u) = (random(14, 1.0, &mut rng), random(7, 1.0, &mut rng));
     for activation in [Activation::Sum, Activation::Quadratic] {
-        let node = |hessian: bool| {
+        let knot = |hessian: bool| {
             let own = Residual::Own(OwnResidual::new(OwnCost { hessian }));
             let costs = vec![
                 Cost::new("own", 0.7, own.clone(), activation.clone()),
@@ -325,13 +325,13 @@ fn a_cost_of_ones_own_has_its_hessian() {
                 Cost::new("effort", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic),
             ];
             let mut action = FreeDynamics::running(arm.clone(), DT, costs).unwrap();
-            let (mut node, mut numeric) = (LqNode::zeros(14, 7), LqNode::zeros(14, 7));
-            action.calc_diff(0, &x, &u, &mut node);
+            let (mut knot, mut numeric) = (LqKnot::zeros(14, 7), LqKnot::zeros(14, 7));
+            action.calc_diff(0, &x, &u, &mut knot);
             NumDiff(action).calc_diff(0, &x, &u, &mut numeric);
-            assert!((&node.q - &numeric.q).amax() < DIFFERENCES && (&node.r - &numeric.r).amax() < DIFFERENCES);
-            node
+            assert!((&knot.q - &numeric.q).amax() < DIFFERENCES && (&knot.r - &numeric.r).amax() < DIFFERENCES);
+            knot
         };
-        let (own, gauss_newton) = (node(true), node(false));
+        let (own, gauss_newton) = (knot(true), knot(false));
         let mut r = [0.0];
         OwnCost { hessian: true }.calc(0, &x, &u, &mut r);
         let (mut expected, slope) = (gauss_newton.clone(), if activation == Activation::Sum { DT } else { DT * r[0] });
@@ -396,7 +396,7 @@ fn a_residual_of_ones_own_is_one_among_others() {
     let xs = x0.repeat(10);
     let us = problem.quasi_static(&xs).unwrap();
     let mut by_differences = knot.clone();
-    let (mut ours, mut theirs) = (LqNode::zeros(36, 12), LqNode::zeros(36, 12));
+    let (mut ours, mut theirs) = (LqKnot::zeros(36, 12), LqKnot::zeros(36, 12));
     by_differences.calc_diff(3, &x0, &us[..12], &mut ours);
     NumDiff(by_differences).calc_diff(3, &x0, &us[..12], &mut theirs);
     assert!((&ours.q - &theirs.q).amax() < 1e-6 * (1.0 + theirs.q.amax()));

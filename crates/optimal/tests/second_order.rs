@@ -9,9 +9,9 @@ use condyle_dynamics::{
     difference_jacobian, integrate_jacobian, neutral, random_configuration, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Cost, FreeAcceleration, FreeDynamics, Integrator, InverseDynamics, Residual,
+    Activation, Actuation, Cost, FreeAcceleration, FreeDynamics, FreeInverseDynamics, Integrator, Residual,
 };
-use condyle_optimal::{ActionModel, Fddp, Hessian, LqNode, NumDiff, Problem, Status, Sweep};
+use condyle_optimal::{ActionModel, Fddp, Hessian, LqKnot, NumDiff, Problem, Status, Sweep};
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
@@ -50,22 +50,22 @@ impl<A: ActionModel> ActionModel for Chained<A> {
 #[test]
 fn the_quadratic_model_is_exact() {
     let (x, u) = ([0.3, 0.7, -0.4, 1.3], [2.0]);
-    let mut node = LqNode::zeros(4, 1);
+    let mut knot = LqKnot::zeros(4, 1);
     let mut action = NumDiff(cartpole_action());
-    action.calc_diff(0, &x, &u, &mut node);
-    let mut end = LqNode::zeros(4, 0);
+    action.calc_diff(0, &x, &u, &mut knot);
+    let mut end = LqKnot::zeros(4, 0);
     let mut next = [0.0; 4];
     action.calc(0, &x, &u, &mut next);
     end.Q.fill_with_identity();
     end.q.copy_from_slice(&next);
 
-    let nodes = [node, end];
-    let mut sweep = Sweep::new(&nodes);
+    let lq_knots = [knot, end];
+    let mut sweep = Sweep::new(&lq_knots);
     let curvature = |t, lambda: &[f64], hessian: &mut Hessian| action.dynamics_hessian(t, &x, &u, lambda, hessian);
-    sweep.run_with(&nodes, 0.0, curvature).unwrap();
-    let knot = &sweep.knots()[0];
+    sweep.run_with(&lq_knots, 0.0, curvature).unwrap();
+    let knot = &sweep.feedback()[0];
 
-    let mut exact = LqNode::zeros(4, 1);
+    let mut exact = LqKnot::zeros(4, 1);
     NumDiff(Chained(cartpole_action())).calc_diff(0, &x, &u, &mut exact);
     let K = -exact.R.clone().try_inverse().unwrap() * exact.S.transpose();
     let Vxx = &exact.Q + &exact.S * &K;
@@ -73,8 +73,8 @@ fn the_quadratic_model_is_exact() {
     assert!((&knot.K - &K).amax() < DIFFERENCES * 10.0, "{} {K}", knot.K);
     assert!((&knot.Vxx - &Vxx).amax() < DIFFERENCES * 10.0, "{} {Vxx}", knot.Vxx);
     // Without the curvature, it is not exact.
-    sweep.run(&nodes, 0.0).unwrap();
-    assert!((&sweep.knots()[0].Vxx - &Vxx).amax() > 100.0 * DIFFERENCES);
+    sweep.run(&lq_knots, 0.0).unwrap();
+    assert!((&sweep.feedback()[0].Vxx - &Vxx).amax() > 100.0 * DIFFERENCES);
 }
 
 /// Near the optimum, the error of a second-order step is the square of the previous error; with Gauss–Newton it is a
@@ -118,7 +118,7 @@ fn groups() -> Model {
 fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
     let mut random = random();
     let (nv, ndx, nu) = (model.nv(), action.ndx(), action.nu());
-    let mut node = LqNode::zeros(ndx, nu);
+    let mut knot = LqKnot::zeros(ndx, nu);
     for _ in 0..3 {
         let numbers = random_matrix(&mut random, nv + nu + ndx, 1);
         let (v, numbers) = numbers.as_slice().split_at(nv);
@@ -137,14 +137,14 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             action.integrate(&x, &z[..ndx], &mut moved);
             let u: Vec<f64> = u.iter().zip(&z[ndx..]).map(|(u, du)| u + du).collect();
             action.calc(0, &moved, &u, &mut next);
-            action.calc_diff(0, &moved, &u, &mut node);
+            action.calc_diff(0, &moved, &u, &mut knot);
             action.difference(&centre, &next, &mut change);
             integrate_jacobian(model, &z[..nv], IntegrateArgument::Velocity, &mut E);
             difference_jacobian(model, &change[..nv], DifferenceArgument::To, &mut L);
             let mut lambda = DVector::from_column_slice(lambda);
             let upper = L.tr_mul(&lambda.rows(0, nv));
             lambda.rows_mut(0, nv).copy_from(&upper);
-            let (mut by_x, by_u) = (node.A.tr_mul(&lambda), node.B.tr_mul(&lambda));
+            let (mut by_x, by_u) = (knot.A.tr_mul(&lambda), knot.B.tr_mul(&lambda));
             let upper = E.tr_mul(&by_x.rows(0, nv));
             by_x.rows_mut(0, nv).copy_from(&upper);
             (by_x, by_u)
@@ -189,7 +189,7 @@ fn robots_give_theirs_exactly() {
     for model in [arm, Arc::new(robots::quadruped()), Arc::new(groups())] {
         for dt in [0.05, 0.5] {
             check(&model, FreeDynamics::running(model.clone(), dt, vec![]).unwrap());
-            check(&model, InverseDynamics::running(model.clone(), dt, vec![]).unwrap());
+            check(&model, FreeInverseDynamics::running(model.clone(), dt, vec![]).unwrap());
         }
     }
 }
@@ -239,8 +239,8 @@ impl ActionModel for ExactCosts {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.0.calc_diff(t, x, u, node);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.0.calc_diff(t, x, u, knot);
     }
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         self.0.0.dynamics_hessian(t, x, u, lambda, hessian)

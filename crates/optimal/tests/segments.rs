@@ -3,10 +3,10 @@
 
 mod common;
 
-use common::{random, random_euler_node, random_matrix, random_node};
+use common::{random, random_euler_knot, random_knot, random_matrix};
 use condyle_dynamics::{ContactConstraint, Vec3, neutral, robots};
 use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
-use condyle_optimal::{Error, Fddp, LqKnot, LqNode, Problem, Sweep, SweepError};
+use condyle_optimal::{Error, Fddp, KnotFeedback, LqKnot, Problem, Sweep, SweepError};
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use std::sync::Arc;
@@ -24,8 +24,8 @@ fn largest(x: &[f64]) -> f64 {
 }
 
 #[track_caller]
-fn assert_same(found: &[LqKnot], expected: &[LqKnot], case: &str) {
-    let fields = |knot: &LqKnot| {
+fn assert_same(found: &[KnotFeedback], expected: &[KnotFeedback], case: &str) {
+    let fields = |knot: &KnotFeedback| {
         [&knot.Vxx, &knot.K, &knot.Quu]
             .map(|matrix| matrix.as_slice().to_vec())
             .into_iter()
@@ -50,18 +50,18 @@ fn assert_same(found: &[LqKnot], expected: &[LqKnot], case: &str) {
 }
 
 /// Returns the knots of a sweep as one, and of a sweep in segments; both must succeed.
-fn both(nodes: &[LqNode], segments: usize, regularisation: f64) -> (Vec<LqKnot>, Vec<LqKnot>) {
-    let mut sweep = Sweep::new(nodes);
-    sweep.run(nodes, regularisation).unwrap();
-    let as_one = sweep.knots().to_vec();
-    let mut sweep = Sweep::new(nodes);
+fn both(lq_knots: &[LqKnot], segments: usize, regularisation: f64) -> (Vec<KnotFeedback>, Vec<KnotFeedback>) {
+    let mut sweep = Sweep::new(lq_knots);
+    sweep.run(lq_knots, regularisation).unwrap();
+    let as_one = sweep.feedback().to_vec();
+    let mut sweep = Sweep::new(lq_knots);
     sweep.set_segments(segments);
-    sweep.run(nodes, regularisation).unwrap();
-    (as_one, sweep.knots().to_vec())
+    sweep.run(lq_knots, regularisation).unwrap();
+    (as_one, sweep.feedback().to_vec())
 }
 
-/// Returns nodes of all kinds: dense or Euler steps, with or without blocks, and with different numbers of controls.
-fn problems() -> Vec<Vec<LqNode>> {
+/// Returns knots of all kinds: dense or Euler steps, with or without blocks, and with different numbers of controls.
+fn problems() -> Vec<Vec<LqKnot>> {
     let (mut random, root) = (random(), 0..6);
     let root = std::slice::from_ref(&root);
     let mut all = Vec::new();
@@ -73,28 +73,28 @@ fn problems() -> Vec<Vec<LqNode>> {
         (17, vec![4; 30]),
         (33, vec![9, 12, 40, 9, 12, 9, 15]),
     ] {
-        let mut nodes: Vec<_> = nus.iter().map(|&nu| random_node(&mut random, ndx, nu)).collect();
-        nodes.push(random_node(&mut random, ndx, 0));
-        all.push(nodes);
+        let mut lq_knots: Vec<_> = nus.iter().map(|&nu| random_knot(&mut random, ndx, nu)).collect();
+        lq_knots.push(random_knot(&mut random, ndx, 0));
+        all.push(lq_knots);
     }
     for (nv, nus, blocks) in
         [(9, vec![4; 17], &[][..]), (10, vec![3, 0, 10, 11, 0, 2, 5, 5, 5, 1], root), (38, vec![32; 9], root)]
     {
-        let mut nodes: Vec<_> = nus.iter().map(|&nu| random_euler_node(&mut random, nv, nu, blocks)).collect();
-        nodes[nus.len() / 2].structure.set_dense();
-        nodes.push(random_node(&mut random, 2 * nv, 0));
-        all.push(nodes);
+        let mut lq_knots: Vec<_> = nus.iter().map(|&nu| random_euler_knot(&mut random, nv, nu, blocks)).collect();
+        lq_knots[nus.len() / 2].structure.set_dense();
+        lq_knots.push(random_knot(&mut random, 2 * nv, 0));
+        all.push(lq_knots);
     }
     all
 }
 
 #[test]
 fn segments_change_nothing_but_rounding() {
-    for nodes in problems() {
-        let (ndx, horizon) = (nodes[0].ndx(), nodes.len() - 1);
+    for lq_knots in problems() {
+        let (ndx, horizon) = (lq_knots[0].ndx(), lq_knots.len() - 1);
         for segments in [2, 3, 4, 7, 16] {
             for regularisation in [0.0, 1e-3] {
-                let (as_one, knots) = both(&nodes, segments, regularisation);
+                let (as_one, knots) = both(&lq_knots, segments, regularisation);
                 assert_same(&knots, &as_one, &format!("ndx {ndx}, horizon {horizon}, {segments} segments"));
                 assert!(knots != as_one, "ndx {ndx}: not in segments"); // other sums, so other roundings
             }
@@ -106,13 +106,13 @@ fn segments_change_nothing_but_rounding() {
 fn a_horizon_too_short_for_two_segments_is_swept_as_one() {
     let mut random = random();
     for horizon in 0..4 {
-        let mut nodes: Vec<_> = (0..horizon).map(|_| random_node(&mut random, 4, 2)).collect();
-        nodes.push(random_node(&mut random, 4, 0));
-        let (as_one, knots) = both(&nodes, 5, 1e-6);
+        let mut lq_knots: Vec<_> = (0..horizon).map(|_| random_knot(&mut random, 4, 2)).collect();
+        lq_knots.push(random_knot(&mut random, 4, 0));
+        let (as_one, knots) = both(&lq_knots, 5, 1e-6);
         assert_eq!(knots, as_one, "horizon {horizon}");
     }
-    let nodes = &problems()[3];
-    let (as_one, knots) = both(nodes, 1, 1e-6);
+    let lq_knots = &problems()[3];
+    let (as_one, knots) = both(lq_knots, 1, 1e-6);
     assert_eq!(knots, as_one);
 }
 
@@ -120,55 +120,55 @@ fn a_horizon_too_short_for_two_segments_is_swept_as_one() {
 #[test]
 fn segments_solve_the_whole_problem() {
     let mut random = random();
-    for nodes in problems().into_iter().take(3) {
-        let (n, horizon) = (nodes[0].ndx(), nodes.len() - 1);
+    for lq_knots in problems().into_iter().take(3) {
+        let (n, horizon) = (lq_knots[0].ndx(), lq_knots.len() - 1);
         let x0: DVector<f64> = random_matrix(&mut random, n, 1).column(0).into_owned();
         // Unknowns: x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
         let mut offsets = vec![horizon * n];
-        for node in &nodes[..horizon] {
-            offsets.push(offsets[offsets.len() - 1] + node.nu());
+        for knot in &lq_knots[..horizon] {
+            offsets.push(offsets[offsets.len() - 1] + knot.nu());
         }
         let (unknown, all) = (offsets[horizon], offsets[horizon] + horizon * n);
         let mut kkt = DMatrix::zeros(all, all);
         let mut right = DVector::zeros(all);
-        for (t, node) in nodes.iter().enumerate() {
+        for (t, knot) in lq_knots.iter().enumerate() {
             let (x, row) = (t.wrapping_sub(1).wrapping_mul(n), unknown + t * n);
             if t > 0 {
-                kkt.view_mut((x, x), (n, n)).copy_from(&node.Q);
-                right.rows_mut(x, n).copy_from(&-&node.q);
+                kkt.view_mut((x, x), (n, n)).copy_from(&knot.Q);
+                right.rows_mut(x, n).copy_from(&-&knot.q);
             }
             if t == horizon {
                 continue;
             }
-            let (u, m) = (offsets[t], node.nu());
-            kkt.view_mut((u, u), (m, m)).copy_from(&node.R);
-            right.rows_mut(u, m).copy_from(&-&node.r);
+            let (u, m) = (offsets[t], knot.nu());
+            kkt.view_mut((u, u), (m, m)).copy_from(&knot.R);
+            right.rows_mut(u, m).copy_from(&-&knot.r);
             kkt.view_mut((row, t * n), (n, n)).fill_diagonal(-1.0);
-            kkt.view_mut((row, u), (n, m)).copy_from(&node.B);
-            right.rows_mut(row, n).copy_from(&-&node.f);
+            kkt.view_mut((row, u), (n, m)).copy_from(&knot.B);
+            right.rows_mut(row, n).copy_from(&-&knot.f);
             if t > 0 {
-                kkt.view_mut((u, x), (m, n)).copy_from(&node.S.transpose());
-                kkt.view_mut((row, x), (n, n)).copy_from(&node.A);
+                kkt.view_mut((u, x), (m, n)).copy_from(&knot.S.transpose());
+                kkt.view_mut((row, x), (n, n)).copy_from(&knot.A);
             } else {
-                right.rows_mut(u, m).axpy(-1.0, &(node.S.transpose() * &x0), 1.0);
-                right.rows_mut(row, n).axpy(-1.0, &(&node.A * &x0), 1.0);
+                right.rows_mut(u, m).axpy(-1.0, &(knot.S.transpose() * &x0), 1.0);
+                right.rows_mut(row, n).axpy(-1.0, &(&knot.A * &x0), 1.0);
             }
         }
         kkt.fill_upper_triangle_with_lower_triangle();
         let solution = kkt.lu().solve(&right).unwrap();
         for segments in [2, 5] {
-            let mut sweep = Sweep::new(&nodes);
+            let mut sweep = Sweep::new(&lq_knots);
             sweep.set_segments(segments);
-            sweep.run(&nodes, 0.0).unwrap();
+            sweep.run(&lq_knots, 0.0).unwrap();
             let mut x = x0.clone();
-            for (t, node) in nodes[..horizon].iter().enumerate() {
-                let knot = &sweep.knots()[t];
-                let u = &knot.k + &knot.K * &x;
-                x = &node.A * &x + &node.B * &u + &node.f;
+            for (t, knot) in lq_knots[..horizon].iter().enumerate() {
+                let gains = &sweep.feedback()[t];
+                let u = &gains.k + &gains.K * &x;
+                x = &knot.A * &x + &knot.B * &u + &knot.f;
                 let expected = solution.rows(t * n, n);
                 let scale = 1.0 + largest(solution.rows(0, unknown).as_slice());
                 assert!((&x - expected).amax() < SAME * scale, "ndx {n}, {segments} segments, knot {t}");
-                let expected = solution.rows(offsets[t], node.nu());
+                let expected = solution.rows(offsets[t], knot.nu());
                 assert!(u.iter().zip(&expected).all(|(a, b)| (a - b).abs() < SAME * scale), "ndx {n}, knot {t}: u");
             }
         }
@@ -177,16 +177,16 @@ fn segments_solve_the_whole_problem() {
 
 #[test]
 fn any_number_of_threads_finds_the_same_bits() {
-    for nodes in problems() {
+    for lq_knots in problems() {
         for segments in [2, 3, 8] {
-            let mut sweep = Sweep::new(&nodes);
+            let mut sweep = Sweep::new(&lq_knots);
             sweep.set_segments(segments);
             let mut first = None;
             for threads in 1..5 {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                pool.install(|| sweep.run(&nodes, 1e-9)).unwrap();
-                let knots = first.get_or_insert_with(|| sweep.knots().to_vec());
-                assert!(sweep.knots() == *knots, "{segments} segments, {threads} threads");
+                pool.install(|| sweep.run(&lq_knots, 1e-9)).unwrap();
+                let knots = first.get_or_insert_with(|| sweep.feedback().to_vec());
+                assert!(sweep.feedback() == *knots, "{segments} segments, {threads} threads");
             }
         }
     }
@@ -196,21 +196,21 @@ fn any_number_of_threads_finds_the_same_bits() {
 #[test]
 fn failures_are_those_of_a_sweep_as_one() {
     let mut random = random();
-    let good: Vec<_> = (0..=20).map(|t| random_node(&mut random, 4, if t < 20 { 3 } else { 0 })).collect();
+    let good: Vec<_> = (0..=20).map(|t| random_knot(&mut random, 4, if t < 20 { 3 } else { 0 })).collect();
     for knot in 0..=20 {
         for wrong in ["R", "A", "q"] {
-            let mut nodes = good.clone();
+            let mut lq_knots = good.clone();
             match wrong {
-                "R" if knot < 20 => nodes[knot].R[(2, 2)] = -1e6,
-                "A" if knot < 20 => nodes[knot].A[(1, 0)] = f64::NAN,
-                _ => nodes[knot].q[3] = f64::INFINITY,
+                "R" if knot < 20 => lq_knots[knot].R[(2, 2)] = -1e6,
+                "A" if knot < 20 => lq_knots[knot].A[(1, 0)] = f64::NAN,
+                _ => lq_knots[knot].q[3] = f64::INFINITY,
             }
-            let mut sweep = Sweep::new(&nodes);
-            let expected = sweep.run(&nodes, 1e-9).unwrap_err();
+            let mut sweep = Sweep::new(&lq_knots);
+            let expected = sweep.run(&lq_knots, 1e-9).unwrap_err();
             for segments in [2, 4] {
-                let mut sweep = Sweep::new(&nodes);
+                let mut sweep = Sweep::new(&lq_knots);
                 sweep.set_segments(segments);
-                let found = sweep.run(&nodes, 1e-9).unwrap_err();
+                let found = sweep.run(&lq_knots, 1e-9).unwrap_err();
                 match (found, expected) {
                     (SweepError::NotPositive { .. }, SweepError::NotPositive { .. }) => assert_eq!(found, expected),
                     (SweepError::NotFinite { knot: found }, SweepError::NotFinite { knot: t }) => assert_eq!(found, t),
@@ -226,22 +226,22 @@ fn failures_are_those_of_a_sweep_as_one() {
 #[test]
 fn what_segments_cannot_do_is_swept_as_one() {
     let mut random = random();
-    let good: Vec<_> = (0..=16).map(|t| random_node(&mut random, 5, if t < 16 { 2 } else { 0 })).collect();
+    let good: Vec<_> = (0..=16).map(|t| random_knot(&mut random, 5, if t < 16 { 2 } else { 0 })).collect();
     let mut without_effort = good.clone();
-    for node in &mut without_effort {
-        node.R.fill(0.0);
-        node.S.fill(0.0);
+    for knot in &mut without_effort {
+        knot.R.fill(0.0);
+        knot.S.fill(0.0);
     }
     let mut concave = good.clone();
-    for node in &mut concave {
-        node.R.fill_diagonal(1e4);
-        node.Q.fill_diagonal(-0.1);
-        node.A *= 0.1;
+    for knot in &mut concave {
+        knot.R.fill_diagonal(1e4);
+        knot.Q.fill_diagonal(-0.1);
+        knot.A *= 0.1;
     }
     let mut bounded = good.clone();
     bounded[3].upper[1] = 0.1;
-    for (name, nodes) in [("no effort", without_effort), ("concave", concave), ("bounded", bounded)] {
-        let (as_one, knots) = both(&nodes, 3, 0.0);
+    for (name, lq_knots) in [("no effort", without_effort), ("concave", concave), ("bounded", bounded)] {
+        let (as_one, knots) = both(&lq_knots, 3, 0.0);
         assert_eq!(knots, as_one, "{name}");
     }
 }
@@ -251,13 +251,13 @@ fn what_segments_cannot_do_is_swept_as_one() {
 fn cheap_controls_lose_no_digits() {
     let mut random = random();
     for effort in [1e-3, 1e-6, 1e-9, 1e-12] {
-        let mut nodes: Vec<_> = (0..=24).map(|t| random_node(&mut random, 6, if t < 24 { 2 } else { 0 })).collect();
-        for node in &mut nodes {
-            node.S.fill(0.0);
-            node.R.fill(0.0);
-            node.R.fill_diagonal(effort);
+        let mut lq_knots: Vec<_> = (0..=24).map(|t| random_knot(&mut random, 6, if t < 24 { 2 } else { 0 })).collect();
+        for knot in &mut lq_knots {
+            knot.S.fill(0.0);
+            knot.R.fill(0.0);
+            knot.R.fill_diagonal(effort);
         }
-        let (as_one, knots) = both(&nodes, 4, 0.0);
+        let (as_one, knots) = both(&lq_knots, 4, 0.0);
         assert_same(&knots, &as_one, &format!("effort {effort:e}"));
     }
 }
@@ -266,16 +266,16 @@ fn cheap_controls_lose_no_digits() {
 #[test]
 fn states_may_cost_nothing() {
     let mut random = random();
-    let mut nodes: Vec<_> = (0..=15).map(|t| random_node(&mut random, 7, if t < 15 { 3 } else { 0 })).collect();
-    for node in &mut nodes {
+    let mut lq_knots: Vec<_> = (0..=15).map(|t| random_knot(&mut random, 7, if t < 15 { 3 } else { 0 })).collect();
+    for knot in &mut lq_knots {
         for free in [2, 6] {
-            node.Q.row_mut(free).fill(0.0);
-            node.Q.column_mut(free).fill(0.0);
-            node.S.row_mut(free).fill(0.0);
-            node.A.column_mut(free).fill(0.0);
+            knot.Q.row_mut(free).fill(0.0);
+            knot.Q.column_mut(free).fill(0.0);
+            knot.S.row_mut(free).fill(0.0);
+            knot.A.column_mut(free).fill(0.0);
         }
     }
-    let (as_one, knots) = both(&nodes, 4, 0.0);
+    let (as_one, knots) = both(&lq_knots, 4, 0.0);
     assert_same(&knots, &as_one, "singular");
     assert!(knots != as_one);
 }
@@ -283,7 +283,7 @@ fn states_may_cost_nothing() {
 #[test]
 #[should_panic(expected = "`segments` is 0, expected at least 1")]
 fn no_segment_at_all_is_refused() {
-    Sweep::new(&[LqNode::zeros(2, 0)]).set_segments(0);
+    Sweep::new(&[LqKnot::zeros(2, 0)]).set_segments(0);
 }
 
 /// Creates the problem of a quadruped that shifts its weight on four feet and then reaches with one, from a warm start
@@ -314,8 +314,9 @@ fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
     let us = stance.quasi_static(&x0).repeat(30);
     let reach = ContactDynamics::running(model.clone(), &feet[..3], 0.02, driven(near)).unwrap();
     let end = FreeDynamics::terminal(model.clone(), costs(near)).unwrap();
-    let stages = (0..30).map(|t| usize::from(t >= 12)).collect();
-    let problem = Problem::new(x0.clone(), vec![Box::new(stance), Box::new(reach)], stages, Box::new(end)).unwrap();
+    let knot_models = (0..30).map(|t| usize::from(t >= 12)).collect();
+    let problem =
+        Problem::new(x0.clone(), vec![Box::new(stance), Box::new(reach)], knot_models, Box::new(end)).unwrap();
     let mut xs = x0.repeat(31);
     let mut random = random();
     for t in 1..31 {
@@ -352,14 +353,14 @@ fn a_robots_solve_makes_the_same_iterates() {
     }
 
     // also compare each knot of sweeps at the last derivatives
-    let mut nodes = problem.nodes();
-    problem.calc_diff(&expected.xs, &expected.us, &mut nodes);
+    let mut lq_knots = problem.lq_knots();
+    problem.calc_diff(&expected.xs, &expected.us, &mut lq_knots);
     let mut random = random();
-    for node in &mut nodes {
-        node.f.copy_from(&(random_matrix(&mut random, 36, 1) * 1e-3).column(0));
+    for knot in &mut lq_knots {
+        knot.f.copy_from(&(random_matrix(&mut random, 36, 1) * 1e-3).column(0));
     }
     for segments in [2, 4, 9] {
-        let (as_one, knots) = both(&nodes, segments, 1e-9);
+        let (as_one, knots) = both(&lq_knots, segments, 1e-9);
         assert_same(&knots, &as_one, "quadruped");
         assert!(knots != as_one);
     }

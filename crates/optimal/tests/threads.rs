@@ -3,13 +3,13 @@
 
 mod common;
 
-use common::{random, random_matrix, random_node};
+use common::{random, random_knot, random_matrix};
 use condyle_dynamics::{ContactConstraint, Vec3, integrate, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, ImpulseDynamics, Integrator,
     Residual,
 };
-use condyle_optimal::{ActionModel, Error, Fddp, LqNode, Lqr, NumDiff, Problem, Solution, Status, Unicycle};
+use condyle_optimal::{ActionModel, Error, Fddp, LqKnot, Lqr, NumDiff, Problem, Solution, Status, Unicycle};
 use rand::RngExt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -40,15 +40,16 @@ fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Proble
     };
     let mut stance = ContactDynamics::running(model.clone(), &contacts, 0.01, driven()).unwrap();
     let us = stance.quasi_static(&x0);
-    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
+    let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, standing()).unwrap();
     let flight = FreeAcceleration::new(model.clone(), Actuation::joints(&model), driven()).unwrap();
     let flight = FreeDynamics::new(flight, Integrator::RungeKutta4, 0.01).unwrap();
     let flying = FreeDynamics::running(model.clone(), 0.01, driven()).unwrap();
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
     let models: Vec<Box<dyn ActionModel>> =
         vec![Box::new(stance), Box::new(impact.clone()), impact_again(impact), Box::new(flight), Box::new(flying)];
-    let stages = [vec![2], vec![0; 19], vec![1], vec![3; 5], vec![4; 11], vec![2], vec![0; 9], vec![1, 1]].concat();
-    let nus = stages.iter().map(|stage| if [1, 2].contains(stage) { 0 } else { 12 });
+    let knot_models =
+        [vec![2], vec![0; 19], vec![1], vec![3; 5], vec![4; 11], vec![2], vec![0; 9], vec![1, 1]].concat();
+    let nus = knot_models.iter().map(|stage| if [1, 2].contains(stage) { 0 } else { 12 });
     let us = nus.flat_map(|nu| us[..nu].to_vec()).collect();
     let mut random = random();
     let mut state = || {
@@ -57,8 +58,8 @@ fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Proble
         integrate(&model, &x0[..19], &step, &mut q);
         [q, (0..18).map(|_| random.random_range(-0.1..0.1)).collect()].concat()
     };
-    let xs = (0..=stages.len()).flat_map(|_| state()).collect();
-    (Problem::new(x0.clone(), models, stages, Box::new(end)).unwrap(), xs, us)
+    let xs = (0..=knot_models.len()).flat_map(|_| state()).collect();
+    (Problem::new(x0.clone(), models, knot_models, Box::new(end)).unwrap(), xs, us)
 }
 
 fn solve(problem: &mut Problem, xs: &[f64], us: &[f64], threads: usize) -> Solution {
@@ -118,8 +119,8 @@ fn a_solver_turns_to_another_problem() {
     let end = FreeDynamics::terminal(arm, vec![state()]).unwrap();
     let mut robot = Problem::new(x0.to_vec(), vec![Box::new(knot)], vec![0; 9], Box::new(end)).unwrap();
     let mut random = random();
-    let [node, end] = [7, 0].map(|nu| Box::new(Lqr::new(random_node(&mut random, 14, nu))));
-    let other = Problem::new(x0.to_vec(), vec![node], vec![0; 9], end).unwrap();
+    let [knot, end] = [7, 0].map(|nu| Box::new(Lqr::new(random_knot(&mut random, 14, nu))));
+    let other = Problem::new(x0.to_vec(), vec![knot], vec![0; 9], end).unwrap();
     let mut solve = |made_for: Option<&Problem>, threads: usize| {
         let mut solver = Fddp::new(made_for.unwrap_or(&robot));
         solver.settings.threads = threads;
@@ -154,10 +155,10 @@ fn copies_follow_their_models() {
 #[test]
 fn a_horizon_may_move() {
     let mut random = random();
-    let models = [3, 1, 2].map(|nu| random_node(&mut random, 4, nu));
-    let end = random_node(&mut random, 4, 0);
+    let models = [3, 1, 2].map(|nu| random_knot(&mut random, 4, nu));
+    let end = random_knot(&mut random, 4, 0);
     let build = || {
-        let models = models.iter().map(|node| Box::new(Lqr::new(node.clone())) as Box<dyn ActionModel>).collect();
+        let models = models.iter().map(|knot| Box::new(Lqr::new(knot.clone())) as Box<dyn ActionModel>).collect();
         Problem::new(vec![0.5; 4], models, vec![0, 0, 1, 2, 2, 2], Box::new(Lqr::new(end.clone()))).unwrap()
     };
     let (mut one, mut several) = (build(), build());
@@ -175,12 +176,12 @@ fn a_horizon_may_move() {
 #[test]
 fn a_sweep_that_fails_is_repeated() {
     let mut random = random();
-    let mut node = random_node(&mut random, 4, 2);
-    node.R.fill_diagonal(-1.0);
-    let end = random_node(&mut random, 4, 0);
+    let mut knot = random_knot(&mut random, 4, 2);
+    knot.R.fill_diagonal(-1.0);
+    let end = random_knot(&mut random, 4, 0);
     let (xs, us) = (random_matrix(&mut random, 4 * 21, 1), random_matrix(&mut random, 2 * 20, 1));
     let solve = |threads: usize| {
-        let model = Box::new(Lqr::new(node.clone()));
+        let model = Box::new(Lqr::new(knot.clone()));
         let mut problem =
             Problem::new(vec![0.5; 4], vec![model], vec![0; 20], Box::new(Lqr::new(end.clone()))).unwrap();
         let mut solver = Fddp::new(&problem);
@@ -220,11 +221,11 @@ impl ActionModel for Fragile {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         assert_ne!(t, self.1, "on purpose");
-        self.0.calc_diff(t, x, u, node);
+        self.0.calc_diff(t, x, u, knot);
     }
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         Some(Box::new(Self(self.0.clone(), self.1)))
     }
 }
@@ -234,7 +235,7 @@ impl ActionModel for Fragile {
 fn a_panic_reaches_the_caller() {
     for fragile in [0, 17, 39] {
         let model = Box::new(Fragile(Unicycle::default(), fragile));
-        let end = Box::new(Unicycle::default().at_the_end());
+        let end = Box::new(Unicycle::default().terminal());
         let mut problem = Problem::new(vec![1.0, 0.0, 0.0], vec![model], vec![0; 40], end).unwrap();
         let mut solver = Fddp::new(&problem);
         solver.settings.threads = 4;

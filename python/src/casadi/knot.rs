@@ -10,7 +10,7 @@
 
 use super::chart::Chart;
 use super::computation::{Calls, Computation, Output};
-use condyle::optimal::{ActionModel, Hessian, LqNode};
+use condyle::optimal::{ActionModel, Hessian, LqKnot};
 use condyle::{Model, ModelError as Error};
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
@@ -41,15 +41,14 @@ impl KnotFunction {
     /// Creates the function of an action at knot t, or at all knots if t is `None`. `robot` is the robot of the action,
     /// if the action has one. Returns `None` if the action cannot be copied.
     pub(super) fn new(
-        mut action: Box<dyn ActionModel>,
+        action: Box<dyn ActionModel>,
         robot: Option<&Model>,
         t: Option<usize>,
         end: bool,
     ) -> Option<Self> {
-        action.reserve();
         let (nx, nu) = (action.nx(), action.nu());
         let chart = robot.map_or_else(Chart::none, Chart::new);
-        let mut calls = KnotCalls::new(action.fork()?, chart.clone(), t, end);
+        let mut calls = KnotCalls::new(action.try_clone()?, chart.clone(), t, end);
         let action = Mutex::new(action);
         let mut slopes = Vec::new();
         if !end {
@@ -111,7 +110,7 @@ impl Computation for KnotFunction {
 
     fn calls(&self, _: usize) -> Result<Box<dyn Calls>, Error> {
         let action = self.action.lock().unwrap_or_else(PoisonError::into_inner);
-        let copy = action.fork().expect("was copied before");
+        let copy = action.try_clone().expect("was copied before");
         Ok(Box::new(KnotCalls::new(copy, self.chart.clone(), self.t, self.end)))
     }
 }
@@ -125,17 +124,16 @@ struct KnotCalls {
     next: Vec<f64>,
     /// μ = Eᵀ λ.
     mu: Vec<f64>,
-    node: LqNode,
+    knot: LqKnot,
     hessian: Hessian,
 }
 
 impl KnotCalls {
-    fn new(mut action: Box<dyn ActionModel>, chart: Chart, t: Option<usize>, end: bool) -> Self {
-        action.reserve();
+    fn new(action: Box<dyn ActionModel>, chart: Chart, t: Option<usize>, end: bool) -> Self {
         let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
         let (next, mu) = (vec![0.0; nx], vec![0.0; ndx]);
-        let (node, hessian) = (LqNode::zeros(ndx, nu), Hessian::zeros(ndx, nu));
-        Self { action, chart, t, end, next, mu, node, hessian }
+        let (knot, hessian) = (LqKnot::zeros(ndx, nu), Hessian::zeros(ndx, nu));
+        Self { action, chart, t, end, next, mu, knot, hessian }
     }
 
     /// Returns the index, the state and the controls of the knot, from the arguments.
@@ -146,23 +144,23 @@ impl KnotCalls {
     }
 }
 
-/// Returns column j of the matrix [A B] of a node.
-fn slope(node: &LqNode, j: usize) -> &[f64] {
-    let n = node.ndx();
+/// Returns column j of the matrix [A B] of a knot.
+fn slope(knot: &LqKnot, j: usize) -> &[f64] {
+    let n = knot.ndx();
     match j.checked_sub(n) {
-        None => &node.A.as_slice()[j * n..][..n],
-        Some(k) => &node.B.as_slice()[k * n..][..n],
+        None => &knot.A.as_slice()[j * n..][..n],
+        Some(k) => &knot.B.as_slice()[k * n..][..n],
     }
 }
 
 impl KnotCalls {
-    /// Computes the next state, and its derivatives in the node.
+    /// Computes the next state, and its derivatives in the knot.
     fn differentiate(&mut self, x: &[Vec<f64>]) {
         let (t, x, u) = self.read(x);
         if !self.end {
             self.action.calc(t, x, u, &mut self.next);
         }
-        self.action.calc_diff(t, x, u, &mut self.node);
+        self.action.calc_diff(t, x, u, &mut self.knot);
     }
 }
 
@@ -179,13 +177,13 @@ impl Calls for KnotCalls {
 
     fn jacobian(&mut self, x: &[Vec<f64>], J: &mut [DMatrix<f64>]) {
         self.differentiate(x);
-        let Self { chart, end, next, node, .. } = self;
-        let (ndx, nq, nv) = (node.ndx(), chart.nq, chart.nv);
-        for (j, mut column) in J[0].columns_mut(0, ndx + node.nu()).column_iter_mut().enumerate() {
+        let Self { chart, end, next, knot, .. } = self;
+        let (ndx, nq, nv) = (knot.ndx(), chart.nq, chart.nv);
+        for (j, mut column) in J[0].columns_mut(0, ndx + knot.nu()).column_iter_mut().enumerate() {
             let (cost, rows) = column.as_mut_slice().split_last_mut().expect("the cost is there");
-            *cost = if j < ndx { node.q[j] } else { node.r[j - ndx] };
+            *cost = if j < ndx { knot.q[j] } else { knot.r[j - ndx] };
             if !*end {
-                let slope = slope(node, j);
+                let slope = slope(knot, j);
                 chart.push(&next[..nq], &slope[..nv], &mut rows[..nq]);
                 rows[nq..].copy_from_slice(&slope[nv..]);
             }
@@ -205,11 +203,11 @@ impl Calls for KnotCalls {
         }
         let H = &mut H[0];
         let (t, x, u) = self.read(x);
-        let Self { action, chart, end, next, mu, node, hessian, .. } = self;
-        let n = node.ndx() + node.nu(); // if t is an argument, its coordinate follows these n
+        let Self { action, chart, end, next, mu, knot, hessian, .. } = self;
+        let n = knot.ndx() + knot.nu(); // if t is an argument, its coordinate follows these n
         let (weight, lambda) = lambda.split_last().expect("the cost is there");
         H.fill(0.0);
-        add(H, *weight, [&node.Q, &node.S, &node.R]);
+        add(H, *weight, [&knot.Q, &knot.S, &knot.R]);
         if *end {
             return Ok(());
         }
@@ -221,11 +219,11 @@ impl Calls for KnotCalls {
         }
         chart.each_curvature(&next[..nq], &lambda[..nq], |group, C| {
             for j in 0..n {
-                let by_j = &slope(node, j)[group.clone()];
+                let by_j = &slope(knot, j)[group.clone()];
                 let along: Vec<f64> =
                     (0..by_j.len()).map(|r| (0..by_j.len()).map(|c| C[(r, c)] * by_j[c]).sum()).collect();
                 for i in 0..n {
-                    let by_i = &slope(node, i)[group.clone()];
+                    let by_i = &slope(knot, i)[group.clone()];
                     H[(i, j)] += by_i.iter().zip(&along).map(|(x, y)| x * y).sum::<f64>();
                 }
             }

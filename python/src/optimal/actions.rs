@@ -129,7 +129,7 @@ methods! {
         let Some(dt) = dt else {
             let kept = kept_at(model.py(), &costs, &None, &limits, &None);
             let end = |model: &_| {
-                Ok(Knot { limits: self::limits(model, limits), ..Knot::new(Dynamics::End, terms(model, &costs)) })
+                Ok(Knot { limits: self::limits(model, limits), ..Knot::new(Dynamics::Terminal, terms(model, &costs)) })
             };
             return Ok(Self(RobotAction::new(model, kept, end)?));
         };

@@ -30,12 +30,12 @@ pub(crate) fn alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> 
     let Some(t) = t else {
         return Err(ProblemError::new_err("t: expected the number of a knot of the problem, found None"));
     };
-    let k = match inner.stages().get(t) {
+    let k = match inner.knot_models().get(t) {
         Some(&k) => k,
         None if t == horizon => described.len() - 1,
         None => return Err(ProblemError::new_err(format!("t: expected 0 to {horizon}, found {t}"))),
     };
-    let mut alone = match (&described[k], &problem.objects[k]) {
+    let mut alone = match (&described[k], &lock("problem", &problem.objects)?[k]) {
         (Some(described), _) => robot_alone(described, Some(t))?,
         (None, Some(object)) => action_alone(object.bind(py), Some(t))?,
         (None, None) => unreachable!("a model is a robot's or an object"),
@@ -83,6 +83,6 @@ fn robot_alone(Described { robot, knot }: &Described, t: Option<usize>) -> PyRes
     let text = serde_json::to_string(&knot)
         .map_err(|error| ProblemError::new_err(format!("this knot cannot be a function of CasADi: {error}")))?;
     let action = knot.build(robot).map_err(problem_error)?;
-    let end = action.is_end();
+    let end = action.is_terminal();
     Ok(Alone { action, robot: Some(robot.clone()), end, text })
 }

@@ -22,11 +22,11 @@ use pyo3::types::PyDict;
 ///
 /// Raises `ProblemError` for a cost or a limit that does not fit the robot.
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct InverseDynamics(pub(super) RobotAction<robot::InverseDynamics>);
+pub(crate) struct FreeInverseDynamics(pub(super) RobotAction<robot::FreeInverseDynamics>);
 
 methods! {
     /// Returns the accelerations that hold the robot still: nv zeros.
-    InverseDynamics::quasi_static;
+    FreeInverseDynamics::quasi_static;
 
     #[new]
     #[pyo3(signature = (

@@ -1,7 +1,7 @@
 //! Reads the models of a problem, which are actions of any kind.
 
 use super::actions::{ContactDynamics, FreeDynamics, ImpulseDynamics};
-use super::inverse::{ContactInverseDynamics, InverseDynamics};
+use super::inverse::{ContactInverseDynamics, FreeInverseDynamics};
 use super::own::{Action, ConstrainedAction, DifferentialAction, Fault, Lqr, Unicycle};
 use super::robot_action::Boxed;
 use condyle::optimal as rust;
@@ -17,7 +17,7 @@ pub(super) fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> 
             }
         )*};
     }
-    of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics, ContactInverseDynamics);
+    of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, FreeInverseDynamics, ContactInverseDynamics);
     let action: Box<dyn rust::ActionModel> = if let Ok(lqr) = model.cast::<Lqr>() {
         Box::new(lqr.get().0.clone())
     } else if let Ok(unicycle) = model.cast::<Unicycle>() {
@@ -45,6 +45,6 @@ pub(super) fn residuals(model: &Bound<'_, PyAny>) -> Vec<Py<PyAny>> {
             }
         )*};
     }
-    of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics, ContactInverseDynamics);
+    of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, FreeInverseDynamics, ContactInverseDynamics);
     Vec::new()
 }

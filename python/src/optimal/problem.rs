@@ -29,10 +29,11 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
 ///
 /// x0: the initial state, nx numbers.
-/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
-///     `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-/// stages: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed as a group
-///     if they have the same model, or if their models belong to one robot and differ only in their costs and limits.
+/// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
+///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+/// knot_models: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed
+///     as a group if they have the same model, or if their models belong to one robot and differ only in their
+///     costs and limits.
 /// terminal: the model of the terminal knot, without controls.
 ///
 /// Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
@@ -45,7 +46,7 @@ pub(crate) struct Problem {
     pub(super) described: Mutex<Vec<Option<Arc<Described>>>>,
     /// The models that do not belong to a robot, as the objects that the user passed, the terminal model last. The
     /// problem's copies of these models call the functions of the objects.
-    pub(super) objects: Vec<Option<Py<PyAny>>>,
+    pub(super) objects: Mutex<Vec<Option<Py<PyAny>>>>,
     /// Residuals of robots that are written in Python, as the user passed them.
     written: Mutex<Vec<Py<PyAny>>>,
     /// The first error of an action that is written in Python.
@@ -62,10 +63,10 @@ impl Problem {
     fn new(
         x0: &Bound<'_, PyAny>,
         models: Vec<Bound<'_, PyAny>>,
-        stages: Option<Vec<usize>>,
+        knot_models: Option<Vec<usize>>,
         terminal: &Bound<'_, PyAny>,
     ) -> PyResult<Self> {
-        let stages = stages.unwrap_or_else(|| (0..models.len()).collect());
+        let knot_models = knot_models.unwrap_or_else(|| (0..models.len()).collect());
         let fault = Fault::default();
         let ends = models.iter().map(|model| (model, false)).chain([(terminal, true)]);
         let all = ends.map(|(model, end)| boxed(model, end, &fault)).collect::<PyResult<Vec<_>>>()?;
@@ -75,12 +76,15 @@ impl Problem {
             Some(_) => None,
         });
         let (objects, written) = (objects.collect(), each.flat_map(residuals).collect());
-        Self::make(numbers("x0", x0)?, all, stages, (objects, written), fault)
+        Self::make(numbers("x0", x0)?, all, knot_models, (objects, written), fault)
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.objects.iter().try_for_each(|object| visit.call(object))?;
-        let written = self.written.try_lock(); // `written` is never locked while Python code runs, so it is free here
+        // no Python code runs while these are locked
+        if let Ok(objects) = self.objects.try_lock() {
+            objects.iter().try_for_each(|object| visit.call(object))?;
+        }
+        let written = self.written.try_lock();
         written.map_or(Ok(()), |written| written.iter().try_for_each(|action| visit.call(action)))
     }
 
@@ -96,11 +100,11 @@ impl Problem {
         let knots = data.knots.into_iter().chain([data.terminal]);
         let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
         let objects = all.iter().map(|_| None).collect();
-        Self::make(data.x0, all, data.stages, (objects, vec![]), Fault::default())
+        Self::make(data.x0, all, data.knot_models, (objects, vec![]), Fault::default())
     }
 
-    /// Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
-    /// is written as null.
+    /// Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
+    /// infinite bound is written as null.
     ///
     /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
     /// different robots.
@@ -132,8 +136,8 @@ impl Problem {
         }
         let terminal = knots.pop().expect("the terminal one is there");
         let model = first.expect("the terminal one is there");
-        let (x0, stages) = (problem.x0().to_vec(), problem.stages().to_vec());
-        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, stages, terminal };
+        let (x0, knot_models) = (problem.x0().to_vec(), problem.knot_models().to_vec());
+        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, knot_models, terminal };
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
@@ -143,7 +147,7 @@ impl Problem {
         let described = lock("problem", &this.described)?;
         let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
         let mut parts = Vec::new();
-        for (object, described) in this.objects.iter().zip(&*described) {
+        for (object, described) in lock("problem", &this.objects)?.iter().zip(&*described) {
             let Some(described) = described.as_deref() else {
                 parts.push(object.as_ref().map_or_else(|| py.None(), |object| object.clone_ref(py)));
                 continue;
@@ -157,12 +161,12 @@ impl Problem {
             parts.push((model, text, written).into_pyobject(py)?.into_any().unbind());
         }
         let problem = lock("problem", &this.inner)?;
-        let arguments = (problem.x0().to_vec(), parts, problem.stages().to_vec());
+        let arguments = (problem.x0().to_vec(), parts, problem.knot_models().to_vec());
         Ok((slf.get_type().getattr("_from_parts")?, arguments).into_pyobject(py)?.into_any())
     }
 
     #[staticmethod]
-    fn _from_parts(x0: Vec<f64>, parts: Vec<Bound<'_, PyAny>>, stages: Vec<usize>) -> PyResult<Self> {
+    fn _from_parts(x0: Vec<f64>, parts: Vec<Bound<'_, PyAny>>, knot_models: Vec<usize>) -> PyResult<Self> {
         let (fault, last) = (Fault::default(), parts.len().saturating_sub(1));
         let (mut all, mut objects, mut kept) = (Vec::new(), Vec::new(), Vec::new());
         for (k, part) in parts.iter().enumerate() {
@@ -180,7 +184,7 @@ impl Problem {
         if all.is_empty() {
             return Err(ProblemError::new_err("parts: expected at least a terminal model"));
         }
-        Self::make(x0, all, stages, (objects, kept), fault)
+        Self::make(x0, all, knot_models, (objects, kept), fault)
     }
 
     /// The number of knots before the terminal one, N.
@@ -246,7 +250,7 @@ impl Problem {
         if knot > horizon {
             return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {horizon}")));
         }
-        let k = problem.stages().get(knot).copied();
+        let k = problem.knot_models().get(knot).copied();
         let mut described = lock("problem", &self.described)?;
         let last = described.len() - 1;
         let described = &mut described[k.unwrap_or(last)];
@@ -266,6 +270,39 @@ impl Problem {
         }
         lock("problem", &self.written)?.extend(own);
         Ok(())
+    }
+
+    /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between solves.
+    /// The solver's next iterations do not allocate.
+    ///
+    /// knot: its index, 0 to N − 1.
+    /// model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
+    ///     indices of this problem.
+    ///
+    /// Raises `ProblemError` if the model does not fit.
+    fn set_knot(&self, py: Python<'_>, knot: usize, model: &Bound<'_, PyAny>) -> PyResult<()> {
+        let new = boxed(model, false, &self.fault)?;
+        let object = new.described.is_none().then(|| model.clone().unbind());
+        self.replace(py, knot, new, object, residuals(model))
+    }
+
+    /// Sets the duration of a knot, whose model keeps its duration at all other knots. Call it between solves. The
+    /// solver's next iterations do not allocate.
+    ///
+    /// knot: its index, 0 to N − 1.
+    /// dt: the duration (s).
+    ///
+    /// Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
+    fn set_duration(&self, py: Python<'_>, knot: usize, dt: f64) -> PyResult<()> {
+        let described = {
+            let (problem, described) = (lock("problem", &self.inner)?, lock("problem", &self.described)?);
+            problem.knot_models().get(knot).and_then(|&k| described[k].as_deref().cloned())
+        };
+        let Some(mut new) = described.filter(|new| new.knot.dynamics.dt().is_some()) else {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot with a duration")));
+        };
+        new.knot.dynamics.set_dt(dt);
+        self.replace(py, knot, new.boxed()?, None, vec![])
     }
 
     /// Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
@@ -316,7 +353,7 @@ impl Problem {
     }
 
     /// Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
-    /// `LqNode`s, which a `Sweep` solves.
+    /// `LqKnot`s, which a `Sweep` solves.
     ///
     /// xs, us: as for `evaluate`.
     fn derivatives<'py>(
@@ -329,15 +366,15 @@ impl Problem {
         let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
         let xs = matrix("xs", xs, [horizon + 1, nx])?;
         let us = controls(&problem, us)?;
-        let (mut nodes, mut next, mut costs) = (problem.nodes(), vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
+        let (mut lq_knots, mut next, mut costs) = (problem.lq_knots(), vec![0.0; horizon * nx], vec![0.0; horizon + 1]);
         problem.calc(&xs, &us, &mut next, &mut costs);
-        problem.calc_diff(&xs, &us, &mut nodes);
+        problem.calc_diff(&xs, &us, &mut lq_knots);
         self.raise()?;
-        // the gap at the next state is stored in the node of the knot before
-        for (node, gap) in nodes.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
-            node.f.copy_from_slice(gap);
+        // the gap at the next state is stored in the knot of the knot before
+        for (knot, gap) in lq_knots.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
+            knot.f.copy_from_slice(gap);
         }
-        give(py, &nodes)
+        give(py, &lq_knots)
     }
 
     fn __repr__(&self) -> PyResult<String> {
@@ -377,18 +414,52 @@ impl Problem {
     fn make(
         x0: Vec<f64>,
         all: Vec<Boxed>,
-        stages: Vec<usize>,
+        knot_models: Vec<usize>,
         (objects, written): (Vec<Option<Py<PyAny>>>, Vec<Py<PyAny>>),
         fault: Fault,
     ) -> PyResult<Self> {
         let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
         let end = actions.pop().expect("the terminal one is there");
-        let problem = rust::Problem::new(x0, actions, stages, end).map_err(problem_error)?;
+        let problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
         let described: Vec<Option<Arc<Described>>> = described;
         let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
         let (inner, described) = (Mutex::new(problem), Mutex::new(described));
-        let (written, faults) = (Mutex::new(written), Mutex::new(faults));
+        let (objects, written, faults) = (Mutex::new(objects), Mutex::new(written), Mutex::new(faults));
         Ok(Self { inner, described, objects, written, fault, faults, moved: AtomicUsize::new(0) })
+    }
+
+    /// Replaces the model of a knot, and its description.
+    fn replace(
+        &self,
+        py: Python<'_>,
+        knot: usize,
+        Boxed { action, described: new }: Boxed,
+        object: Option<Py<PyAny>>,
+        written: Vec<Py<PyAny>>,
+    ) -> PyResult<()> {
+        let mut problem = lock("problem", &self.inner)?;
+        let horizon = problem.horizon();
+        if knot >= horizon {
+            return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {}", horizon - 1)));
+        }
+        problem.set_knot(knot, action).map_err(problem_error)?;
+        let (k, mut described) = (problem.knot_models()[knot], lock("problem", &self.described)?);
+        let mut objects = lock("problem", &self.objects)?;
+        if k == described.len() - 1 {
+            described.insert(k, None); // before the terminal model
+            objects.insert(k, None);
+        }
+        if let Some(new) = &new {
+            lock("problem", &self.faults)?.extend(faults(&new.knot));
+        }
+        described[k] = new;
+        let old = std::mem::replace(&mut objects[k], object);
+        drop((problem, described, objects));
+        if let Some(old) = old {
+            old.drop_ref(py); // may run Python code
+        }
+        lock("problem", &self.written)?.extend(written);
+        Ok(())
     }
 
     /// Shifts the descriptions of the models by one knot.

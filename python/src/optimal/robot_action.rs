@@ -49,10 +49,10 @@ impl<A: ActionModel + Clone> RobotAction<A> {
     }
 
     /// Returns the controls that hold the robot still at the state x.
-    pub(super) fn hold<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    pub(super) fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let model = &self.described.robot;
         let state = vector("x", x, model.nq() + model.nv())?;
-        self.action.clone().hold(0, &state).give(x.py(), None)
+        ActionModel::quasi_static(&mut self.action.clone(), 0, &state).give(x.py(), None)
     }
 
     /// Iterates over the residuals that are written in Python.
@@ -188,7 +188,7 @@ macro_rules! change {
     ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
         change!(
             $problem, $k, |$knot| $change;
-            FreeDynamics, ContactDynamics, ImpulseDynamics, InverseDynamics, ContactInverseDynamics
+            FreeDynamics, ContactDynamics, ImpulseDynamics, FreeInverseDynamics, ContactInverseDynamics
         )
     };
     ($problem:expr, $k:expr, |$knot:ident| $change:expr; $($class:ident),*) => {
@@ -211,7 +211,7 @@ macro_rules! methods {
 
             $(#[doc = $gives])+
             fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-                self.0.hold(x)
+                self.0.quasi_static(x)
             }
 
             fn __repr__(&self) -> String {

@@ -1,23 +1,24 @@
 //! The backward sweep, and the linear-quadratic problems that it solves.
 
 use super::own::write;
-use crate::arrays::{Array, class, output};
+use crate::arrays::{Array, class, matrix, output, vector};
 use crate::exceptions::{ProblemError, within};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
-use rust::LqNode;
+use rust::{ConstraintRow, LqKnot};
 
 const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 
 /// The backward Riccati sweep over a horizon of linear-quadratic knots: an iteration of `Fddp` without derivatives and
 /// line search.
 ///
-/// nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
+/// knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
 /// controls.
 ///
-/// Raises `ProblemError` if the shapes of the nodes do not fit together.
+/// Raises `ProblemError` if the shapes of the nodes do not fit together. `run` raises it for a knot with constraint rows, which
+/// the sweep does not treat.
 ///
 /// >>> from condyle.optimal import Lqr, Problem, Sweep
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
@@ -26,36 +27,37 @@ const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 /// >>> bool(abs(result.K[0][0, 0] + 2 / 3) < 1e-15)  # δu = −⅔ δx
 /// True
 #[pyclass(frozen, module = "condyle.optimal")]
-pub(crate) struct Sweep(Vec<LqNode>);
+pub(crate) struct Sweep(Vec<LqKnot>);
 
 #[pymethods]
 impl Sweep {
     #[new]
-    fn new(nodes: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
-        let read = |(t, node): (usize, &Bound<'_, PyAny>)| {
-            let size = |name: &str| node.getattr(name).and_then(|part| part.len());
-            let wrong = |error: PyErr| PyValueError::new_err(format!("nodes[{t}]: expected an LqNode: {error}"));
-            let most = LqNode::MOST_SIZE;
+    fn new(lq_knots: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+        let read = |(t, knot): (usize, &Bound<'_, PyAny>)| {
+            let size = |name: &str| knot.getattr(name).and_then(|part| part.len());
+            let wrong = |error: PyErr| PyValueError::new_err(format!("lq_knots[{t}]: expected an LqKnot: {error}"));
+            let most = LqKnot::MOST_SIZE;
             let ndx = within("ndx", size("q").map_err(wrong)?, 1, most)?;
             let nu = within("nu", size("r").map_err(wrong)?, 0, most)?;
-            let mut to = LqNode::zeros(ndx, nu);
+            let mut to = LqKnot::zeros(ndx, nu);
             for name in FIELDS {
-                write(&mut to, name, &node.getattr(name)?)?;
+                write(&mut to, name, &knot.getattr(name)?)?;
             }
+            read_rows(&mut to, &knot.getattr("rows")?)?;
             Ok(to)
         };
-        let nodes = nodes.iter().enumerate().map(read).collect::<PyResult<Vec<_>>>()?;
-        let Some(last) = nodes.last() else { return Err(ProblemError::new_err("nodes: expected at least one")) };
+        let lq_knots = lq_knots.iter().enumerate().map(read).collect::<PyResult<Vec<_>>>()?;
+        let Some(last) = lq_knots.last() else { return Err(ProblemError::new_err("lq_knots: expected at least one")) };
         if last.nu() > 0 {
-            let (t, nu) = (nodes.len() - 1, last.nu());
-            return Err(ProblemError::new_err(format!("nodes[{t}]: expected no controls at the end, found {nu}")));
+            let (t, nu) = (lq_knots.len() - 1, last.nu());
+            return Err(ProblemError::new_err(format!("lq_knots[{t}]: expected no controls at the end, found {nu}")));
         }
-        match nodes.iter().position(|node| node.ndx() != last.ndx()) {
+        match lq_knots.iter().position(|knot| knot.ndx() != last.ndx()) {
             Some(t) => {
-                let (expected, found) = (last.ndx(), nodes[t].ndx());
-                Err(ProblemError::new_err(format!("nodes[{t}]: expected ndx = {expected}, found {found}")))
+                let (expected, found) = (last.ndx(), lq_knots[t].ndx());
+                Err(ProblemError::new_err(format!("lq_knots[{t}]: expected ndx = {expected}, found {found}")))
             }
-            None => Ok(Self(nodes)),
+            None => Ok(Self(lq_knots)),
         }
     }
 
@@ -66,21 +68,23 @@ impl Sweep {
     /// Raises `ProblemError` if Quu of a knot is not positive definite.
     #[pyo3(signature = (regularisation=0.0))]
     fn run<'py>(&self, py: Python<'py>, regularisation: f64) -> PyResult<Bound<'py, PyAny>> {
-        let nodes = &self.0;
-        let mut sweep = rust::Sweep::new(nodes);
-        let done = py.detach(|| sweep.run(nodes, regularisation).map(|_| ()));
+        let lq_knots = &self.0;
+        let mut sweep = rust::Sweep::new(lq_knots);
+        let done = py.detach(|| sweep.run(lq_knots, regularisation).map(|_| ()));
         done.map_err(|error| ProblemError::new_err(error.to_string()))?;
-        let (knots, horizon, ndx) = (sweep.knots(), nodes.len() - 1, nodes[0].ndx());
+        let (feedback, horizon, ndx) = (sweep.feedback(), lq_knots.len() - 1, lq_knots[0].ndx());
         let (gains, feed_forward) = (PyList::empty(py), PyList::empty(py));
-        for (knot, node) in knots.iter().zip(&nodes[..horizon]) {
-            gains.append(output(py, None, &[node.nu(), ndx], |out| knot.K.write(out))?)?;
-            feed_forward.append(output(py, None, &[node.nu()], |out| out.copy_from_slice(knot.k.as_slice()))?)?;
+        for (feedback, knot) in feedback.iter().zip(&lq_knots[..horizon]) {
+            gains.append(output(py, None, &[knot.nu(), ndx], |out| feedback.K.write(out))?)?;
+            feed_forward.append(output(py, None, &[knot.nu()], |out| out.copy_from_slice(feedback.k.as_slice()))?)?;
         }
         let slopes = output(py, None, &[horizon + 1, ndx], |out| {
-            out.chunks_exact_mut(ndx).zip(knots).for_each(|(out, knot)| out.copy_from_slice(knot.Vx.as_slice()));
+            out.chunks_exact_mut(ndx)
+                .zip(feedback)
+                .for_each(|(out, feedback)| out.copy_from_slice(feedback.Vx.as_slice()));
         })?;
         let curvatures = output(py, None, &[horizon + 1, ndx, ndx], |out| {
-            out.chunks_exact_mut(ndx * ndx).zip(knots).for_each(|(out, knot)| knot.Vxx.write(out));
+            out.chunks_exact_mut(ndx * ndx).zip(feedback).for_each(|(out, feedback)| feedback.Vxx.write(out));
         })?;
         class!(py, "SweepResult")?.call1((gains, feed_forward, slopes, curvatures))
     }
@@ -90,25 +94,69 @@ impl Sweep {
     }
 }
 
-/// Converts nodes to `LqNode`s.
-pub(super) fn give<'py>(py: Python<'py>, nodes: &[LqNode]) -> PyResult<Bound<'py, PyList>> {
-    let class = class!(py, "LqNode")?;
+/// Reads the constraint rows of a knot from a `ConstraintRows` or None.
+#[allow(non_snake_case)]
+fn read_rows(to: &mut LqKnot, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    if given.is_none() {
+        return Ok(());
+    }
+    let part = |name: &str| given.getattr(name);
+    let (ndx, nu) = (to.ndx(), to.nu());
+    let count = within("rows.c", part("c")?.len()?, 0, LqKnot::MOST_SIZE)?;
+    let (C, D) = (part("C")?, part("D")?);
+    let (C, D) = (matrix("rows.C", &C, [count, ndx])?.to_matrix(), matrix("rows.D", &D, [count, nu])?.to_matrix());
+    let (c, lower, upper) = (part("c")?, part("lower")?, part("upper")?);
+    let c = vector("rows.c", &c, count)?;
+    let (lower, upper) = (vector("rows.lower", &lower, count)?, vector("rows.upper", &upper, count)?);
+    for i in 0..count {
+        let entries: Vec<f64> = C.row(i).iter().chain(D.row(i).iter()).copied().collect();
+        let (c, lower, upper) = (c[i], lower[i], upper[i]);
+        to.rows.push(ConstraintRow { first: 0, entries: &entries, c, lower, upper });
+    }
+    Ok(())
+}
+
+/// Converts the constraint rows of a knot to a `ConstraintRows`, or to None if it has none.
+#[allow(non_snake_case)]
+fn give_rows<'py>(py: Python<'py>, knot: &LqKnot) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let (rows, ndx, nu) = (&knot.rows, knot.ndx(), knot.nu());
+    if rows.is_empty() {
+        return Ok(None);
+    }
+    let [C, D] = rows.dense(ndx, nu);
+    let column = |of: fn(ConstraintRow<'_>) -> f64| {
+        output(py, None, &[rows.len()], |out| out.iter_mut().zip(rows.iter()).for_each(|(out, row)| *out = of(row)))
+    };
+    let given = (
+        output(py, None, &[rows.len(), ndx], |out| C.write(out))?,
+        output(py, None, &[rows.len(), nu], |out| D.write(out))?,
+        column(|row| row.c)?,
+        column(|row| row.lower)?,
+        column(|row| row.upper)?,
+    );
+    class!(py, "ConstraintRows")?.call1(given).map(Some)
+}
+
+/// Converts knots to `LqKnot`s.
+pub(super) fn give<'py>(py: Python<'py>, lq_knots: &[LqKnot]) -> PyResult<Bound<'py, PyList>> {
+    let class = class!(py, "LqKnot")?;
     let all = PyList::empty(py);
-    for node in nodes {
-        let (ndx, nu) = (node.ndx(), node.nu());
+    for knot in lq_knots {
+        let (ndx, nu) = (knot.ndx(), knot.nu());
         let matrix = |rows: usize, columns: usize, of: &nalgebra::DMatrix<f64>| {
             output(py, None, &[rows, columns], |out| of.write(out))
         };
         let vector = |of: &[f64]| output(py, None, &[of.len()], |out| out.copy_from_slice(of));
         all.append(class.call1((
-            matrix(ndx, ndx, &node.A)?,
-            matrix(ndx, nu, &node.B)?,
-            vector(node.f.as_slice())?,
-            matrix(ndx, ndx, &node.Q)?,
-            matrix(ndx, nu, &node.S)?,
-            matrix(nu, nu, &node.R)?,
-            vector(node.q.as_slice())?,
-            vector(node.r.as_slice())?,
+            matrix(ndx, ndx, &knot.A)?,
+            matrix(ndx, nu, &knot.B)?,
+            vector(knot.f.as_slice())?,
+            matrix(ndx, ndx, &knot.Q)?,
+            matrix(ndx, nu, &knot.S)?,
+            matrix(nu, nu, &knot.R)?,
+            vector(knot.q.as_slice())?,
+            vector(knot.r.as_slice())?,
+            give_rows(py, knot)?,
         ))?)?;
     }
     Ok(all)

@@ -14,7 +14,7 @@ from condyle.optimal import (
     Cost,
     FreeDynamics,
     ImpulseDynamics,
-    InverseDynamics,
+    FreeInverseDynamics,
     Problem,
     Residual,
 )
@@ -192,7 +192,7 @@ def test_quasi_static(name):
 
     same(FreeDynamics(robot.ours, DT, []), crocoddyl.DifferentialActionModelFreeFwdDynamics(state, drives, free))
     backwards = crocoddyl.DifferentialActionModelFreeInvDynamics(state, drives, nothing)
-    same(InverseDynamics(robot.ours, DT, []), backwards)
+    same(FreeInverseDynamics(robot.ours, DT, []), backwards)
     same(ContactInverseDynamics(robot.ours, {}, DT, []), backwards)
     if not kinds:
         return

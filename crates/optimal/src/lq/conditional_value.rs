@@ -30,7 +30,7 @@
 //! x and λ.
 #![allow(non_snake_case)] // the names of the literature
 
-use super::node::LqNode;
+use super::knot::LqKnot;
 use super::step::Step;
 use condyle_linalg::{
     SLACK, View, add_product_lower, add_scaled_product, copy_lower, copy_matrix, copy_symmetric, dot, eliminate,
@@ -75,8 +75,8 @@ impl SegmentValue {
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
     }
 
-    /// Computes P, p, Θ, θ and C of a segment from its nodes; returns whether all Quu were positive definite.
-    pub(crate) fn run(&mut self, step: &mut Step, nodes: &[LqNode], regularisation: f64) -> bool {
+    /// Computes P, p, Θ, θ and C of a segment from its knots; returns whether all Quu were positive definite.
+    pub(crate) fn run(&mut self, step: &mut Step, knots: &[LqKnot], regularisation: f64) -> bool {
         let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
         let work = &mut step.work;
         for zero in [&mut work.P, &mut work.p, &mut self.Theta, &mut self.theta, &mut self.C] {
@@ -85,18 +85,18 @@ impl SegmentValue {
         for j in 0..n {
             self.Theta[j * ld + j] = 1.0;
         }
-        nodes.iter().rev().all(|node| self.step(step, node, regularisation))
+        knots.iter().rev().all(|knot| self.step(step, knot, regularisation))
     }
 
     /// Makes the step of one knot; returns whether Quu was positive definite.
-    fn step(&mut self, step: &mut Step, node: &LqNode, regularisation: f64) -> bool {
-        let (n, m) = (node.ndx(), node.nu());
+    fn step(&mut self, step: &mut Step, knot: &LqKnot, regularisation: f64) -> bool {
+        let (n, m) = (knot.ndx(), knot.nu());
         let (ldt, last) = (n + SLACK, m + n);
         let Self { Theta, theta, C } = self;
-        if node.f.iter().any(|f| *f != 0.0) {
-            add_scaled_product(theta, 1.0, View::new(Theta, ldt), node.f.as_slice()); // θ + Θ f
+        if knot.f.iter().any(|f| *f != 0.0) {
+            add_scaled_product(theta, 1.0, View::new(Theta, ldt), knot.f.as_slice()); // θ + Θ f
         }
-        let (work, turn) = step.write_with_rows_below(node, regularisation, Theta);
+        let (work, turn) = step.write_with_rows_below(knot, regularisation, Theta);
         let ld = work.stride(m);
         if eliminate(&mut work.H, ld, [last + 1 + n, last, m]).is_err() {
             return false;

@@ -2,21 +2,22 @@
 
 mod box_qp;
 mod conditional_value;
+mod feedback;
 mod forms;
-mod gains;
-mod inverse_dynamics_form;
-mod node;
+mod knot;
+mod rows;
 mod segments;
 mod step;
 mod structure;
 mod sweep;
 mod workspace;
 
-pub(crate) use gains::Gains;
-pub(crate) use inverse_dynamics_form::InverseDynamicsForm;
-pub(crate) use node::DIVERGED;
-pub use node::{Hessian, LqKnot, LqNode};
+pub(crate) use feedback::Gains;
+pub use feedback::KnotFeedback;
+pub(crate) use knot::DIVERGED;
+pub use knot::{Hessian, LqKnot};
+pub use rows::{ConstraintRow, ConstraintRows};
 pub use step::SweepError;
-pub(crate) use structure::LARGEST_BLOCK;
-pub use structure::{EulerBlock, Structure};
+pub use structure::{DynamicsStructure, EulerBlock};
+pub(crate) use structure::{InverseDynamicsForm, LARGEST_BLOCK};
 pub use sweep::Sweep;

@@ -20,8 +20,10 @@
 #![allow(non_snake_case)] // the names of the literature
 
 use super::conditional_value::{Link, SegmentValue, Value};
-use super::node::{Hessian, LqKnot, LqNode};
-use super::step::{Sizes, Step, SweepError};
+use super::feedback::KnotFeedback;
+use super::forms::Sizes;
+use super::knot::LqKnot;
+use super::step::{Step, SweepError, SweepOptions};
 use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
@@ -73,38 +75,38 @@ impl Segments {
         Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(sizes.n) })
     }
 
-    /// Returns whether a segment may contain a node. It may not if controls are bounded, since the value function is
-    /// then not quadratic in a multiplier.
-    fn serve(node: &LqNode) -> bool {
-        !node.is_bounded()
+    /// Returns whether a segment may contain a knot. It may not if controls are bounded, since the value function is
+    /// then not quadratic in a multiplier. A knot with constraint rows is left to the sweep as one.
+    fn serve(knot: &LqKnot) -> bool {
+        !knot.is_bounded() && knot.rows.is_empty()
     }
 
     /// Sweeps the horizon; returns `None` if it must be swept as one.
     pub(crate) fn run(
         &mut self,
-        nodes: &[LqNode],
-        knots: &mut [LqKnot],
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
         regularisation: f64,
     ) -> Option<Result<(), SweepError>> {
-        if !nodes.iter().all(Self::serve) {
+        if !knots.iter().all(Self::serve) {
             return None;
         }
         let parallel = threads::threads() > 1;
-        self.sweep(SegmentTask { pass: Pass::Begin, nodes, regularisation, parallel }, knots)
+        self.sweep(SegmentTask { pass: Pass::Begin, knots, regularisation, parallel }, feedback)
     }
 
-    fn sweep(&mut self, begin: SegmentTask<'_>, knots: &mut [LqKnot]) -> Option<Result<(), SweepError>> {
+    fn sweep(&mut self, begin: SegmentTask<'_>, feedback: &mut [KnotFeedback]) -> Option<Result<(), SweepError>> {
         let last = self.all.len() - 1;
-        begin.over(&mut self.all[1..], knots);
+        begin.over(&mut self.all[1..], feedback);
         if self.all[last].result.is_err() {
             return Some(self.all[last].result);
         }
         if !self.link() {
             return None;
         }
-        SegmentTask { pass: Pass::Finish, ..begin }.over(&mut self.all[..last], knots);
+        SegmentTask { pass: Pass::Finish, ..begin }.over(&mut self.all[..last], feedback);
         let consistent = |pair: &[Segment]| {
-            let (end, found) = (&pair[0].end, &knots[pair[1].knots.start]);
+            let (end, found) = (&pair[0].end, &feedback[pair[1].knots.start]);
             pair[0].result.is_ok() && end.is_near(found.Vxx.as_slice(), found.Vx.as_slice())
         };
         self.all.windows(2).all(consistent).then_some(Ok(()))
@@ -152,26 +154,26 @@ enum Pass {
 #[derive(Clone, Copy)]
 struct SegmentTask<'a> {
     pass: Pass,
-    /// Nodes of the whole horizon.
-    nodes: &'a [LqNode],
+    /// Knots of the whole horizon.
+    knots: &'a [LqKnot],
     regularisation: f64,
     /// Whether threads share the segments.
     parallel: bool,
 }
 
 impl SegmentTask<'_> {
-    /// Does the task for some of the segments, given all knots.
-    fn over(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
-        self.run(segments, &mut knots[segments[0].knots.start..]);
+    /// Does the task for some of the segments, given the feedback of all knots.
+    fn over(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
+        self.run(segments, &mut feedback[segments[0].knots.start..]);
     }
 
-    /// Does the task for consecutive segments; `knots` begin with the knots of the first segment.
-    fn run(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
+    /// Does the task for consecutive segments; `feedback` begins with the first knot of the first segment.
+    fn run(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         if let [segment] = segments {
-            return self.run_one(segment, knots);
+            return self.run_one(segment, feedback);
         }
         let (some, others) = segments.split_at_mut(segments.len() / 2);
-        let (first, second) = knots.split_at_mut(others[0].knots.start - some[0].knots.start);
+        let (first, second) = feedback.split_at_mut(others[0].knots.start - some[0].knots.start);
         if self.parallel {
             threads::join(|| self.run(some, first), || self.run(others, second));
         } else {
@@ -180,21 +182,21 @@ impl SegmentTask<'_> {
         }
     }
 
-    /// Does the task for one segment, given its knots.
-    fn run_one(self, segment: &mut Segment, knots: &mut [LqKnot]) {
-        let Self { pass, nodes, regularisation, .. } = self;
+    /// Does the task for one segment, given the feedback of its knots.
+    fn run_one(self, segment: &mut Segment, feedback: &mut [KnotFeedback]) {
+        let Self { pass, knots, regularisation, .. } = self;
         let Segment { knots: range, step, value, end, result, good } = segment;
-        let (first, own) = (range.start, &nodes[range.clone()]);
-        let no_curvature = &mut |_: usize, _: &[f64], _: &mut Hessian| false;
+        let (first, own) = (range.start, &knots[range.clone()]);
+        let options = &mut SweepOptions::linear(regularisation);
         match pass {
-            Pass::Begin if range.end + 1 == nodes.len() => {
-                *result = step.run(first, &nodes[first..], knots, regularisation, no_curvature);
+            Pass::Begin if range.end + 1 == knots.len() => {
+                *result = step.run(first, &knots[first..], feedback, options);
             }
             Pass::Begin => *good = value.run(step, own, regularisation),
             Pass::Finish => {
                 step.work.P.copy_from_slice(&end.P);
                 step.work.p.copy_from_slice(&end.p);
-                *result = step.back(first, own, knots, regularisation, no_curvature);
+                *result = step.back(first, own, feedback, options);
             }
         }
     }

@@ -1,8 +1,9 @@
 //! Steps of the Riccati recursion.
 #![allow(non_snake_case)] // the names of the literature: H, L, X, Vxx
 
-use super::forms::{Controls, Curvature, Driven, Forms, InverseDynamics};
-use super::node::{Hessian, LqKnot, LqNode};
+use super::feedback::KnotFeedback;
+use super::forms::{Curvature, CurvatureFn, Forms, Sizes};
+use super::knot::{Hessian, LqKnot};
 use super::workspace::Workspace;
 
 /// Reason why a sweep stopped before the first knot.
@@ -26,32 +27,28 @@ pub enum SweepError {
         /// Index of the knot.
         knot: usize,
     },
+    /// The knot has [constraint rows](crate::LqKnot::rows), which the sweep does not treat.
+    #[error("knot {knot}: the sweep does not treat constraint rows")]
+    ConstraintRows {
+        /// Index of the knot.
+        knot: usize,
+    },
 }
 
-/// Largest numbers of states and controls of some nodes, and their requirements for inverse dynamics.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sizes {
-    /// Number of states.
-    pub(super) n: usize,
-    /// Largest number of controls.
-    pub(super) m: usize,
-    /// Requirements as returned by [`InverseDynamics::room`].
-    inverse_dynamics: [usize; 3],
+/// Options of a sweep, which hold for all of its knots.
+pub(super) struct SweepOptions<'a> {
+    /// Number that is added to the diagonals of Quu and Vxx.
+    pub(super) regularisation: f64,
+    /// Whether gains are deferred, if a form supports it: see [`Gains`](super::feedback::Gains).
+    pub(super) defers_gains: bool,
+    /// Function that computes the curvature of the dynamics; `None` if they count as linear.
+    pub(super) curvature: Option<&'a mut CurvatureFn<'a>>,
 }
 
-impl Sizes {
-    /// Returns the sizes of some nodes.
-    pub(super) fn of(nodes: &[LqNode]) -> Self {
-        Self {
-            n: nodes.last().map_or(0, LqNode::ndx),
-            m: nodes.iter().map(LqNode::nu).max().unwrap_or(0),
-            inverse_dynamics: InverseDynamics::room(nodes),
-        }
-    }
-
-    /// Returns the maximum number of controls of knots in inverse-dynamics form: 0 without such knots.
-    pub(super) fn solved_controls(self) -> usize {
-        if self.inverse_dynamics[0] > 0 { self.m } else { 0 }
+impl SweepOptions<'_> {
+    /// Returns the options for linear dynamics, with gains that are written at once.
+    pub(super) fn linear(regularisation: f64) -> Self {
+        Self { regularisation, defers_gains: false, curvature: None }
     }
 }
 
@@ -59,61 +56,54 @@ impl Sizes {
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
     pub(super) work: Workspace,
-    /// Whether Vxx is written to the knots.
+    /// Whether Vxx is written to the feedback.
     pub(super) keep: bool,
-    /// Whether gains are deferred, if a form supports it: see [`Gains`](super::gains::Gains).
-    pub(super) puts_off: bool,
     forms: Forms,
-    controls: Controls,
-    /// Curvature of the dynamics, one entry for each number of controls that occurs at nodes with curvature.
+    /// Curvature of the dynamics, one entry for each number of controls that occurs at knots with curvature.
     hessians: Vec<Hessian>,
 }
 
 impl Step {
-    /// Allocates the workspace for nodes of the given sizes, with `below` additional rows in H. The dynamics may be
-    /// curved at nodes whose number of controls is in `curved`.
+    /// Allocates the workspace for knots of the given sizes, with `below` additional rows in H. The dynamics may be
+    /// curved at knots whose number of controls is in `curved`.
     pub(super) fn new(sizes: Sizes, below: usize, mut curved: Vec<usize>) -> Self {
-        let Sizes { n, m, inverse_dynamics } = sizes;
         curved.sort_unstable();
         curved.dedup();
         Self {
-            work: Workspace::new(n, m, below.max(Driven::rows_below(n, m))),
+            work: Workspace::new(sizes.n, sizes.m, below.max(sizes.rows_below())),
             keep: true,
-            puts_off: false,
-            forms: Forms::new(n, sizes.solved_controls(), inverse_dynamics),
-            controls: Controls::new(m),
-            hessians: curved.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
+            forms: Forms::new(sizes),
+            hessians: curved.into_iter().map(|nu| Hessian::zeros(sizes.n, nu)).collect(),
         }
     }
 
-    /// Sweeps the end of a horizon. The first node is knot `first`, and the last node is the terminal one.
-    pub(crate) fn run(
+    /// Sweeps the end of a horizon. The first knot is knot `first`, and the last knot is the terminal one.
+    pub(super) fn run(
         &mut self,
         first: usize,
-        nodes: &[LqNode],
-        knots: &mut [LqKnot],
-        regularisation: f64,
-        curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
+        options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
-        let last = nodes.len() - 1;
-        self.work.start(&nodes[last]);
-        self.finish(first + last, &mut knots[last], regularisation)?;
-        self.back(first, &nodes[..last], knots, regularisation, curvature)
+        let last = knots.len() - 1;
+        check_rows(first + last, &knots[last])?;
+        self.work.start(&knots[last]);
+        self.finish(first + last, &mut feedback[last], options.regularisation)?;
+        self.back(first, &knots[..last], feedback, options)
     }
 
-    /// Makes the steps at `nodes`, whose first is knot `first`, from P, p of the knot after them.
-    pub(crate) fn back(
+    /// Makes the steps at `knots`, whose first is knot `first`, from P, p of the knot after them.
+    pub(super) fn back(
         &mut self,
         first: usize,
-        nodes: &[LqNode],
-        knots: &mut [LqKnot],
-        regularisation: f64,
-        curvature: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
+        options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
-        for i in (0..nodes.len()).rev() {
-            let (t, knot) = (first + i, &mut knots[i]);
-            self.step(t, &nodes[i], knot, regularisation, curvature)?;
-            self.finish(t, knot, regularisation)?;
+        for (i, (knot, feedback)) in knots.iter().zip(feedback).enumerate().rev() {
+            check_rows(first + i, knot)?;
+            self.step(first + i, knot, feedback, options)?;
+            self.finish(first + i, feedback, options.regularisation)?;
         }
         Ok(())
     }
@@ -122,54 +112,52 @@ impl Step {
     fn step(
         &mut self,
         t: usize,
-        node: &LqNode,
-        knot: &mut LqKnot,
-        regularisation: f64,
-        ask: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+        options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
-        let Self { work, forms, controls, hessians, puts_off, .. } = self;
-        let form = forms.of_step(node, regularisation);
-        work.move_by(node.f.as_slice());
-        form.write(work, node, regularisation, &mut Curvature { knot: t, ask, hessians });
-        let eliminated =
-            form.eliminate(work, controls, node, knot).map_err(|(row, pivot)| match pivot.is_finite() {
-                true => SweepError::NotPositive { knot: t, row, pivot },
-                false => SweepError::NotFinite { knot: t },
-            })?;
-        work.take_value(work.stride(node.nu()), eliminated, form.turn(node.ndx()));
-        knot.is_put_off = *puts_off && node.nu() > 0 && form.put_off_gains(work, node, knot);
-        if !knot.is_put_off {
-            form.recover_gains(work, controls, node, knot);
-        }
+        let Self { work, forms, hessians, .. } = self;
+        let SweepOptions { regularisation, defers_gains, .. } = *options;
+        let form = forms.of_step(knot, regularisation);
+        work.move_by(knot.f.as_slice());
+        let ask = options.curvature.as_mut().map(|ask| &mut **ask as &mut CurvatureFn<'_>);
+        form.write(work, knot, regularisation, &mut Curvature { knot: t, ask, hessians });
+        let eliminated = form.eliminate(work, knot, feedback).map_err(|(row, pivot)| match pivot.is_finite() {
+            true => SweepError::NotPositive { knot: t, row, pivot },
+            false => SweepError::NotFinite { knot: t },
+        })?;
+        work.take_value(work.stride(knot.nu()), eliminated, form.turn(knot.ndx()));
+        feedback.gains_deferred = false;
+        form.write_gains(work, knot, feedback, defers_gains);
         Ok(())
     }
 
-    /// Writes H of a node, and below it the product of Θ and the map to δx⁺. Returns the workspace that contains it,
+    /// Writes H of a knot, and below it the product of Θ and the map to δx⁺. Returns the workspace that contains it,
     /// and the rotation of the states there.
     pub(super) fn write_with_rows_below(
         &mut self,
-        node: &LqNode,
+        knot: &LqKnot,
         regularisation: f64,
         Theta: &[f64],
     ) -> (&mut Workspace, usize) {
         let Self { work, forms, .. } = self;
-        let form = forms.of(node);
-        work.move_by(node.f.as_slice());
-        form.write(
-            work,
-            node,
-            regularisation,
-            &mut Curvature { knot: 0, ask: &mut |_, _, _| false, hessians: &mut [] },
-        );
-        form.write_below(work, node, Theta);
-        (work, form.turn(node.ndx()))
+        let form = forms.of(knot);
+        work.move_by(knot.f.as_slice());
+        form.write(work, knot, regularisation, &mut Curvature { knot: 0, ask: None, hessians: &mut [] });
+        form.write_below(work, knot, Theta);
+        (work, form.turn(knot.ndx()))
     }
 
-    /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to knot t.
-    fn finish(&mut self, t: usize, knot: &mut LqKnot, regularisation: f64) -> Result<(), SweepError> {
-        match self.work.finish_value(knot, regularisation, self.keep) {
+    /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to the feedback of knot t.
+    fn finish(&mut self, t: usize, feedback: &mut KnotFeedback, regularisation: f64) -> Result<(), SweepError> {
+        match self.work.finish_value(feedback, regularisation, self.keep) {
             true => Ok(()),
             false => Err(SweepError::NotFinite { knot: t }),
         }
     }
+}
+
+/// Returns an error if knot t has constraint rows, which the recursion does not treat.
+fn check_rows(t: usize, knot: &LqKnot) -> Result<(), SweepError> {
+    if knot.rows.is_empty() { Ok(()) } else { Err(SweepError::ConstraintRows { knot: t }) }
 }

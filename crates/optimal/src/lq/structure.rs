@@ -1,13 +1,14 @@
-//! Structure of a knot's A and B, which a sweep may exploit.
+//! Structure of a knot's dynamics, which a sweep may exploit: blocks of A and B, or equations instead of them.
 #![allow(non_snake_case)] // A, B, T, E
 
+use condyle_linalg::{SLACK, SparseRows};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
 /// Maximum number of rows of a block, needed by a free joint.
 pub(crate) const LARGEST_BLOCK: usize = 6;
 
-/// Structure of the A and B of an [`LqNode`](crate::LqNode).
+/// Structure of the A and B of an [`LqKnot`](crate::LqKnot).
 ///
 /// The structure is unknown unless the action sets it, each time that it differentiates. Let x = (q, v), with nv
 /// numbers each for a change of q and of v. The next state follows by semi-implicit Euler from an acceleration a(x, u):
@@ -25,22 +26,24 @@ pub(crate) const LARGEST_BLOCK: usize = 6;
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::LqNode;
+/// use condyle_optimal::LqKnot;
 ///
 /// // One joint: v⁺ = v + 0.1 (u − q), q⁺ = q + 0.1 v⁺.
-/// let mut node = LqNode::zeros(2, 1);
-/// node.A.copy_from_slice(&[0.99, -0.1, 0.1, 1.0]); // column after column
-/// node.B.copy_from_slice(&[0.01, 0.1]);
-/// node.structure.set_euler(0.1, &[]);
+/// let mut knot = LqKnot::zeros(2, 1);
+/// knot.A.copy_from_slice(&[0.99, -0.1, 0.1, 1.0]); // column after column
+/// knot.B.copy_from_slice(&[0.01, 0.1]);
+/// knot.structure.set_euler(0.1, &[]);
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Structure {
+pub struct DynamicsStructure {
     /// Δt, if the structure is known.
     dt: Option<f64>,
     blocks: Vec<EulerBlock>,
+    /// Whether the knot is given as equations of inverse dynamics instead of A and B.
+    inverse_dynamics: bool,
 }
 
-/// Blocks of T and E of one joint; see [`Structure`].
+/// Blocks of T and E of one joint; see [`DynamicsStructure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EulerBlock {
     /// First row and column of the block.
@@ -51,10 +54,20 @@ pub struct EulerBlock {
     pub E: DMatrix<f64>,
 }
 
-impl Structure {
+impl DynamicsStructure {
     /// Sets the structure to unknown. Keeps the memory of blocks.
     pub fn set_dense(&mut self) {
-        self.dt = None;
+        (self.dt, self.inverse_dynamics) = (None, false);
+    }
+
+    /// Marks the knot as given by equations of inverse dynamics, until the structure is unknown again.
+    pub(crate) fn set_inverse_dynamics(&mut self) {
+        self.inverse_dynamics = true;
+    }
+
+    /// Returns whether the knot is given by equations of inverse dynamics.
+    pub(crate) fn is_inverse_dynamics(&self) -> bool {
+        self.inverse_dynamics
     }
 
     /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for a block
@@ -83,5 +96,68 @@ impl EulerBlock {
     /// Returns the rows and columns of the block.
     pub(crate) fn range(&self) -> Range<usize> {
         self.start..self.start + self.T.nrows()
+    }
+}
+
+/// Rows of a knot over (w, δv, δq); see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the block of
+/// `Q` for δq are taken from the knot; its `A`, `B`, `S` and `R` are not used.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct InverseDynamicsForm {
+    /// Distance between consecutive rows, the same for all rows.
+    pub(crate) stride: usize,
+    /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, and the number of both.
+    pub(crate) own: Vec<[usize; 3]>,
+    /// Other coordinates, in ascending order.
+    pub(crate) dependent: Vec<usize>,
+    /// U: δu = U (w, δv, δq). Its masks are not written, because not every form reads them.
+    pub(crate) efforts: SparseRows,
+    /// D, one row for each dependent coordinate.
+    pub(crate) steps: SparseRows,
+    /// G: the gradients of residuals that depend on more than δq.
+    pub(crate) costs: SparseRows,
+    /// a′ and a″, first and second derivative of the cost with respect to each of these residuals.
+    pub(crate) slopes: Vec<[f64; 2]>,
+    /// Diagonals of Q for δv and of R, one after the other.
+    pub(crate) diagonal: Vec<f64>,
+}
+
+impl InverseDynamicsForm {
+    /// Allocates the form for a knot of nv coordinates and nu controls, with a maximum number of dependent coordinates
+    /// and of rows of costs.
+    pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
+        self.stride = nu + 2 * nv + SLACK;
+        self.own.reserve(nv);
+        self.dependent.reserve(dependent);
+        self.slopes.reserve(costs);
+        self.diagonal.resize(nv + nu, 0.0);
+        for (rows, most) in [(&mut self.efforts, nu), (&mut self.steps, dependent), (&mut self.costs, costs)] {
+            rows.resize(most, self.stride);
+        }
+    }
+
+    /// Takes U and D out while G is being written.
+    pub(crate) fn lend(&mut self) -> Self {
+        let stride = self.stride;
+        let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
+        let diagonal = core::mem::take(&mut self.diagonal);
+        core::mem::replace(self, Self { stride, costs, slopes, diagonal, ..Self::default() })
+    }
+
+    /// Puts back the parts that [`lend`](Self::lend) took out.
+    pub(crate) fn take_back(&mut self, lent: Self) {
+        let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
+        let diagonal = core::mem::take(&mut self.diagonal);
+        *self = Self { costs, slopes, diagonal, ..lent };
+    }
+
+    /// Copies G.
+    pub(crate) fn set_costs(&mut self, rows: &[f64], slopes: &[[f64; 2]]) {
+        self.costs.resize(slopes.len(), self.stride);
+        for (to, from) in self.costs.numbers.chunks_exact_mut(self.stride).zip(rows.chunks_exact(self.stride)) {
+            to[..self.stride - SLACK].copy_from_slice(&from[..self.stride - SLACK]);
+        }
+        self.slopes.clear();
+        self.slopes.extend_from_slice(slopes);
+        self.costs.mark(self.stride);
     }
 }

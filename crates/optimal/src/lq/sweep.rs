@@ -1,10 +1,11 @@
 //! Backward sweep that solves a linear-quadratic problem.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
-use super::gains::Gains;
-use super::node::{Hessian, LqKnot, LqNode};
+use super::feedback::{Gains, KnotFeedback};
+use super::forms::Sizes;
+use super::knot::{Hessian, LqKnot};
 use super::segments::Segments;
-use super::step::{Sizes, Step, SweepError};
+use super::step::{Step, SweepError, SweepOptions};
 use crate::error::assert_length;
 use condyle_dynamics::level::level;
 
@@ -26,8 +27,9 @@ use condyle_dynamics::level::level;
 /// A regularisation ϱ ≥ 0 is added to the diagonals of Quu (before it is factorised) and of Vxx (before the previous
 /// knot uses it), as in Crocoddyl.
 ///
-/// A knot whose A and B have the structure of semi-implicit Euler ([`Structure`](crate::Structure)) takes half the
-/// operations. With N = (Δt EᵀP₁₁ + P₂₁) T and Π = Δt²EᵀP₁₁E + Δt (EᵀP₁₂ + P₂₁E) + P₂₂, and A_v = [F_q F_v], B_v = G,
+/// A knot whose A and B have the structure of semi-implicit Euler ([`DynamicsStructure`](crate::DynamicsStructure))
+/// takes half the operations. With N = (Δt EᵀP₁₁ + P₂₁) T, Π = Δt²EᵀP₁₁E + Δt (EᵀP₁₂ + P₂₁E) + P₂₂, and A_v = [F_q
+/// F_v], B_v = G,
 ///
 /// ```text
 /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   H += W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T
@@ -46,50 +48,50 @@ use condyle_dynamics::level::level;
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{LqNode, Sweep};
+/// use condyle_optimal::{LqKnot, Sweep};
 ///
 /// // Minimise ½ δu² + δx₁²  with  δx₁ = δx₀ + δu:   δu = −⅔ δx₀,   V₀ = ⅓ δx₀².
-/// let mut nodes = [LqNode::zeros(1, 1), LqNode::zeros(1, 0)];
-/// (nodes[0].A[0], nodes[0].B[0], nodes[0].R[0], nodes[1].Q[0]) = (1.0, 1.0, 1.0, 2.0);
+/// let mut knots = [LqKnot::zeros(1, 1), LqKnot::zeros(1, 0)];
+/// (knots[0].A[0], knots[0].B[0], knots[0].R[0], knots[1].Q[0]) = (1.0, 1.0, 1.0, 2.0);
 ///
-/// let mut sweep = Sweep::new(&nodes);
-/// sweep.run(&nodes, 0.0)?;
-/// assert!((sweep.knots()[0].K[0] + 2.0 / 3.0).abs() < 1e-15);
-/// assert!((sweep.knots()[0].Vxx[0] - 2.0 / 3.0).abs() < 1e-15);
+/// let mut sweep = Sweep::new(&knots);
+/// sweep.run(&knots, 0.0)?;
+/// assert!((sweep.feedback()[0].K[0] + 2.0 / 3.0).abs() < 1e-15);
+/// assert!((sweep.feedback()[0].Vxx[0] - 2.0 / 3.0).abs() < 1e-15);
 /// # Ok::<(), condyle_optimal::SweepError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Sweep {
-    knots: Vec<LqKnot>,
+    feedback: Vec<KnotFeedback>,
     step: Step,
     /// Number of segments that was requested, and their workspaces, unless the number is one.
     at_once: usize,
     segments: Option<Segments>,
-    /// Scratch for the gains; see [`parts`](Self::parts).
+    /// Scratch for deferred gains, one for each thread: see [`follow`](Self::follow).
     gains: Vec<Gains>,
     sizes: Sizes,
 }
 
 impl Sweep {
-    /// Allocates a workspace for problems with the dimensions of `nodes`, whose last is the terminal one.
+    /// Allocates a workspace for problems with the dimensions of `knots`, whose last is the terminal one.
     ///
     /// # Panics
-    /// If `nodes` is empty, the shapes of a node do not fit each other, ndx differs from node to node, or the terminal
-    /// node has controls.
+    /// If `knots` is empty, the shapes of a knot do not fit each other, ndx differs from knot to knot, or the terminal
+    /// knot has controls.
     #[track_caller]
-    pub fn new(nodes: &[LqNode]) -> Self {
+    pub fn new(knots: &[LqKnot]) -> Self {
         level(); // selected now, because reading CONDYLE_LEVEL allocates
-        assert!(!nodes.is_empty(), "`nodes` is empty, expected at least the terminal node");
-        let terminal = &nodes[nodes.len() - 1];
+        assert!(!knots.is_empty(), "`knots` is empty, expected at least the terminal knot");
+        let terminal = &knots[knots.len() - 1];
         let n = terminal.ndx();
-        assert_length("r of the terminal node", terminal.nu(), 0);
-        for node in nodes {
-            node.assert_shapes(n, node.nu());
+        assert_length("r of the terminal knot", terminal.nu(), 0);
+        for knot in knots {
+            knot.assert_shapes(n, knot.nu());
         }
-        let knots = nodes.iter().map(|node| LqKnot::zeros(n, node.nu())).collect();
-        let sizes = Sizes::of(nodes);
-        let step = Step::new(sizes, 0, nodes.iter().map(LqNode::nu).collect());
-        Self { knots, step, at_once: 1, segments: None, gains: Vec::new(), sizes }
+        let feedback = knots.iter().map(|knot| KnotFeedback::zeros(n, knot.nu())).collect();
+        let sizes = Sizes::of(knots);
+        let step = Step::new(sizes, 0, knots.iter().map(LqKnot::nu).collect());
+        Self { feedback, step, at_once: 1, segments: None, gains: Vec::new(), sizes }
     }
 
     /// Sets the number of segments of the horizon that [`run`](Self::run) processes at the same time. It uses the
@@ -118,15 +120,15 @@ impl Sweep {
     pub fn set_segments(&mut self, segments: usize) {
         assert!(segments > 0, "`segments` is 0, expected at least 1");
         if segments != self.at_once {
-            self.segments = Segments::new(segments, self.knots.len() - 1, self.sizes);
+            self.segments = Segments::new(segments, self.feedback.len() - 1, self.sizes);
             self.at_once = segments;
         }
     }
 
     /// Resets the sweep, so that the next run starts as if it were the first.
     pub(crate) fn forget(&mut self) {
-        for knot in &mut self.knots {
-            knot.k.fill(0.0);
+        for feedback in &mut self.feedback {
+            feedback.k.fill(0.0);
         }
     }
 
@@ -137,25 +139,26 @@ impl Sweep {
 
     /// Returns the feedback and value function of each knot, as computed by the last [`run`](Self::run). The terminal
     /// knot has no controls.
-    pub fn knots(&self) -> &[LqKnot] {
-        &self.knots
+    pub fn feedback(&self) -> &[KnotFeedback] {
+        &self.feedback
     }
 
-    /// Sweeps from the terminal node back to the first, with `regularisation` added to the diagonals of Quu and Vxx.
+    /// Sweeps from the terminal knot back to the first, with `regularisation` added to the diagonals of Quu and Vxx.
     ///
     /// # Errors
-    /// [`SweepError`] if a Quu is not positive definite or the value function is not finite. The knots before the
-    /// failing one then keep their old values; with several segments, some of them may have new values.
+    /// [`SweepError`] if a Quu is not positive definite, the value function is not finite, or a knot has constraint
+    /// rows. The knots before the failing one then keep their old values; with several segments, some of them may have
+    /// new values.
     ///
     /// # Panics
-    /// If the shapes of `nodes` differ from the shapes given to [`new`](Self::new).
+    /// If the shapes of `knots` differ from the shapes given to [`new`](Self::new).
     #[track_caller]
-    pub fn run(&mut self, nodes: &[LqNode], regularisation: f64) -> Result<(), SweepError> {
-        self.check(nodes);
-        let Self { segments, knots, .. } = self;
-        match segments.as_mut().and_then(|segments| segments.run(nodes, knots, regularisation)) {
+    pub fn run(&mut self, knots: &[LqKnot], regularisation: f64) -> Result<(), SweepError> {
+        self.check(knots);
+        let Self { segments, feedback, step, .. } = self;
+        match segments.as_mut().and_then(|segments| segments.run(knots, feedback, regularisation)) {
             Some(result) => result,
-            None => self.run_with(nodes, regularisation, |_, _, _| false),
+            None => step.run(0, knots, feedback, &mut SweepOptions::linear(regularisation)),
         }
     }
 
@@ -171,13 +174,13 @@ impl Sweep {
     #[track_caller]
     pub fn run_with(
         &mut self,
-        nodes: &[LqNode],
+        knots: &[LqKnot],
         regularisation: f64,
         mut curvature: impl FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
-        self.check(nodes);
-        self.step.puts_off = false;
-        self.step.run(0, nodes, &mut self.knots, regularisation, &mut curvature)
+        self.check(knots);
+        let mut options = SweepOptions { curvature: Some(&mut curvature), ..SweepOptions::linear(regularisation) };
+        self.step.run(0, knots, &mut self.feedback, &mut options)
     }
 
     /// Returns whether the sweep can proceed from knot to knot while they are computed; it cannot if it is cut into
@@ -186,20 +189,46 @@ impl Sweep {
         self.segments.is_none()
     }
 
-    /// Returns the parts of a sequential sweep: its steps, the knots that they write, and scratch for `threads` threads
-    /// that write deferred gains. The first step is [`Step::run`] at the terminal node, the others are [`Step::back`].
-    pub(crate) fn parts(&mut self, threads: usize) -> (&mut Step, &mut [LqKnot], &mut [Gains]) {
-        let Self { knots, step, gains, sizes, .. } = self;
-        gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.solved_controls()));
-        step.puts_off = true;
-        (step, knots, gains)
+    /// Begins a sweep that receives the knots while they are computed, and defers their gains. Returns it, the feedback
+    /// that it writes, and scratch for `threads` threads that compute deferred gains.
+    pub(crate) fn follow(&mut self, threads: usize) -> (FollowingSweep<'_>, &mut [KnotFeedback], &mut [Gains]) {
+        let Self { feedback, step, gains, sizes, .. } = self;
+        gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.deferred_controls()));
+        (FollowingSweep { step, is_at_end: true }, feedback, gains)
     }
 
     #[track_caller]
-    fn check(&self, nodes: &[LqNode]) {
-        assert_length("nodes", nodes.len(), self.knots.len());
-        for (node, knot) in nodes.iter().zip(&self.knots) {
-            node.assert_shapes(self.sizes.n, knot.k.len());
+    fn check(&self, knots: &[LqKnot]) {
+        assert_length("knots", knots.len(), self.feedback.len());
+        for (knot, feedback) in knots.iter().zip(&self.feedback) {
+            knot.assert_shapes(self.sizes.n, feedback.k.len());
+        }
+    }
+}
+
+/// Sweep that receives the knots in groups, from the last to the first.
+pub(crate) struct FollowingSweep<'a> {
+    step: &'a mut Step,
+    /// Whether the next group ends with the terminal knot.
+    is_at_end: bool,
+}
+
+impl FollowingSweep<'_> {
+    /// Sweeps the next group of knots, whose first is knot `first`. The first group ends with the terminal knot.
+    ///
+    /// # Errors
+    /// As [`Sweep::run`]. The sweep is then over.
+    pub(crate) fn run(
+        &mut self,
+        first: usize,
+        knots: &[LqKnot],
+        feedback: &mut [KnotFeedback],
+        regularisation: f64,
+    ) -> Result<(), SweepError> {
+        let options = &mut SweepOptions { defers_gains: true, ..SweepOptions::linear(regularisation) };
+        match std::mem::replace(&mut self.is_at_end, false) {
+            true => self.step.run(first, knots, feedback, options),
+            false => self.step.back(first, knots, feedback, options),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Workspace of a step of the sweep.
 #![allow(non_snake_case)] // the names of the literature: P, F, W, H
 
-use super::node::{DIVERGED, LqKnot, LqNode};
+use super::feedback::KnotFeedback;
+use super::knot::{DIVERGED, LqKnot};
 use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric_turned, copy_with_squares};
 
 /// Value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step computes from it. Matrices
@@ -43,10 +44,10 @@ impl Workspace {
     }
 
     /// Sets P, p = Q, q of the terminal knot.
-    pub(crate) fn start(&mut self, node: &LqNode) {
-        let n = node.ndx();
-        self.p.copy_from_slice(node.q.as_slice());
-        copy_matrix(&mut self.P, n + SLACK, View::new(node.Q.as_slice(), n), [n, n]);
+    pub(crate) fn start(&mut self, knot: &LqKnot) {
+        let n = knot.ndx();
+        self.p.copy_from_slice(knot.q.as_slice());
+        copy_matrix(&mut self.P, n + SLACK, View::new(knot.Q.as_slice(), n), [n, n]);
     }
 
     /// Adds P f to p, which becomes the gradient at the predicted state.
@@ -73,15 +74,15 @@ impl Workspace {
         }
     }
 
-    /// Adds ϱ 1 to P. Writes p to the knot, and P if `keep` is set. Returns whether they are finite and have not
+    /// Adds ϱ 1 to P. Writes p to the feedback, and P if `keep` is set. Returns whether they are finite and have not
     /// diverged.
-    pub(crate) fn finish_value(&mut self, knot: &mut LqKnot, regularisation: f64, keep: bool) -> bool {
+    pub(crate) fn finish_value(&mut self, feedback: &mut KnotFeedback, regularisation: f64, keep: bool) -> bool {
         let Self { P, p, .. } = self;
         let (n, stride) = (p.len(), p.len() + SLACK);
         for j in 0..n {
             P[j * stride + j] += regularisation;
         }
-        let (Vx, Vxx) = (knot.Vx.as_mut_slice(), if keep { knot.Vxx.as_mut_slice() } else { &mut [] });
+        let (Vx, Vxx) = (feedback.Vx.as_mut_slice(), if keep { feedback.Vxx.as_mut_slice() } else { &mut [] });
         let squares = copy_with_squares(Vxx, n, View::new(P, stride), [n, n]);
         let squares = squares + copy_with_squares(Vx, n, View::new(p, n), [n, 1]);
         squares < DIVERGED * DIVERGED // false for NaN

@@ -3,7 +3,7 @@
 use super::action::ActionModel;
 use super::action::differences::write_curvature;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 use condyle_spatial::Scalar;
 use num_dual::HyperDual64;
 use std::any::Any;
@@ -28,8 +28,8 @@ pub trait GenericAction: Any + Send + Sync {
         None
     }
 
-    /// Returns a copy that computes the same, as [`ActionModel::fork`] does; `None` by default.
-    fn fork(&self) -> Option<Self>
+    /// Returns a copy that computes the same, as [`ActionModel::try_clone`] does; `None` by default.
+    fn try_clone(&self) -> Option<Self>
     where
         Self: Sized,
     {
@@ -69,7 +69,7 @@ pub trait GenericAction: Any + Send + Sync {
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, AutoDiff, GenericAction, LqNode};
+/// use condyle_optimal::{ActionModel, AutoDiff, GenericAction, LqKnot};
 /// use condyle_spatial::Scalar;
 ///
 /// struct Pendulum;
@@ -85,10 +85,10 @@ pub trait GenericAction: Any + Send + Sync {
 ///     }
 /// }
 ///
-/// let mut node = LqNode::zeros(2, 1);
-/// AutoDiff::new(Pendulum).calc_diff(0, &[0.3, 0.0], &[0.0], &mut node);
-/// assert!((node.A[(1, 0)] + 0.1 * 0.3_f64.cos()).abs() < 1e-15);
-/// assert!((node.Q[(0, 0)] - 0.3_f64.cos()).abs() < 1e-15);
+/// let mut knot = LqKnot::zeros(2, 1);
+/// AutoDiff::new(Pendulum).calc_diff(0, &[0.3, 0.0], &[0.0], &mut knot);
+/// assert!((knot.A[(1, 0)] + 0.1 * 0.3_f64.cos()).abs() < 1e-15);
+/// assert!((knot.Q[(0, 0)] - 0.3_f64.cos()).abs() < 1e-15);
 /// ```
 #[derive(Debug, Clone)]
 pub struct AutoDiff<A> {
@@ -181,8 +181,8 @@ impl<A: GenericAction> ActionModel for AutoDiff<A> {
         self.action.bounds(t)
     }
 
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        Some(Box::new(Self::new(self.action.fork()?)))
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
+        Some(Box::new(Self::new(self.action.try_clone()?)))
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
@@ -190,18 +190,18 @@ impl<A: GenericAction> ActionModel for AutoDiff<A> {
     }
 
     #[track_caller]
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let (ndx, n) = (self.dx.len(), self.dx.len() + self.u.len());
         self.start(t, x, u);
         for i in 0..n {
             for j in 0..=i {
                 let cost = self.along(t, i, j);
-                write_curvature([&mut node.Q, &mut node.S, &mut node.R], ndx, (i, j), cost.eps1eps2);
+                write_curvature([&mut knot.Q, &mut knot.S, &mut knot.R], ndx, (i, j), cost.eps1eps2);
                 if j == i {
                     let (gradient, slopes) = if i < ndx {
-                        (&mut node.q[i], node.A.column_mut(i))
+                        (&mut knot.q[i], knot.A.column_mut(i))
                     } else {
-                        (&mut node.r[i - ndx], node.B.column_mut(i - ndx))
+                        (&mut knot.r[i - ndx], knot.B.column_mut(i - ndx))
                     };
                     *gradient = cost.eps1;
                     slopes.into_iter().zip(&self.change).for_each(|(to, change)| *to = change.eps1);

@@ -1,12 +1,13 @@
 //! Optimal control problem over a horizon of knots.
 
 use super::action::ActionModel;
-use super::actors::{Actions, Actors};
-use super::models::{Models, check};
+use super::action_view::{ActionView, Actions};
+use super::group::{Evaluation, Results, evaluate, innermost};
+use super::models::{Models, check, reserve};
 use super::shape::Shape;
 use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
-use crate::lq::{Gains, LqKnot, LqNode};
+use crate::lq::{Gains, KnotFeedback, LqKnot};
 use std::any::Any;
 use std::ops::{ControlFlow, Range};
 
@@ -26,7 +27,7 @@ use std::ops::{ControlFlow, Range};
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, LqNode, Problem};
+/// use condyle_optimal::{ActionModel, LqKnot, Problem};
 ///
 /// /// x⁺ = x + u, ℓ = ½ (x² + u²); as a terminal action (nu = 0): ℓ = ½ x².
 /// struct Integrator { nu: usize }
@@ -38,12 +39,12 @@ use std::ops::{ControlFlow, Range};
 ///         next[0] = x[0] + u;
 ///         0.5 * (x[0] * x[0] + u * u)
 ///     }
-///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-///         (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[0]);
-///         node.B.fill(1.0);
-///         node.S.fill(0.0);
-///         node.R.fill(1.0);
-///         node.r.copy_from_slice(u);
+///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+///         (knot.A[0], knot.Q[0], knot.q[0]) = (1.0, 1.0, x[0]);
+///         knot.B.fill(1.0);
+///         knot.S.fill(0.0);
+///         knot.R.fill(1.0);
+///         knot.r.copy_from_slice(u);
 ///     }
 /// }
 ///
@@ -55,7 +56,7 @@ use std::ops::{ControlFlow, Range};
 pub struct Problem {
     x0: Vec<f64>,
     models: Models,
-    stages: Vec<usize>,
+    knot_models: Vec<usize>,
     terminal: Box<dyn ActionModel>,
     shape: Shape,
     /// Maximal runs of knots with one action: (action, knots).
@@ -69,45 +70,47 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Creates a problem that starts at x̂₀. Knot t is served by `models[stages[t]]`, t = 0 … N − 1, and the end by
+    /// Creates a problem that starts at x̂₀. Knot t is served by `models[knot_models[t]]`, t = 0 … N − 1, and the end by
     /// `terminal`.
     ///
     /// # Errors
     /// [`Error`] if
     /// - the horizon or the state is empty, an index has no model, or nx or ndx differ,
-    /// - the terminal model has controls, or a model that has [no next state](ActionModel::is_end) serves a knot,
+    /// - the terminal model has controls, or a model that has [no next state](ActionModel::is_terminal) serves a knot,
     /// - x̂₀ has a wrong length, has an entry that is not finite, or is an invalid state,
     /// - a state or the controls of a knot have more than 4096 entries, or
     /// - there are more than 2²⁰ knots, or 2²⁸ numbers in the matrices \[A B\] of all knots.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
-        stages: Vec<usize>,
+        knot_models: Vec<usize>,
         mut terminal: Box<dyn ActionModel>,
     ) -> Result<Self, Error> {
-        let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
-        check(&models, &stages, &*terminal)?;
+        let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), knot_models.len());
+        check(&models, &knot_models, &*terminal)?;
         Error::check("x0", &x0, nx)?;
         terminal.check_state(&x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
         let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
-        terminal.reserve();
-        let mut problem = Self { x0, models, stages, terminal, shape, runs, knots, copies, unread };
+        reserve(&mut *terminal);
+        let mut problem = Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread };
         problem.arrange();
         Ok(problem)
     }
 
-    /// Computes the offsets of the controls and the runs of knots from the stages.
+    /// Computes the offsets of the controls and the runs of knots from the knot_models.
     fn arrange(&mut self) {
-        let Self { models, stages, shape: Shape { offsets, .. }, runs, copies, .. } = self;
+        let Self { models, knot_models, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
         offsets.clear();
         offsets.push(0);
-        for (knot, &index) in stages.iter().enumerate() {
+        for (knot, &index) in knot_models.iter().enumerate() {
             let [action, own] = models.place(index);
-            models.actions[action].serve(knot, stages.len(), own);
-            copies.serve(action, knot, stages.len(), own);
+            if let Some(group) = models.actions[action].knot_group_mut() {
+                group.serve(knot, knot_models.len(), own);
+            }
+            copies.serve(action, knot, knot_models.len(), own);
             offsets.push(offsets[knot] + models.actions[action].nu());
             match runs.last_mut() {
                 Some((last, knots)) if *last == action => knots.end = knot + 1,
@@ -131,25 +134,81 @@ impl Problem {
         if last >= self.models.len() {
             return Err(Error::UnknownModel { knot: horizon - 1, index: last, models: self.models.len() });
         }
-        if self.models.of(last).is_end() {
+        if self.models.of(last).is_terminal() {
             return Err(Error::NoNextState { knot: horizon - 1, index: last });
         }
-        self.stages.rotate_left(1);
-        self.stages[horizon - 1] = last;
+        self.knot_models.rotate_left(1);
+        self.knot_models[horizon - 1] = last;
         self.models.actions.iter_mut().for_each(|action| action.shift());
         self.copies.shift();
         self.arrange();
         Ok(())
     }
 
-    /// Returns the index of the model of each knot.
-    pub fn stages(&self) -> &[usize] {
-        &self.stages
+    /// Replaces the model of knot t, as an MPC does when a contact is made earlier than planned. The solver needs no other
+    /// changes, and its next iterations do not allocate. This function allocates; a model that was given to knot t in the
+    /// same way before is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
+    ///
+    /// Costs and limits that the model has for a single knot count for that index.
+    ///
+    /// # Errors
+    /// [`Error::Dimension`] if nx, ndx or nu differ from those of the old model, [`Error::NoNextState`] for a terminal
+    /// model; the problem is then unchanged.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn set_knot(&mut self, t: usize, model: Box<dyn ActionModel>) -> Result<(), Error> {
+        self.assert_running(t);
+        let Self { models, knot_models, shape, copies, .. } = self;
+        let sizes = [("nx", shape.nx, model.nx()), ("ndx", shape.ndx, model.ndx()), ("nu", shape.nu(t), model.nu())];
+        for (name, expected, found) in sizes {
+            if expected != found {
+                return Err(Error::Dimension { knot: t, name, expected, found });
+            }
+        }
+        if model.is_terminal() {
+            return Err(Error::NoNextState { knot: t, index: models.len() });
+        }
+        let uses = |index: usize| knot_models.iter().enumerate().any(|(knot, own)| *own == index && knot != t);
+        let unused = models.added().find(|&index| !uses(index));
+        knot_models[t] = models.add(model, unused);
+        copies.forget(models.place(knot_models[t])[0]);
+        self.arrange();
+        Ok(())
+    }
+
+    /// Sets the duration Δt (s) of knot t, whose model keeps its duration at all other knots. The solver's next
+    /// iterations do not allocate.
+    ///
+    /// # Errors
+    /// [`Error::TimeStep`] if Δt is not above 0, [`Error::NoDuration`] if the knot has no duration; the problem is then
+    /// unchanged.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn set_duration(&mut self, t: usize, dt: f64) -> Result<(), Error> {
+        self.assert_running(t);
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::TimeStep { dt });
+        }
+        let index = self.knot_models[t];
+        match self.chosen(index).and_then(innermost).is_some_and(|group| group.set_duration(t, dt)) {
+            true => Ok(()),
+            false => Err(Error::NoDuration { knot: t }),
+        }
+    }
+
+    /// Returns the index of the model of each knot. Models that [`set_knot`](Self::set_knot) added have the indices after
+    /// the models with which the problem was created.
+    pub fn knot_models(&self) -> &[usize] {
+        &self.knot_models
     }
 
     /// Returns the number of knots before the terminal one, N.
     pub fn horizon(&self) -> usize {
-        self.stages.len()
+        self.knot_models.len()
     }
 
     /// Returns the number of entries of a state.
@@ -221,21 +280,22 @@ impl Problem {
     /// Copies the problem, with all current costs, limits, references and weights, so that another thread can solve it.
     /// The robot's [`Model`](condyle_dynamics::Model) and user-defined functions are shared. Allocates.
     ///
-    /// A problem is not [`Clone`]: a user-defined action can be copied only if its [`fork`](ActionModel::fork) returns
-    /// a copy. All actions of this crate can be copied, except [`NumDiff`](crate::NumDiff).
-    /// [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied if their parts can.
+    /// A problem is not [`Clone`]: a user-defined action can be copied only if its
+    /// [`try_clone`](ActionModel::try_clone) returns a copy. All actions of this crate can be copied, except
+    /// [`NumDiff`](crate::NumDiff). [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied
+    /// if their parts can.
     ///
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
     pub fn try_clone(&self) -> Result<Self, Error> {
-        let Self { x0, models, stages, terminal, shape, runs: own_runs, knots, unread, .. } = self;
-        let (x0, models, stages, shape) = (x0.clone(), models.try_clone()?, stages.clone(), shape.clone());
-        let mut terminal = terminal.fork().ok_or(Error::NoCopy { model: None })?;
-        terminal.reserve();
-        let mut runs = Vec::with_capacity(stages.len()); // capacity that a shift may need
+        let Self { x0, models, knot_models, terminal, shape, runs: own_runs, knots, unread, .. } = self;
+        let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
+        let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
+        reserve(&mut *terminal);
+        let mut runs = Vec::with_capacity(knot_models.len()); // capacity that a shift may need
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
-        Ok(Self { x0, models, stages, terminal, shape, runs, knots, copies, unread })
+        Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread })
     }
 
     /// Returns the terminal model as a `T`, if it has that type.
@@ -269,7 +329,7 @@ impl Problem {
             }
             let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
             let u = &us[self.shape.u(t)];
-            self.models.of_mut(self.stages[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
+            self.models.of_mut(self.knot_models[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
         }
         Error::check("xs", &xs, xs.len())?;
         Ok(xs)
@@ -282,13 +342,13 @@ impl Problem {
     /// If a length is wrong.
     #[track_caller]
     pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        self.calc_with_motion(xs, us, next, costs, &mut []);
+        self.calc_with_motions(xs, us, next, costs, &mut []);
     }
 
     /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`: N equal parts, which
     /// are empty or have [`motion_size`](Self::motion_size) numbers.
     #[track_caller]
-    pub(crate) fn calc_with_motion(
+    pub(crate) fn calc_with_motions(
         &mut self,
         xs: &[f64],
         us: &[f64],
@@ -297,66 +357,75 @@ impl Problem {
         motions: &mut [f64],
     ) {
         let (nx, horizon) = (self.nx(), self.horizon());
-        let room = motions.len() / horizon;
+        let size = motions.len() / horizon;
         self.assert_trajectory(xs, us);
         assert_length("next", next.len(), horizon * nx);
         assert_length("costs", costs.len(), horizon + 1);
-        for (model, knots) in &self.runs {
+        for (action, knots) in &self.runs {
             let (x, u) = self.places(knots);
-            let (next, costs) = (&mut next[x.clone()], &mut costs[knots.clone()]);
-            let motions = &mut motions[knots.start * room..knots.end * room];
-            let (action, t) = (&mut self.models.actions[*model], &self.knots[knots.clone()]);
-            match room {
-                0 => action.calc_group(t, &xs[x], &us[u], next, costs),
-                _ => action.calc_group_with_motion(t, &xs[x], &us[u], next, costs, motions),
-            }
+            let motions = &mut motions[knots.start * size..knots.end * size];
+            let mut results = Results::values(&mut next[x.clone()], &mut costs[knots.clone()], motions);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], Evaluation::Values, &mut results);
         }
+        let mut results = Results::values(&mut self.unread, &mut costs[horizon..], &mut []);
         let x = &xs[self.shape.x(horizon)];
-        self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Values, &mut results);
     }
 
-    /// Computes the derivatives at all knots of a trajectory into `nodes` (N + 1, the terminal one last). Allocates
+    /// Computes the derivatives at all knots of a trajectory into `lq_knots` (N + 1, the terminal one last). Allocates
     /// nothing.
     ///
     /// # Panics
     /// If a length is wrong.
     #[track_caller]
-    pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        let horizon = self.horizon();
-        self.begin_derivatives(xs, us, nodes);
-        for (model, knots) in &self.runs {
-            let (x, u) = self.places(knots);
-            let (t, nodes) = (&self.knots[knots.clone()], &mut nodes[knots.clone()]);
-            self.models.actions[*model].calc_diff_group(t, &xs[x], &us[u], nodes);
-        }
-        let x = &xs[self.shape.x(horizon)];
-        self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
+    pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        self.calc_diff_as(Evaluation::Derivatives, xs, us, lq_knots);
     }
 
-    /// Computes [`calc_diff`](Self::calc_diff) on `gains.len()` threads of the rayon pool in which it is called, or
-    /// else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
-    /// group (model, first index, nodes, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
-    /// are written afterwards. Models that cannot be [copied](ActionModel::fork) are evaluated on the calling thread.
+    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics where knots support
+    /// them.
+    #[track_caller]
+    pub(crate) fn calc_diff_as(&mut self, what: Evaluation<'_>, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        let horizon = self.horizon();
+        self.begin_derivatives(xs, us, lq_knots);
+        for (action, knots) in &self.runs {
+            let (x, u) = self.places(knots);
+            let mut results = Results::derivatives(&mut lq_knots[knots.clone()]);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], what.part(knots.clone(), horizon), &mut results);
+        }
+        let (x, mut results) = (&xs[self.shape.x(horizon)], Results::derivatives(&mut lq_knots[horizon..]));
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Derivatives, &mut results);
+    }
+
+    /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool in which it is called,
+    /// or else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
+    /// group (model, first index, knots, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
+    /// are written afterwards. Models that cannot be [copied](ActionModel::try_clone) are evaluated on the calling
+    /// thread.
     ///
     /// # Panics
     /// If a length is wrong.
     #[track_caller]
     pub(crate) fn calc_diff_on(
         &mut self,
+        what: Evaluation<'_>,
         [xs, us]: [&[f64]; 2],
-        nodes: &mut [LqNode],
-        found: &mut [LqKnot],
+        lq_knots: &mut [LqKnot],
+        found: &mut [KnotFeedback],
         gains: &mut [Gains],
-        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqNode], &mut [LqKnot]) + Send,
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqKnot], &mut [KnotFeedback]) + Send,
     ) {
-        self.begin_derivatives(xs, us, nodes);
+        self.begin_derivatives(xs, us, lq_knots);
         let Self { models, runs, copies, knots, shape, terminal, .. } = self;
         let t = shape.horizon();
-        let ((nodes, end), (found, found_there)) = (nodes.split_at_mut(t), found.split_at_mut(t));
-        terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
+        let ((lq_knots, end), (found, found_there)) = (lq_knots.split_at_mut(t), found.split_at_mut(t));
+        let mut results = Results::derivatives(&mut *end);
+        evaluate(&mut **terminal, &knots[t..], &xs[shape.x(t)], &[], Evaluation::Derivatives, &mut results);
         sweep(&**terminal, t, end, found_there);
-        let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
-        copies.calc_diff(&mut models.actions, runs, all, nodes, found, gains, sweep);
+        let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets, what };
+        copies.calc_diff(models, runs, all, lq_knots, found, gains, sweep);
     }
 
     /// Copies the multipliers of models to the copies that other threads use.
@@ -364,21 +433,19 @@ impl Problem {
         self.copies.share_multipliers(&mut self.models.actions, &self.runs);
     }
 
-    /// Checks the lengths, and resets the structures of A and B, which the action sets. Requests the equations of
-    /// inverse dynamics only from actions that support them.
+    /// Checks the lengths, and resets the structures of A and B, which the actions set.
     #[track_caller]
-    fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
+    fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         self.assert_trajectory(xs, us);
-        assert_length("nodes", nodes.len(), self.horizon() + 1);
-        for (t, node) in nodes.iter_mut().enumerate() {
-            node.structure.set_dense();
-            node.inverse_dynamics.active = false;
-            node.inverse_dynamics.wanted &= self.action(t).inverse_dynamics_form().is_some();
+        assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
+        for knot in lq_knots {
+            knot.structure.set_dense();
+            knot.rows.clear();
         }
     }
 
     /// Computes for each knot by itself the controls that hold its state still, as far as that is possible: see
-    /// [`hold`](ActionModel::hold). Allocates.
+    /// [`quasi_static`](ActionModel::quasi_static). Allocates.
     ///
     /// # Errors
     /// [`Error`] if the length of `xs` is not (N + 1)·nx, or an entry is not finite.
@@ -386,7 +453,7 @@ impl Problem {
         Error::check("xs", xs, (self.horizon() + 1) * self.nx())?;
         let mut us = Vec::with_capacity(self.shape.offsets[self.horizon()]);
         for t in 0..self.horizon() {
-            us.extend(self.models.of_mut(self.stages[t]).hold(t, &xs[self.shape.x(t)]));
+            us.extend(self.models.of_mut(self.knot_models[t]).quasi_static(t, &xs[self.shape.x(t)]));
         }
         Ok(us)
     }
@@ -405,8 +472,10 @@ impl Problem {
         self.terminal.difference(x0, x1, out);
     }
 
-    /// Passes the vectors that the dynamics of knot t compute at (x, u), besides the next state, to `show`: see
-    /// [`outputs`](ActionModel::outputs).
+    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute at (x, u) besides the next
+    /// state. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of each
+    /// contact. A contact's force is expressed in the axes of its rows; at an impact it is an impulse. User-defined
+    /// accelerations have `acceleration`; other actions have no such vectors.
     ///
     /// # Panics
     /// If t > N or a length is wrong.
@@ -414,29 +483,35 @@ impl Problem {
     pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         assert_length("x", x.len(), self.nx());
         assert_length("u", u.len(), self.nu(t));
-        self.action_mut(t).outputs(t, x, u, show);
+        if let Some(group) = innermost(self.action_mut(t)) {
+            group.show_outputs(t, x, u, show);
+        }
     }
 
-    /// Creates nodes of zeros with the dimensions of the knots, the terminal one last.
-    pub fn nodes(&self) -> Vec<LqNode> {
-        (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
+    /// Creates knots of zeros with the dimensions of the knots, the terminal one last.
+    pub fn lq_knots(&self) -> Vec<LqKnot> {
+        (0..=self.horizon()).map(|t| LqKnot::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
     /// Returns the maximum number of entries of a knot's motion that a rollout stores for the derivatives.
     pub(crate) fn motion_size(&self) -> usize {
-        self.models.actions.iter().map(|model| model.motion_size()).max().unwrap_or(0)
+        self.inverse_dynamics().map(|(size, _)| size).max().unwrap_or(0)
     }
 
-    /// Allocates memory in nodes for the equations of inverse dynamics, for any order of the actions in the horizon.
+    /// Returns the sizes of the equations of inverse dynamics of all actions that support them.
+    fn inverse_dynamics(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
+        self.models.actions.iter().filter_map(|action| action.knot_group()?.inverse_dynamics())
+    }
+
+    /// Allocates memory in LQ knots for the equations of inverse dynamics, for any order of the actions in the horizon.
     /// Returns whether an action supports them.
-    pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) -> bool {
-        let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
+    pub(crate) fn reserve_inverse_dynamics(&self, lq_knots: &mut [LqKnot]) -> bool {
+        let sizes = self.inverse_dynamics().map(|(_, sizes)| sizes);
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
-        let (nv, horizon, motion) = (self.ndx() / 2, self.horizon(), self.motion_size());
-        for node in &mut nodes[..horizon] {
-            let nu = node.nu();
-            node.inverse_dynamics.reserve(nv, nu, most);
-            node.inverse_dynamics.motion.resize(motion, 0.0);
+        let (nv, horizon) = (self.ndx() / 2, self.horizon());
+        for knot in &mut lq_knots[..horizon] {
+            let nu = knot.nu();
+            knot.inverse_dynamics.reserve(nv, nu, most);
         }
         true
     }
@@ -447,28 +522,28 @@ impl Problem {
 
     /// Returns the model of knot t; the terminal one for t = N.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
-        self.stages.get(t).map_or(&*self.terminal, |&stage| self.models.of(stage))
+        self.knot_models.get(t).map_or(&*self.terminal, |&model| self.models.of(model))
     }
 
     /// Returns the model of knot t, for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
-        self.stages.get(t).map_or(&mut *self.terminal, |&stage| self.models.of_mut(stage))
+        self.knot_models.get(t).map_or(&mut *self.terminal, |&model| self.models.of_mut(model))
     }
 
     /// Returns the actions of all knots.
-    pub(crate) fn actors(&mut self) -> Actors<'_> {
-        let Self { x0, models, stages, terminal, .. } = self;
+    pub(crate) fn action_view(&mut self) -> ActionView<'_> {
+        let Self { x0, models, knot_models, terminal, .. } = self;
         let (actions, places) = models.parts();
-        Actors { x0, stages, places, actions: Actions::Own(actions, &mut **terminal) }
+        ActionView { x0, knot_models, places, actions: Actions::Own(actions, &mut **terminal) }
     }
 
     /// Returns the actions of all knots, and copies of all but the terminal one, which compute the same on another
     /// thread. Returns `None` if an action cannot be copied, or no copies exist yet.
-    pub(crate) fn two(&mut self) -> Option<[Actors<'_>; 2]> {
-        let Self { x0, models, stages, terminal, copies, .. } = self;
+    pub(crate) fn two(&mut self) -> Option<[ActionView<'_>; 2]> {
+        let Self { x0, models, knot_models, terminal, copies, .. } = self;
         let copies = copies.first().filter(|copies| copies.iter().all(Option::is_some))?;
         let (actions, places) = models.parts();
-        let with = |actions| Actors { x0, stages, places, actions };
+        let with = |actions| ActionView { x0, knot_models, places, actions };
         Some([with(Actions::Own(actions, &mut **terminal)), with(Actions::Copied(copies))])
     }
 
@@ -483,7 +558,7 @@ impl Problem {
             let expected = self.shape.nu(knot);
             for (name, found) in [("lower bounds", lower.len()), ("upper bounds", upper.len())] {
                 if found != expected {
-                    return Err(Error::Dimension { node: knot, name, expected, found });
+                    return Err(Error::Dimension { knot, name, expected, found });
                 }
             }
             for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
@@ -499,7 +574,7 @@ impl Problem {
 
     /// Returns the largest number of lanes that one of the models uses.
     pub(crate) fn lanes(&self) -> usize {
-        self.models.actions.iter().map(|action| action.lanes()).max().unwrap_or(1).max(1)
+        self.models.lanes.iter().copied().max().unwrap_or(1)
     }
 
     /// Returns the ranges of the states and controls of a run of knots in flat trajectories.
@@ -514,6 +589,12 @@ impl Problem {
         assert!(t <= self.horizon(), "`t` is {t}, expected at most the horizon {}", self.horizon());
     }
 
+    /// Panics if t ≥ N.
+    #[track_caller]
+    fn assert_running(&self, t: usize) {
+        assert!(t < self.horizon(), "`t` is {t}, expected less than the horizon {}", self.horizon());
+    }
+
     #[track_caller]
     fn assert_trajectory(&self, xs: &[f64], us: &[f64]) {
         assert_length("xs", xs.len(), (self.horizon() + 1) * self.nx());
@@ -525,7 +606,7 @@ impl std::fmt::Debug for Problem {
         f.debug_struct("Problem")
             .field("x0", &self.x0)
             .field("models", &self.models.len())
-            .field("stages", &self.stages)
+            .field("knot_models", &self.knot_models)
             .field("shape", &self.shape)
             .finish()
     }

@@ -2,18 +2,18 @@
 #![allow(non_snake_case)] // the names of the literature
 
 use super::action::ActionModel;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 
 /// Action x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper. The names are the fields
-/// of its [`LqNode`].
+/// of its [`LqKnot`].
 ///
 /// Without controls it is a terminal action. In Crocoddyl: `ActionModelLQR`.
 ///
 /// ```
-/// use condyle_optimal::{Fddp, LqNode, Lqr, Problem};
+/// use condyle_optimal::{Fddp, LqKnot, Lqr, Problem};
 ///
 /// // x⁺ = x + u, ℓ = ½ (x² + u²): one step solves it.
-/// let (mut knot, mut end) = (LqNode::zeros(1, 1), LqNode::zeros(1, 0));
+/// let (mut knot, mut end) = (LqKnot::zeros(1, 1), LqKnot::zeros(1, 0));
 /// (knot.A[0], knot.B[0], knot.Q[0], knot.R[0], end.Q[0]) = (1.0, 1.0, 1.0, 1.0, 1.0);
 /// let mut problem = Problem::new(vec![1.0], vec![Box::new(Lqr::new(knot))], vec![0; 30], Box::new(Lqr::new(end)))?;
 /// let solution = Fddp::new(&problem).solve(&mut problem, &[0.0; 31], &[0.0; 30])?.clone();
@@ -21,33 +21,34 @@ use crate::lq::LqNode;
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lqr(LqNode);
+pub struct Lqr(LqKnot);
 
 impl Lqr {
-    /// Creates the action of a node.
+    /// Creates the action of a knot.
     ///
     /// # Panics
-    /// If the shapes of the node's matrices do not fit each other.
+    /// If the shapes of the knot's matrices do not fit each other, or the knot has constraint rows.
     #[track_caller]
-    pub fn new(node: LqNode) -> Self {
-        let (n, m) = (node.ndx(), node.nu());
+    pub fn new(knot: LqKnot) -> Self {
+        assert!(knot.rows.is_empty(), "`rows` is not empty, but an action has no constraint rows: see `Constrained`");
+        let (n, m) = (knot.ndx(), knot.nu());
         for (name, found, expected) in [
-            ("A", node.A.shape(), (n, n)),
-            ("B", node.B.shape(), (n, m)),
-            ("Q", node.Q.shape(), (n, n)),
-            ("S", node.S.shape(), (n, m)),
-            ("R", node.R.shape(), (m, m)),
-            ("f", node.f.shape(), (n, 1)),
-            ("lower", node.lower.shape(), (m, 1)),
-            ("upper", node.upper.shape(), (m, 1)),
+            ("A", knot.A.shape(), (n, n)),
+            ("B", knot.B.shape(), (n, m)),
+            ("Q", knot.Q.shape(), (n, n)),
+            ("S", knot.S.shape(), (n, m)),
+            ("R", knot.R.shape(), (m, m)),
+            ("f", knot.f.shape(), (n, 1)),
+            ("lower", knot.lower.shape(), (m, 1)),
+            ("upper", knot.upper.shape(), (m, 1)),
         ] {
             assert!(found == expected, "`{name}` has shape {found:?}, expected {expected:?}");
         }
-        Self(node)
+        Self(knot)
     }
 
-    /// Returns the node of the action.
-    pub fn node(&self) -> &LqNode {
+    /// Returns the knot of the action.
+    pub fn knot(&self) -> &LqKnot {
         &self.0
     }
 }
@@ -81,12 +82,12 @@ impl ActionModel for Lqr {
         Some((self.0.lower.as_slice(), self.0.upper.as_slice()))
     }
 
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         Some(Box::new(self.clone()))
     }
 
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        let LqNode { A, B, f, Q, S, R, q, r, .. } = &self.0;
+        let LqKnot { A, B, f, Q, S, R, q, r, .. } = &self.0;
         next.copy_from_slice(f.as_slice());
         add_product(next, A.as_slice(), x); // A x + B u + f
         add_product(next, B.as_slice(), u);
@@ -94,24 +95,24 @@ impl ActionModel for Lqr {
         quadratic + product(x, S.as_slice(), u) + dot(q.as_slice(), x) + dot(r.as_slice(), u)
     }
 
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let own = &self.0;
         for (to, from) in [
-            (&mut node.A, &own.A),
-            (&mut node.B, &own.B),
-            (&mut node.Q, &own.Q),
-            (&mut node.S, &own.S),
-            (&mut node.R, &own.R),
+            (&mut knot.A, &own.A),
+            (&mut knot.B, &own.B),
+            (&mut knot.Q, &own.Q),
+            (&mut knot.S, &own.S),
+            (&mut knot.R, &own.R),
         ] {
             to.copy_from(from);
         }
-        node.q.copy_from(&own.q);
-        node.r.copy_from(&own.r);
-        add_product(node.q.as_mut_slice(), own.Q.as_slice(), x); // q + Q x + S u
-        add_product(node.q.as_mut_slice(), own.S.as_slice(), u);
+        knot.q.copy_from(&own.q);
+        knot.r.copy_from(&own.r);
+        add_product(knot.q.as_mut_slice(), own.Q.as_slice(), x); // q + Q x + S u
+        add_product(knot.q.as_mut_slice(), own.S.as_slice(), u);
         if !u.is_empty() {
-            add_product(node.r.as_mut_slice(), own.R.as_slice(), u); // r + R u + Sᵀ x
-            for (r, column) in node.r.iter_mut().zip(own.S.as_slice().chunks_exact(x.len())) {
+            add_product(knot.r.as_mut_slice(), own.R.as_slice(), u); // r + R u + Sᵀ x
+            for (r, column) in knot.r.iter_mut().zip(own.S.as_slice().chunks_exact(x.len())) {
                 *r += dot(column, x);
             }
         }

@@ -1,24 +1,31 @@
 //! Optimal control problem: actions, horizons of actions, and derivatives for actions without their own.
 
 mod action;
-mod actors;
+mod action_view;
 mod autodiff;
+mod constrained;
+mod group;
 mod horizon;
 mod lqr;
 mod models;
 mod multipliers;
 mod numdiff;
+mod path_constraint;
 mod shape;
 mod threads;
 mod unicycle;
 
 pub use action::ActionModel;
-pub(crate) use action::{differences, hold};
-pub(crate) use actors::Actors;
+pub(crate) use action::quasi_static;
+pub(crate) use action_view::ActionView;
 pub use autodiff::{AutoDiff, GenericAction};
+pub use constrained::Constrained;
+pub use group::GroupModel;
+pub(crate) use group::{Evaluation, KnotGroup, Results, evaluate, innermost};
 pub use horizon::Problem;
 pub use lqr::Lqr;
 pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a_value};
 pub use numdiff::NumDiff;
+pub use path_constraint::{AutoDiffConstraint, GenericConstraint, PathConstraint};
 pub(crate) use shape::{MOST_KNOTS, Shape};
 pub use unicycle::Unicycle;

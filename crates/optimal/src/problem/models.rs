@@ -1,7 +1,8 @@
-//! Actions of a problem. Models that differ only in costs, references and weights are represented by one action, so
-//! that their knots are computed in groups.
+//! Actions of a problem. Models of the same kind, which differ only in costs, limits and durations, are represented by
+//! one action, so that their knots are computed in groups.
 
 use super::action::ActionModel;
+use super::group::{innermost, lanes as group_lanes};
 use super::shape::{MOST_ENTRIES, MOST_KNOTS};
 use crate::error::Error;
 
@@ -13,69 +14,137 @@ const MOST_NUMBERS: usize = 1 << 28;
 /// is created in linear time.
 const COMPARED: usize = 64;
 
+/// Places of models in actions.
+#[derive(Clone, Default)]
+struct Places {
+    /// Action that represents each model, and the model's index in that action.
+    of: Vec<[usize; 2]>,
+    /// Number of models that each action represents.
+    counts: Vec<usize>,
+    /// Indices in each action that no model uses any more.
+    free: Vec<Vec<usize>>,
+}
+
 /// Actions of a problem, and the action that represents each model.
 #[derive(Default)]
 pub(crate) struct Models {
     pub(crate) actions: Vec<Box<dyn ActionModel>>,
-    /// Action that represents each model, and the model's index in that action.
-    places: Vec<[usize; 2]>,
+    /// Number of states that each action computes at the cost of one.
+    pub(crate) lanes: Vec<usize>,
+    places: Places,
+    /// Number of models with which the problem was created.
+    given: usize,
+}
+
+/// Moves a model into an action of the same kind, as its model `place` or as a new one; returns whether it did so.
+fn merge(action: &mut dyn ActionModel, model: &mut dyn ActionModel, place: Option<usize>) -> bool {
+    match action.knot_group_mut() {
+        Some(group) => group.merge(model, place),
+        None => action.group_model().is_some_and(|group| group.is_same(model)),
+    }
+}
+
+/// Allocates the workspace of an action, and of the action that it wraps.
+pub(super) fn reserve(action: &mut dyn ActionModel) {
+    if let Some(group) = innermost(action) {
+        group.reserve();
+    }
 }
 
 impl Models {
-    /// Merges the models that differ only in costs, references and weights, and allocates the memory of all.
+    /// Merges the models that differ only in costs, limits and durations, and allocates the memory of all.
     pub(crate) fn new(models: Vec<Box<dyn ActionModel>>) -> Self {
-        let mut all = Self::default();
-        let mut counts: Vec<usize> = Vec::new();
-        for mut model in models {
-            let last = all.actions.len().saturating_sub(COMPARED);
-            let mut alike = all.actions.iter_mut().enumerate().skip(last).rev();
-            let place = match alike.find_map(|(k, action)| action.merge(&mut *model).then_some(k)) {
-                Some(k) => {
-                    counts[k] += 1;
-                    [k, counts[k] - 1]
-                }
-                None => {
-                    all.actions.push(model);
-                    counts.push(1);
-                    [counts.len() - 1, 0]
-                }
-            };
-            all.places.push(place);
+        let mut all = Self { given: models.len(), ..Self::default() };
+        for model in models {
+            let place = all.place_of(model);
+            all.places.of.push(place);
         }
-        all.actions.iter_mut().for_each(|action| action.reserve());
+        all.actions.iter_mut().for_each(|action| reserve(&mut **action));
         all
+    }
+
+    /// Finds an action of the model's kind that represents the model from now on, or adds it as an action.
+    fn place_of(&mut self, mut model: Box<dyn ActionModel>) -> [usize; 2] {
+        let Self { actions, lanes, places: Places { counts, free, .. }, .. } = self;
+        let first = actions.len().saturating_sub(COMPARED);
+        for (k, action) in actions.iter_mut().enumerate().skip(first).rev() {
+            let place = free[k].last().copied();
+            if merge(&mut **action, &mut *model, place) {
+                free[k].pop();
+                counts[k] += usize::from(place.is_none());
+                return [k, place.unwrap_or(counts[k] - 1)];
+            }
+        }
+        lanes.push(group_lanes(&mut *model));
+        // an action without models is replaced
+        match (0..actions.len()).find(|&k| free[k].len() == counts[k]) {
+            Some(k) => {
+                (actions[k], lanes[k], counts[k]) = (model, lanes.pop().expect("was just pushed"), 1);
+                free[k].clear();
+                [k, 0]
+            }
+            None => {
+                actions.push(model);
+                counts.push(1);
+                free.push(Vec::new());
+                [actions.len() - 1, 0]
+            }
+        }
+    }
+
+    /// Adds a model in the place of model `unused`, if that was added as well. Otherwise it becomes a new model.
+    /// Returns its index. Allocates.
+    pub(crate) fn add(&mut self, model: Box<dyn ActionModel>, unused: Option<usize>) -> usize {
+        let index = unused.filter(|index| *index >= self.given).unwrap_or(self.len());
+        if let Some(&[action, own]) = self.places.of.get(index) {
+            self.places.free[action].push(own);
+        }
+        let place = self.place_of(model);
+        match self.places.of.get_mut(index) {
+            Some(old) => *old = place,
+            None => self.places.of.push(place),
+        }
+        reserve(&mut *self.actions[place[0]]);
+        index
+    }
+
+    /// Returns the models that were added after the problem was created.
+    pub(crate) fn added(&self) -> core::ops::Range<usize> {
+        self.given..self.len()
     }
 
     /// Returns the actions, and the action that represents each model.
     pub(crate) fn parts(&mut self) -> (&mut [Box<dyn ActionModel>], &[[usize; 2]]) {
-        (&mut self.actions, &self.places)
+        (&mut self.actions, &self.places.of)
     }
 
     /// Returns the number of models.
     pub(crate) fn len(&self) -> usize {
-        self.places.len()
+        self.places.of.len()
     }
 
     /// Returns the action that represents a model, and the model's index in that action.
     pub(crate) fn place(&self, model: usize) -> [usize; 2] {
-        self.places[model]
+        self.places.of[model]
     }
 
     /// Returns the action that represents a model.
     pub(crate) fn of(&self, model: usize) -> &dyn ActionModel {
-        &*self.actions[self.places[model][0]]
+        &*self.actions[self.places.of[model][0]]
     }
 
     /// Returns the action that represents a model, for computing.
     pub(crate) fn of_mut(&mut self, model: usize) -> &mut dyn ActionModel {
-        &mut *self.actions[self.places[model][0]]
+        &mut *self.actions[self.places.of[model][0]]
     }
 
     /// Returns the action that represents a model; changes made through it only change that model.
     pub(crate) fn chosen(&mut self, model: usize) -> Option<&mut dyn ActionModel> {
-        let [action, own] = *self.places.get(model)?;
+        let [action, own] = *self.places.of.get(model)?;
         let action = &mut *self.actions[action];
-        action.choose(own);
+        if let Some(group) = action.knot_group_mut() {
+            group.choose(own);
+        }
         Some(action)
     }
 
@@ -84,40 +153,40 @@ impl Models {
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
     pub(crate) fn try_clone(&self) -> Result<Self, Error> {
-        let model = |k: usize| self.places.iter().position(|place| place[0] == k);
+        let model = |k: usize| self.places.of.iter().position(|place| place[0] == k);
         let mut actions = Vec::with_capacity(self.actions.len());
         for (k, action) in self.actions.iter().enumerate() {
-            let mut copy = action.fork().ok_or(Error::NoCopy { model: model(k) })?;
-            copy.reserve();
+            let mut copy = action.try_clone().ok_or(Error::NoCopy { model: model(k) })?;
+            reserve(&mut *copy);
             actions.push(copy);
         }
-        Ok(Self { actions, places: self.places.clone() })
+        Ok(Self { actions, lanes: self.lanes.clone(), places: self.places.clone(), given: self.given })
     }
 }
 
 /// Checks that the models fit together in one problem.
 pub(crate) fn check(
     models: &[Box<dyn ActionModel>],
-    stages: &[usize],
+    knot_models: &[usize],
     terminal: &dyn ActionModel,
 ) -> Result<(), Error> {
-    if stages.is_empty() {
+    if knot_models.is_empty() {
         return Err(Error::EmptyHorizon);
     }
-    let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), stages.len());
+    let (nx, ndx, horizon) = (terminal.nx(), terminal.ndx(), knot_models.len());
     Error::check_size("knots", horizon, MOST_KNOTS)?;
     for (name, found) in [("nx", nx), ("ndx", ndx)] {
         Error::check_size(name, found, MOST_ENTRIES)?;
     }
     let mut numbers = 0;
-    for (knot, &index) in stages.iter().enumerate() {
+    for (knot, &index) in knot_models.iter().enumerate() {
         let model = models.get(index).ok_or(Error::UnknownModel { knot, index, models: models.len() })?;
-        if model.is_end() {
+        if model.is_terminal() {
             return Err(Error::NoNextState { knot, index });
         }
         for (name, expected, found) in [("nx", nx, model.nx()), ("ndx", ndx, model.ndx())] {
             if expected != found {
-                return Err(Error::Dimension { node: knot, name, expected, found });
+                return Err(Error::Dimension { knot, name, expected, found });
             }
         }
         Error::check_size("nu", model.nu(), MOST_ENTRIES)?;

@@ -76,7 +76,7 @@ impl Bounded<'_> {
     pub(crate) fn check(&self, knot: usize) -> Result<(), Error> {
         for (name, found) in [("lower bounds", self.lower.len()), ("upper bounds", self.upper.len())] {
             if found != self.count {
-                return Err(Error::Dimension { node: knot, name, expected: self.count, found });
+                return Err(Error::Dimension { knot, name, expected: self.count, found });
             }
         }
         for (row, (&lower, &upper)) in self.lower.iter().zip(self.upper).enumerate() {

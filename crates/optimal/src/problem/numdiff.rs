@@ -2,7 +2,7 @@
 
 use super::action::ActionModel;
 use super::action::differences::{SECOND, at, calc_diff, write_curvature};
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 
 /// Action whose derivatives are central differences of [`calc`](ActionModel::calc), taken with ⊕ and ⊖. The action's
 /// own derivatives are not used.
@@ -13,7 +13,7 @@ use crate::lq::{Hessian, LqNode};
 ///
 /// # Examples
 /// ```
-/// use condyle_optimal::{ActionModel, LqNode, NumDiff};
+/// use condyle_optimal::{ActionModel, LqKnot, NumDiff};
 ///
 /// struct Pendulum;
 /// impl ActionModel for Pendulum {
@@ -26,10 +26,10 @@ use crate::lq::{Hessian, LqNode};
 ///     }
 /// }
 ///
-/// let mut node = LqNode::zeros(2, 1);
-/// NumDiff(Pendulum).calc_diff(0, &[0.3, 0.0], &[0.0], &mut node);
-/// assert!((node.A[(1, 0)] + 0.1 * 0.3_f64.cos()).abs() < 1e-9);
-/// assert!((node.Q[(0, 0)] - 0.3_f64.cos()).abs() < 1e-6);
+/// let mut knot = LqKnot::zeros(2, 1);
+/// NumDiff(Pendulum).calc_diff(0, &[0.3, 0.0], &[0.0], &mut knot);
+/// assert!((knot.A[(1, 0)] + 0.1 * 0.3_f64.cos()).abs() < 1e-9);
+/// assert!((knot.Q[(0, 0)] - 0.3_f64.cos()).abs() < 1e-6);
 /// ```
 #[derive(Debug, Clone)]
 pub struct NumDiff<A>(
@@ -54,8 +54,8 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         Some(&mut self.0)
     }
 
-    fn is_end(&self) -> bool {
-        self.0.is_end()
+    fn is_terminal(&self) -> bool {
+        self.0.is_terminal()
     }
 
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
@@ -66,20 +66,12 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         self.0.shift();
     }
 
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        self.0.outputs(t, x, u, show);
-    }
-
-    fn reserve(&mut self) {
-        self.0.reserve();
-    }
-
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }
 
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        calc_diff(&mut self.0, t, x, u, node);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        calc_diff(&mut self.0, t, x, u, knot);
     }
 
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {

@@ -1,14 +1,14 @@
 //! Dimensions of a horizon.
 
 use crate::error::Error;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use core::ops::Range;
 
 /// Maximum number of knots of a horizon.
 pub(crate) const MOST_KNOTS: usize = 1 << 20;
 /// Maximum number of entries of a state, a change of state, or the controls of a knot: matrices of that size take 128
 /// MiB each.
-pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
+pub(crate) const MOST_ENTRIES: usize = LqKnot::MOST_SIZE;
 
 /// Dimensions of a horizon, by which trajectories and workspaces are allocated.
 #[derive(Debug, PartialEq, Default)]
@@ -77,14 +77,14 @@ impl Shape {
     /// Returns `Ok` if the dimensions of a problem equal the dimensions for which a solver was created.
     pub(crate) fn check(&self, found: &Self) -> Result<(), Error> {
         if self.horizon() != found.horizon() {
-            return Err(Error::Length { name: "stages", expected: self.horizon(), found: found.horizon() });
+            return Err(Error::Length { name: "knot_models", expected: self.horizon(), found: found.horizon() });
         }
         for t in 0..=self.horizon() {
             for (name, expected, found) in
                 [("nx", self.nx, found.nx), ("ndx", self.ndx, found.ndx), ("nu", self.nu(t), found.nu(t))]
             {
                 if expected != found {
-                    return Err(Error::Dimension { node: t, name, expected, found });
+                    return Err(Error::Dimension { knot: t, name, expected, found });
                 }
             }
         }

@@ -1,16 +1,18 @@
 //! Derivatives of a horizon on several threads, each with its own copies of the actions, concurrent with the sweep.
 //!
 //! A group has as many knots as its model has lanes. From the end of the horizon to its beginning, each group passes
-//! through three stages. The first free thread computes its derivatives. The calling thread sweeps it; while the
+//! through three steps. The first free thread computes its derivatives. The calling thread sweeps it; while the
 //! derivatives it needs are missing, it computes derivatives itself. An idle thread computes the group's gains.
 
 use super::action::ActionModel;
-use crate::lq::{Gains, LqKnot, LqNode};
+use super::group::{Evaluation, Results, evaluate};
+use super::models::{Models, reserve};
+use crate::lq::{Gains, KnotFeedback, LqKnot};
 use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
 use core::sync::atomic::AtomicU8;
 
-/// Stages of a group.
+/// Steps of the work on a group.
 const DERIVE: u8 = 0;
 const SWEEP: u8 = 1;
 const FINISH: u8 = 2;
@@ -38,10 +40,11 @@ impl Copies {
         self.of.first_mut().map(Vec::as_mut_slice)
     }
 
-    /// Drops the copies of a model that may change.
-    pub(crate) fn forget(&mut self, model: usize) {
-        for copy in self.of.iter_mut().filter_map(|copies| copies.get_mut(model)) {
-            *copy = None;
+    /// Drops the copies of an action that may change, or that is new.
+    pub(crate) fn forget(&mut self, action: usize) {
+        for copies in &mut self.of {
+            copies.resize_with(copies.len().max(action + 1), || None);
+            copies[action] = None;
         }
     }
 
@@ -52,31 +55,34 @@ impl Copies {
 
     /// Assigns knot t, of `horizon` knots, to a model that an action represents.
     pub(crate) fn serve(&mut self, action: usize, t: usize, horizon: usize, model: usize) {
-        for copy in self.of.iter_mut().filter_map(|copies| copies[action].as_mut()) {
-            copy.serve(t, horizon, model);
+        for copy in self.of.iter_mut().filter_map(|copies| copies.get_mut(action)?.as_mut()) {
+            if let Some(group) = copy.knot_group_mut() {
+                group.serve(t, horizon, model);
+            }
         }
     }
 
     /// Creates the missing copies of all models that can be copied, for `threads` threads in all.
     fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
-        self.of.resize_with(threads - 1, || models.iter().map(|_| None).collect());
+        self.of.resize_with(threads - 1, Vec::new);
         for copies in &mut self.of {
+            copies.resize_with(models.len(), || None);
             for (copy, model) in copies.iter_mut().zip(models) {
                 if copy.is_none() {
-                    *copy = model.fork();
-                    copy.iter_mut().for_each(|copy| copy.reserve());
+                    *copy = model.try_clone();
+                    copy.iter_mut().for_each(|copy| reserve(&mut **copy));
                 }
             }
         }
     }
 
     /// Computes the groups of knots, counted from the start of a run as on a single thread.
-    fn group(&mut self, models: &[Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
+    fn group(&mut self, lanes: &[usize], runs: &[(usize, Range<usize>)]) {
         let Self { cuts, owners, .. } = self;
         cuts.clear();
         owners.clear();
         for (model, run) in runs {
-            for knot in run.clone().step_by(models[*model].lanes().max(1)) {
+            for knot in run.clone().step_by(lanes[*model]) {
                 cuts.push(knot);
                 owners.push(*model);
             }
@@ -89,10 +95,12 @@ impl Copies {
         for copies in &mut self.of {
             for (model, run) in runs {
                 let Some(copy) = &mut copies[*model] else { continue };
+                let pair = (copy.knot_group_mut(), models[*model].knot_group_mut());
+                let (Some(copy), Some(own)) = pair else { continue };
                 let mut k = 0;
                 copy.constraints(run.start, &mut |theirs| {
                     let mut i = 0;
-                    models[*model].constraints(run.start, &mut |ours| {
+                    own.constraints(run.start, &mut |ours| {
                         if i == k {
                             theirs.multipliers.clone_from(ours.multipliers);
                         }
@@ -109,26 +117,26 @@ impl Copies {
     /// gains are written afterwards. Models that cannot be copied are evaluated on the calling thread only.
     pub(super) fn calc_diff(
         &mut self,
-        models: &mut [Box<dyn ActionModel>],
+        Models { actions: models, lanes, .. }: &mut Models,
         runs: &[(usize, Range<usize>)],
         knots: Knots<'_>,
-        nodes: &mut [LqNode],
-        found: &mut [LqKnot],
+        lq_knots: &mut [LqKnot],
+        found: &mut [KnotFeedback],
         gains: &mut [Gains],
-        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqNode], &mut [LqKnot]) + Send,
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqKnot], &mut [KnotFeedback]) + Send,
     ) {
         self.renew(gains.len(), models);
-        self.group(models, runs);
+        self.group(lanes, runs);
         let Self { of, cuts, owners, states } = self;
-        let groups = Groups { parts: &Parts::new(nodes, found, cuts, states), owners, knots };
+        let groups = Groups { parts: &Parts::new(lq_knots, found, cuts, states), owners, knots };
         let (own, gains) = gains.split_at_mut(1);
         join(
             || {
                 let parts = groups.parts;
                 let mut tried = parts.count(); // this thread has tried to derive all groups from this index on
                 for group in (0..parts.count()).rev() {
-                    while !parts.work(group, SWEEP, |first, nodes, found| {
-                        sweep(&*models[owners[group]], first, nodes, found);
+                    while !parts.work(group, SWEEP, |first, lq_knots, found| {
+                        sweep(&*models[owners[group]], first, lq_knots, found);
                     }) {
                         if parts.is_abandoned() {
                             return; // another thread has panicked, and so will this one
@@ -159,12 +167,14 @@ pub(super) struct Knots<'a> {
     pub(super) nx: usize,
     /// Offset of the controls of each knot.
     pub(super) offsets: &'a [usize],
+    /// Kind of derivatives.
+    pub(super) what: Evaluation<'a>,
 }
 
 /// Groups of knots, as used by all threads.
 #[derive(Clone, Copy)]
 struct Groups<'a> {
-    parts: &'a Parts<'a, LqNode, LqKnot>,
+    parts: &'a Parts<'a, LqKnot, KnotFeedback>,
     owners: &'a [usize],
     knots: Knots<'a>,
 }
@@ -172,17 +182,18 @@ struct Groups<'a> {
 impl Groups<'_> {
     /// Computes the derivatives at the knots of a group, by its model or a copy of it, unless another thread does.
     fn derive(self, group: usize, model: &mut dyn ActionModel) {
-        let Knots { knots, xs, us, nx, offsets } = self.knots;
-        self.parts.work(group, DERIVE, |first, nodes, _| {
-            let end = first + nodes.len();
+        let Knots { knots, xs, us, nx, offsets, what } = self.knots;
+        self.parts.work(group, DERIVE, |first, lq_knots, _| {
+            let end = first + lq_knots.len();
             let (xs, us) = (&xs[first * nx..end * nx], &us[offsets[first]..offsets[end]]);
-            model.calc_diff_group(&knots[first..end], xs, us, nodes);
+            let what = what.part(first..end, offsets.len() - 1);
+            evaluate(model, &knots[first..end], xs, us, what, &mut Results::derivatives(lq_knots));
         });
     }
 
     /// Writes the deferred gains of a group, if it has been swept and no other thread does; returns whether it did so.
     fn finish(self, group: usize, gains: &mut Gains) -> bool {
-        self.parts.work(group, FINISH, |_, nodes, found| gains.finish(nodes, found))
+        self.parts.work(group, FINISH, |_, lq_knots, found| gains.finish(lq_knots, found))
     }
 
     /// Distributes the groups over threads, each with its own copies, until no group is left.

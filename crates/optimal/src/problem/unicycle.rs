@@ -1,7 +1,7 @@
 //! Unicycle as an action: the smallest problem with curved dynamics.
 
 use super::action::ActionModel;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
 
 /// Unicycle: x = (x, y, θ), u = (v, ω),
 ///
@@ -14,7 +14,7 @@ use crate::lq::{Hessian, LqNode};
 /// ```
 /// use condyle_optimal::{Fddp, Problem, Status, Unicycle};
 /// let x0 = [-1.0, -1.0, 1.0];
-/// let (knot, end) = (Unicycle::default(), Unicycle::default().at_the_end());
+/// let (knot, end) = (Unicycle::default(), Unicycle::default().terminal());
 /// let mut problem = Problem::new(x0.to_vec(), vec![Box::new(knot)], vec![0; 20], Box::new(end))?;
 /// let solution = Fddp::new(&problem).solve(&mut problem, &[0.0; 63], &[0.0; 40])?.clone();
 /// assert_eq!(solution.status, Status::Converged);
@@ -44,7 +44,7 @@ impl Unicycle {
 
     /// Returns the same unicycle as a terminal action, without controls.
     #[must_use]
-    pub fn at_the_end(self) -> Self {
+    pub fn terminal(self) -> Self {
         Self { end: true, ..self }
     }
 }
@@ -62,7 +62,7 @@ impl ActionModel for Unicycle {
         if self.end { 0 } else { 2 }
     }
 
-    fn is_end(&self) -> bool {
+    fn is_terminal(&self) -> bool {
         self.end
     }
 
@@ -77,21 +77,21 @@ impl ActionModel for Unicycle {
         0.5 * (by_x * square(x) + by_u * square(u))
     }
 
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let ([by_x, by_u], dt) = (self.weights.map(|w| w * w), self.dt);
-        node.Q.fill(0.0);
-        node.Q.fill_diagonal(by_x);
-        node.S.fill(0.0);
-        node.R.fill(0.0);
-        node.R.fill_diagonal(by_u);
-        (0..3).for_each(|k| node.q[k] = by_x * x[k]);
-        (0..u.len()).for_each(|k| node.r[k] = by_u * u[k]);
+        knot.Q.fill(0.0);
+        knot.Q.fill_diagonal(by_x);
+        knot.S.fill(0.0);
+        knot.R.fill(0.0);
+        knot.R.fill_diagonal(by_u);
+        (0..3).for_each(|k| knot.q[k] = by_x * x[k]);
+        (0..u.len()).for_each(|k| knot.r[k] = by_u * u[k]);
         if let &[v, _] = u {
             let (s, c) = x[2].sin_cos();
-            node.A.fill_with_identity();
-            (node.A[(0, 2)], node.A[(1, 2)]) = (-dt * v * s, dt * v * c);
-            node.B.fill(0.0);
-            (node.B[(0, 0)], node.B[(1, 0)], node.B[(2, 1)]) = (dt * c, dt * s, dt);
+            knot.A.fill_with_identity();
+            (knot.A[(0, 2)], knot.A[(1, 2)]) = (-dt * v * s, dt * v * c);
+            knot.B.fill(0.0);
+            (knot.B[(0, 0)], knot.B[(1, 0)], knot.B[(2, 1)]) = (dt * c, dt * s, dt);
         }
     }
 
@@ -107,7 +107,7 @@ impl ActionModel for Unicycle {
         true
     }
 
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         Some(Box::new(self.clone()))
     }
 }

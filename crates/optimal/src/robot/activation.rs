@@ -2,7 +2,7 @@
 
 use crate::problem::leave_a_value;
 
-/// A function a(r) that says how much a residual r costs.
+/// Function a(r) that says how much a residual r costs.
 ///
 /// ```
 /// use condyle_optimal::robot::Activation;
@@ -125,7 +125,7 @@ impl Activation {
         }
     }
 
-    /// A message for what does not fit a residual of n numbers.
+    /// Returns a message for what does not fit a residual of n numbers.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
             true if numbers.iter().any(|x| x.is_nan()) => Some(format!("its {name} holds a NaN")),

@@ -4,7 +4,7 @@ use crate::Error;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// A direction so much shorter than the longest one is rounding.
+/// Length below which a direction is rounding, relative to the longest direction.
 const LEAST: f64 = 1e-9;
 
 /// τ = S u: how the controls drive the joints.
@@ -30,7 +30,7 @@ enum Map {
 }
 
 impl Actuation {
-    /// Every joint is driven by controls of its own, but for a free-flyer at the root, which nothing drives.
+    /// Creates drives of every joint by its own controls, except a free-flyer at the root, which is not driven.
     pub fn joints(model: &Model) -> Self {
         let passive = match model.bodies().get(1) {
             Some(root) if root.joint == Joint::FreeFlyer => 6,
@@ -42,7 +42,7 @@ impl Actuation {
     /// Any linear map S, nv × nu: rotors, tendons, joints without motors.
     ///
     /// # Errors
-    /// [`Error::Actuation`] if S has not nv rows or a number in it is not finite.
+    /// [`Error::Actuation`] if S does not have nv rows or a number in it is not finite.
     pub fn matrix(model: &Model, S: DMatrix<f64>) -> Result<Self, Error> {
         let (rows, columns) = S.shape();
         if rows != model.nv() {
@@ -64,7 +64,7 @@ impl Actuation {
         }
     }
 
-    /// A drive for each coordinate.
+    /// Returns a drive for each coordinate.
     pub(super) fn all(model: &Model) -> Self {
         Self { nv: model.nv(), map: Map::After(0) }
     }
@@ -74,7 +74,7 @@ impl Actuation {
         Self { nv: model.nv(), map: Map::After(model.nv()) }
     }
 
-    /// The number of controls.
+    /// Returns the number of controls.
     pub fn nu(&self) -> usize {
         match &self.map {
             Map::After(passive) => self.nv - passive,
@@ -82,7 +82,8 @@ impl Actuation {
         }
     }
 
-    /// The number of coordinates, the first ones, that nothing drives, if each of the others has a control of its own.
+    /// Returns the number of coordinates, the first ones, that nothing drives, if each of the others has a control of
+    /// its own.
     pub(super) fn passive(&self) -> Option<usize> {
         match self.map {
             Map::After(passive) => Some(passive),
@@ -155,7 +156,7 @@ impl Actuation {
         }
     }
 
-    /// The scratch that `columns` needs for nv rows.
+    /// Returns the scratch that `columns` needs for nv rows.
     pub(super) fn scratch(&self) -> Vec<f64> {
         match &self.map {
             Map::After(_) => Vec::new(),
@@ -163,8 +164,8 @@ impl Actuation {
         }
     }
 
-    /// An orthonormal basis of the efforts that no control makes, row after row: Nᵀ with Nᵀ S = 0, unit vectors where S
-    /// selects.
+    /// Returns an orthonormal basis of the efforts that no control makes, row after row: Nᵀ with Nᵀ S = 0, unit vectors
+    /// where S selects.
     pub(super) fn undriven(&self) -> Vec<f64> {
         let nv = self.nv;
         let mut left = DMatrix::identity(nv, nv);
@@ -188,8 +189,8 @@ impl Actuation {
         }
     }
 
-    /// The smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
-    pub(super) fn hold(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
+    /// Returns the smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
+    pub(super) fn quasi_static(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
         let nu = self.nu();
         let mut map = DMatrix::zeros(self.nv, nu + J.nrows());
         for j in 0..nu {

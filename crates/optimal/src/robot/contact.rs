@@ -5,7 +5,7 @@ use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings
 use condyle_spatial::Scalar;
 use core::ops::Range;
 
-/// A contact of a frame with the world, and the name by which residuals call it.
+/// Contact of a frame with the world, and the name by which residuals call it.
 ///
 /// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it
 /// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its
@@ -27,23 +27,23 @@ use core::ops::Range;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Contact {
-    /// The name by which residuals call it.
+    /// Name by which residuals call it.
     pub name: String,
-    /// The constraint that it imposes.
+    /// Constraint that it imposes.
     pub constraint: ContactConstraint,
 }
 
 impl Contact {
-    /// A contact called `name`.
+    /// Returns a contact called `name`.
     pub fn new(name: &str, constraint: ContactConstraint) -> Self {
         Self { name: name.to_owned(), constraint }
     }
 }
 
-/// A damping for contacts whose forces are given, which may share them as they like: it is not used.
+/// Damping for contacts whose forces are given, which may share them as they like: it is not used.
 pub(super) const SHARED: f64 = 1.0;
 
-/// The constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
+/// Returns the constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
 pub(super) fn constraint_set<S: Scalar>(
     model: &Model,
     contacts: &[Contact],
@@ -56,7 +56,7 @@ pub(super) fn constraint_set<S: Scalar>(
     Ok(set)
 }
 
-/// An error of the constraints of some contacts, with the contact's name.
+/// Returns an error of the constraints of some contacts, with the contact's name.
 fn named(contacts: &[Contact], error: condyle_dynamics::Error) -> Error {
     match error {
         condyle_dynamics::Error::Constraint { constraint, what } => {
@@ -110,7 +110,7 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
     Ok(())
 }
 
-/// The names of contacts, and the rows of each in λ.
+/// Returns the names of contacts, and the rows of each in λ.
 pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     let mut row = 0;
     let rows = contacts.iter().map(|Contact { name, constraint }| {
@@ -120,7 +120,7 @@ pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     rows.collect()
 }
 
-/// The coordinates that move each row of all contacts.
+/// Returns the coordinates that move each row of all contacts.
 pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     let rows = contacts.iter().flat_map(|Contact { constraint, .. }| {
         let frames = [Some(constraint.frame), constraint.other].into_iter().flatten();
@@ -129,7 +129,7 @@ pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     rows.collect()
 }
 
-/// The coordinates that move some frames, in order.
+/// Returns the coordinates that move some frames, in order.
 pub(super) fn coordinates_of(model: &Model, frames: impl IntoIterator<Item = usize>) -> Vec<usize> {
     let mut coordinates = Vec::new();
     for frame in frames {
@@ -140,7 +140,7 @@ pub(super) fn coordinates_of(model: &Model, frames: impl IntoIterator<Item = usi
     coordinates
 }
 
-/// The coordinates of a body's joint and of those before it, up to the world.
+/// Returns the coordinates of a body's joint and of those before it, up to the world.
 pub(super) fn path(model: &Model, body: usize) -> Vec<usize> {
     let (mut path, mut body) = (Vec::new(), body);
     while body > 0 {

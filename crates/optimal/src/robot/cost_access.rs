@@ -2,19 +2,19 @@
 
 use super::activation::Activation;
 use super::costs::{Cost, Costs, check_weight};
-use super::dynamics::knots::knot_of;
-use super::horizon_terms::HorizonTerms;
+use super::horizon::HorizonTerms;
 use super::residuals::target::Target;
+use crate::problem::innermost;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
 
-/// A cost term of a robot's knots, to be changed between solves. What does not fit is refused and changes nothing.
+/// Cost term of a robot's knots, to be changed between solves. What does not fit is refused and changes nothing.
 #[derive(Debug)]
 pub struct CostMut<'a> {
     cost: &'a mut Cost,
     model: &'a Model,
     nu: usize,
-    /// The number of entries of the residual.
+    /// Number of entries of the residual.
     n: usize,
 }
 
@@ -66,7 +66,8 @@ impl CostMut<'_> {
 }
 
 impl Costs {
-    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if there is none.
+    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if it does not
+    /// exist.
     pub fn cost_mut(&mut self, name: &str) -> Option<CostMut<'_>> {
         let k = self.terms().iter().position(|cost| cost.name == name)?;
         let Self { model, capabilities, terms } = self;
@@ -75,9 +76,9 @@ impl Costs {
     }
 }
 
-/// The costs and limits of the robot of an action.
+/// Returns the costs and limits of the robot of an action.
 fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
-    Some(&mut knot_of(action)?.robot_mut().terms)
+    Some(&mut innermost(action)?.robot()?.terms)
 }
 
 /// Access to the costs of robots, whatever the dynamics and integrator of a knot, under [`Constrained`](crate::Constrained)
@@ -104,15 +105,15 @@ impl Problem {
         terms_of(self.chosen(index)?)?.costs_mut(None).cost_mut(name)
     }
 
-    /// Returns the cost called `name` of knot t, of the terminal one for t = N: the knot's own if it has costs of its own,
-    /// else that of its model, which other knots share; `None` if there is none.
+    /// Returns the cost called `name` of knot t, or of the terminal knot for t = N. It is the knot's own cost if
+    /// the knot has its own costs, else the cost of its model, which other knots share. `None` if it does not exist.
     ///
     /// # Panics
     /// If t > N.
     #[track_caller]
     pub fn cost_at_mut(&mut self, t: usize, name: &str) -> Option<CostMut<'_>> {
         self.assert_knot(t);
-        let action = match self.stages().get(t) {
+        let action = match self.knot_models().get(t) {
             Some(&index) => self.chosen(index)?,
             None => self.action_mut(t),
         };

@@ -1,7 +1,7 @@
 //! Costs of a robot's state and control: weighted sums of activations of residuals.
 
 use super::activation::Activation;
-use super::capabilities::Capabilities;
+use super::knot_data::Capabilities;
 use super::residuals::layout::Plan;
 use super::residuals::residual::Residual;
 use super::residuals::terms::{Objective, Term, Terms};
@@ -9,29 +9,29 @@ use crate::Error;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// A term w · a(r(x, u)) of a cost.
+/// Term w · a(r(x, u)) of a cost.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Cost {
-    /// The name of the term.
+    /// Name of the term.
     pub name: String,
-    /// The weight w, finite and at least 0; a term whose weight is 0 is not computed.
+    /// Weight w, finite and at least 0; a term whose weight is 0 is not computed.
     pub weight: f64,
-    /// The residual r.
+    /// Residual r.
     pub residual: Residual,
-    /// The activation a.
+    /// Activation a.
     pub activation: Activation,
 }
 
 impl Cost {
-    /// The term `weight` · activation(residual), called `name`.
+    /// Returns the term `weight` · activation(residual), called `name`.
     pub fn new(name: &str, weight: f64, residual: Residual, activation: Activation) -> Self {
         Self { name: name.to_owned(), weight, residual, activation }
     }
 }
 
-/// A sum of terms, called by their names.
+/// Sum of terms, called by their names.
 ///
 /// Derivatives are exact; second derivatives are Gauss–Newton's, w (∂r)ᵀ a″ ∂r. Kinematics that several terms look at
 /// are computed once for a knot, and only where a Jacobian is not zero is anything added.
@@ -53,7 +53,7 @@ impl Term for Cost {
 }
 
 impl Cost {
-    /// The plan of the residual, or what does not fit.
+    /// Returns the plan of the residual, or what does not fit.
     fn plan(&self, model: &Model, capabilities: &Capabilities) -> Result<Plan, Error> {
         let wrong = |what: String| Error::Cost { name: self.name.clone(), what };
         let plan = Plan::new(model, capabilities, &self.residual).map_err(wrong)?;
@@ -72,7 +72,7 @@ pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
     Err(Error::Cost { name: name.to_owned(), what })
 }
 
-/// A factor times w a(r).
+/// Factor times w a(r).
 pub(super) struct WeightedActivations(pub f64);
 
 impl Objective<Cost> for WeightedActivations {
@@ -87,7 +87,7 @@ impl Objective<Cost> for WeightedActivations {
 }
 
 impl Costs {
-    /// The sum of some terms for a robot whose dynamics have some capabilities.
+    /// Returns the sum of some terms for a robot whose dynamics have some capabilities.
     pub(super) fn new(model: Arc<Model>, capabilities: Arc<Capabilities>, costs: Vec<Cost>) -> Result<Self, Error> {
         for (k, cost) in costs.iter().enumerate() {
             if costs[..k].iter().any(|other| other.name == cost.name) {
@@ -103,12 +103,12 @@ impl Costs {
         Ok(Self { model, capabilities, terms })
     }
 
-    /// The terms.
+    /// Returns the terms.
     pub fn terms(&self) -> &[Cost] {
         self.terms.all()
     }
 
-    /// Changes the weight of the term called `name`, between solves; says whether there is one.
+    /// Changes the weight of the term called `name`, between solves; returns whether it exists.
     ///
     /// # Errors
     /// [`Error::Cost`] if the weight is negative or not finite; the old one then stays.
@@ -118,7 +118,7 @@ impl Costs {
         Ok(cost.map(|cost| cost.weight = weight).is_some())
     }
 
-    /// Changes what the term called `name` looks at, between solves: its target, for example. Allocates.
+    /// Changes what the term called `name` reads, between solves: its target, for example. Allocates.
     ///
     /// # Errors
     /// [`Error::Cost`] if there is no such term, the residual does not fit the robot, or it has another number of

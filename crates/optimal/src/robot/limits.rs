@@ -1,8 +1,7 @@
 //! Limits of a robot's state, control and forces: residuals that are held within bounds.
 
-use super::capabilities::Capabilities;
-use super::per_knot::PerKnot;
-use super::per_model::PerModel;
+use super::horizon::{PerKnot, PerModel};
+use super::knot_data::Capabilities;
 use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
@@ -10,7 +9,7 @@ use crate::Error;
 use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
-/// A residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
+/// Residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
 ///
 /// [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds it; to [`Fddp`](crate::Fddp) alone it is a cost for leaving the
 /// bounds. It shares dynamics and kinematics with the costs of its knot, and holds at the knot's beginning, whatever the
@@ -44,14 +43,14 @@ use condyle_dynamics::Model;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Limit {
-    /// The name by which errors call it.
+    /// Name by which errors call it.
     pub name: String,
-    /// The residual r.
+    /// Residual r.
     pub residual: Residual,
-    /// The least values; −∞ for none. Empty, as is `upper`, where r = 0.
+    /// Least values; −∞ for none. Empty, as is `upper`, where r = 0.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
-    /// The greatest values; ∞ for none.
+    /// Greatest values; ∞ for none.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
@@ -67,7 +66,7 @@ impl Limit {
         Self::new(name, residual, vec![], vec![])
     }
 
-    /// The plan of the residual, or what does not fit; sets bounds that are left out.
+    /// Returns the plan of the residual, or what does not fit; sets bounds that are left out.
     fn plan(&mut self, model: &Model, capabilities: &Capabilities) -> Result<Plan, String> {
         let plan = Plan::new(model, capabilities, &self.residual)?;
         if self.lower.is_empty() && self.upper.is_empty() {
@@ -90,19 +89,20 @@ impl Term for Limit {
     }
 }
 
-/// The limits of a knot.
+/// Limits of a knot.
 #[derive(Clone, Debug, Default)]
 struct LimitSet {
     terms: Terms<Limit>,
-    /// The bounds of all, one after the other.
+    /// Bounds of all, one after the other.
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// The name and the rows of each.
+    /// Name and the rows of each.
     parts: Vec<Part>,
 }
 
 impl LimitSet {
-    /// The set of some limits, of one knot of the horizon or of all, for a robot whose dynamics have some capabilities.
+    /// Returns the set of some limits, of one knot of the horizon or of all, for a robot whose dynamics have some
+    /// capabilities.
     fn new(model: &Model, capabilities: &Capabilities, limits: Vec<Limit>, knot: Option<usize>) -> Result<Self, Error> {
         let mut set = Self::default();
         for mut limit in limits {
@@ -122,29 +122,25 @@ impl LimitSet {
     }
 }
 
-/// The limits of all knots that an action serves, with their multipliers.
+/// Limits of all knots that an action serves, with their multipliers.
 #[derive(Clone, Debug)]
-pub struct Limits {
+pub(crate) struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
     /// Those that the dynamics ask for at every knot, before those that are given.
     own: Vec<Limit>,
     /// No limits, where they do not count.
     none: Terms<Limit>,
     multipliers: Multipliers,
-    /// Whether limits count: not at later stages of a step.
-    pub(super) active: bool,
-    /// The term of the augmented Lagrangian, which no Δt scales. Written by: `HorizonTerms::calc`.
-    pub(super) term: f64,
 }
 
 impl Limits {
     /// No limits.
     pub(super) fn none() -> Self {
         let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
-        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0), active: true, term: 0.0 }
+        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0) }
     }
 
-    /// The same with the limits that the dynamics ask for at every knot.
+    /// Returns the same with the limits that the dynamics ask for at every knot.
     pub(super) fn asked_for(own: Vec<Limit>) -> Self {
         Self { own, ..Self::none() }
     }
@@ -163,20 +159,20 @@ impl Limits {
         Ok(())
     }
 
-    /// The sets of all knots of all models.
+    /// Returns the sets of all knots of all models.
     fn all(&self) -> impl Iterator<Item = &LimitSet> {
         self.sets.all().iter().flat_map(PerKnot::all)
     }
 
-    /// The most numbers that a knot's limits have.
+    /// Returns the most numbers that a knot's limits have.
     fn most(&self) -> usize {
         self.all().map(|set| set.terms.len()).max().unwrap_or(0)
     }
 
     /// Takes over the limits of the models that another action stands for. Forgets multipliers.
-    pub(super) fn append(&mut self, other: &mut Self) {
+    pub(super) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         let most = self.multipliers.size().max(other.multipliers.size());
-        self.sets.append(&mut other.sets);
+        self.sets.append(&mut other.sets, place);
         self.multipliers = Multipliers::new(most);
     }
 
@@ -185,7 +181,7 @@ impl Limits {
         self.sets.choose(model);
     }
 
-    /// Lets a model serve knot t of so many.
+    /// Assigns knot t, of `horizon` knots, to a model.
     pub(super) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.sets.serve(t, horizon, model);
     }
@@ -195,20 +191,20 @@ impl Limits {
         self.sets.all_mut().iter_mut().for_each(PerKnot::shift);
     }
 
-    /// The memory that the limits of any knot take.
+    /// Returns the memory that the limits of any knot take.
     pub(super) fn layout(&self) -> KnotLayout {
         self.all().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
 
-    /// The limits that count at knot t.
-    pub(super) fn at(&self, t: usize) -> &Terms<Limit> {
-        if self.active { &self.sets.at(t).at(t).terms } else { &self.none }
+    /// Returns the limits of knot t if it is `limited`: limits count at the first stage of a step only.
+    pub(super) fn at(&self, t: usize, limited: bool) -> &Terms<Limit> {
+        if limited { &self.sets.at(t).at(t).terms } else { &self.none }
     }
 
-    /// The limits that count at knot t, and what they are worth.
-    pub(super) fn objective(&mut self, t: usize) -> (&Terms<Limit>, LimitObjective<'_>) {
-        let Self { sets, none, multipliers, active, .. } = self;
-        let terms = if *active { &sets.at(t).at(t).terms } else { none };
+    /// Returns the limits as [`at`](Self::at) does, and their term of the augmented Lagrangian.
+    pub(super) fn objective(&mut self, t: usize, limited: bool) -> (&Terms<Limit>, LimitObjective<'_>) {
+        let Self { sets, none, multipliers, .. } = self;
+        let terms = if limited { &sets.at(t).at(t).terms } else { none };
         (terms, LimitObjective { multipliers, t })
     }
 
@@ -219,7 +215,7 @@ impl Limits {
     }
 }
 
-/// The term of the augmented Lagrangian at knot t.
+/// Term of the augmented Lagrangian at knot t.
 pub(super) struct LimitObjective<'a> {
     pub multipliers: &'a mut Multipliers,
     t: usize,

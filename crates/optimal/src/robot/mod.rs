@@ -4,7 +4,7 @@
 //! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a
 //!   residual within bounds, or to zero.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
-//!   [`InverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts too. An
+//!   [`FreeInverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts too. An
 //!   [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a [`ControlPolynomial`] says how
 //!   the controls go through it.
 //! - A residual of your own is a [`GenericResidual`], written once for any scalar and differentiated exactly
@@ -49,21 +49,17 @@
 
 mod activation;
 mod actuation;
-mod capabilities;
 mod contact;
 mod continuous;
 mod cost_access;
 mod costs;
 mod dynamics;
-mod horizon_terms;
+mod horizon;
 mod integrators;
-mod knot;
+mod knot_data;
 mod limits;
 mod motion;
-mod on_demand;
 mod own_constraint;
-mod per_knot;
-mod per_model;
 mod problem;
 mod residuals;
 mod state;
@@ -71,14 +67,18 @@ mod state;
 pub use activation::Activation;
 pub use actuation::Actuation;
 pub use contact::Contact;
-pub use continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
+pub use continuous::{ContinuousModel, Derivatives, KnotInput};
 pub use cost_access::CostMut;
 pub use costs::{Cost, Costs};
+pub use dynamics::acceleration::{
+    Controlled, ControlledInContact, Free, InContact, InImpact, RobotAcceleration, RobotKind,
+};
 pub use dynamics::contact::{ContactAcceleration, ContactDynamics};
 pub use dynamics::free::{FreeAcceleration, FreeDynamics};
 pub use dynamics::impulse::ImpulseDynamics;
-pub use dynamics::inverse::{ControlledAcceleration, InverseDynamics};
+pub use dynamics::inverse::{ControlledAcceleration, FreeInverseDynamics};
 pub use dynamics::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
+pub(crate) use dynamics::robot::RobotDynamics;
 pub use integrators::{ControlPolynomial, Integrated, Integrator};
 pub use limits::Limit;
 pub use motion::{ContactForce, KnotMotion};

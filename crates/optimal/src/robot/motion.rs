@@ -1,37 +1,37 @@
 //! The motion of a robot at a knot: accelerations, efforts of joints, and forces of contacts.
 
 use super::contact::Contact;
-use super::dynamics::knots::knot_of;
+use crate::problem::innermost;
 use crate::{Problem, Solution};
 use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
 
-/// The accelerations, efforts and forces at a knot, at its beginning.
+/// Accelerations, efforts and forces at a knot, at its beginning.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct KnotMotion {
-    /// The accelerations q̈. Shape: nv; empty at an impact.
+    /// Accelerations q̈. Shape: nv; empty at an impact.
     pub acceleration: Vec<f64>,
-    /// The efforts τ of all joints (N, N m): S u, or where accelerations are controls those of inverse dynamics, which are 0 for
-    /// an undriven base up to the tolerance of the constraints. Shape: nv; empty at an impact and without a robot.
+    /// Efforts τ of all joints (N, N m): S u. If accelerations are controls, they follow by inverse dynamics, and are 0
+    /// for an undriven base up to the tolerance of the constraints. Shape: nv; empty at an impact and without a robot.
     pub effort: Vec<f64>,
-    /// The jump of the velocities at an impact, v⁺ − v. Shape: nv; empty at other knots.
+    /// Jump of the velocities at an impact, v⁺ − v. Shape: nv; empty at other knots.
     pub velocity_change: Vec<f64>,
-    /// The contacts of the knot, in the order in which the action was given them.
+    /// Contacts of the knot, in the order in which the action was given them.
     pub contacts: Vec<ContactForce>,
 }
 
-/// The force with which the world acts on a contact's body (N, N m); at an impact its impulse (N s, N m s). For a loop, that
-/// on the body of the constraint's first frame.
+/// Force with which the world acts on a contact's body (N, N m); at an impact its impulse (N s, N m s). For a loop,
+/// that on the body of the constraint's first frame.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ContactForce {
-    /// The name of the contact.
+    /// Name of the contact.
     pub name: String,
-    /// The number of the contact's frame in the robot.
+    /// Number of the contact's frame in the robot.
     pub frame: usize,
-    /// The force along the world's axes; its moment is about the frame's origin. Of a point it has no moment.
+    /// Force along the world's axes; its moment is about the frame's origin. Of a point it has no moment.
     pub force: Force<f64>,
-    /// The same along the frame's own axes.
+    /// Same along the frame's own axes.
     pub local: Force<f64>,
 }
 
@@ -48,7 +48,7 @@ impl KnotMotion {
 }
 
 impl ContactForce {
-    /// The force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
+    /// Returns the force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
     fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
         let axes = constraint.axes;
         let along = match *rows {
@@ -67,7 +67,7 @@ impl ContactForce {
     }
 }
 
-/// The forces of some contacts at a position, from the numbers of all their rows.
+/// Returns the forces of some contacts at a position, from the numbers of all their rows.
 fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<ContactForce> {
     if contacts.is_empty() {
         return Vec::new();
@@ -86,8 +86,8 @@ fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<C
 /// Accelerations, efforts and contact forces of robots, whatever the dynamics and integrator of a knot, under
 /// [`Constrained`](crate::Constrained) actions too.
 impl Problem {
-    /// Computes the accelerations, efforts and contact forces of a solution at knot t, 0 to N; `None` where there are none: at
-    /// the end of a horizon, and for actions that are not of a robot and compute no accelerations. Allocates.
+    /// Computes the accelerations, efforts and contact forces of a solution at knot t, 0 to N; `None` at the
+    /// end of a horizon, and for actions that do not belong to a robot and compute no accelerations. Allocates.
     ///
     /// The solution must be of this problem as it is now. After [`shift`](Self::shift), a solution of before belongs to other
     /// knots.
@@ -133,9 +133,9 @@ impl Problem {
             _ => {}
         });
         let action = self.action_mut(t);
-        if let Some(knot) = knot_of(action) {
-            let (model, is_impact) = (knot.robot().model.clone(), knot.robot().is_impact());
-            motion.contacts = forces(&model, knot.contacts(), &rows, &x[..model.nq()]);
+        if let Some(robot) = innermost(action).and_then(|group| group.robot()) {
+            let (model, is_impact) = (robot.model.clone(), robot.is_impact());
+            motion.contacts = forces(&model, robot.contacts(), &rows, &x[..model.nq()]);
             if is_impact {
                 let mut next = x.to_vec();
                 action.calc(t, x, u, &mut next);

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::problem::leave_a_value;
 use nalgebra::DMatrix;
 
-/// A residual of one's own within bounds at every knot, lower ≤ r(t, x, u) ≤ upper, as a [`PathConstraint`]: for actions
+/// Residual of one's own within bounds at every knot, lower ≤ r(t, x, u) ≤ upper, as a [`PathConstraint`]: for actions
 /// that are not a robot's knots. Those take a [`Limit`](crate::robot::Limit) of the same residual, which costs less.
 ///
 /// ```
@@ -41,7 +41,7 @@ pub struct OwnConstraint {
 }
 
 impl OwnConstraint {
-    /// Makes the constraint lower ≤ r ≤ upper, with bounds that are infinite where there is none.
+    /// Makes the constraint lower ≤ r ≤ upper, with infinite bounds where r is unbounded.
     ///
     /// # Errors
     /// [`Error::Length`] if a bound does not have as many numbers as r; [`Error::Constraint`] if bounds leave no value.
@@ -95,7 +95,7 @@ impl PathConstraint for OwnConstraint {
         true
     }
 
-    fn fork(&self) -> Option<Box<dyn PathConstraint>> {
+    fn try_clone(&self) -> Option<Box<dyn PathConstraint>> {
         Some(Box::new(self.clone()))
     }
 }

@@ -4,12 +4,12 @@ use super::actuation::Actuation;
 use super::contact::Contact;
 use super::continuous::ContinuousModel;
 use super::costs::Cost;
+use super::dynamics::acceleration::{RobotAcceleration, RobotKind};
 use super::dynamics::contact::ContactAcceleration;
 use super::dynamics::free::{FreeAcceleration, FreeDynamics};
 use super::dynamics::impulse::ImpulseDynamics;
 use super::dynamics::inverse::ControlledAcceleration;
 use super::dynamics::inverse_contact::ControlledContactAcceleration;
-use super::dynamics::knots::HasRobot;
 use super::integrators::{ControlPolynomial, Integrated, Integrator};
 use super::limits::Limit;
 use crate::ActionModel;
@@ -19,7 +19,7 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// An optimal control problem of a robot as data, with the robot in it: to keep it in a file, to send it, to solve it
+/// Optimal control problem of a robot as data, with the robot in it: to keep it in a file, to send it, to solve it
 /// again. [`build`](Self::build) makes the [`Problem`]; what is wrong in it is found there.
 ///
 /// Any format of serde serves. In JSON a bound that is infinite is `null`.
@@ -33,8 +33,8 @@ use std::sync::Arc;
 ///     model: robots::arm7(),
 ///     x0: vec![0.1; 14],
 ///     knots: vec![Knot::new(step, vec![rest.clone()])],
-///     stages: vec![0; 20],
-///     terminal: Knot::new(Dynamics::End, vec![rest]),
+///     knot_models: vec![0; 20],
+///     terminal: Knot::new(Dynamics::Terminal, vec![rest]),
 /// };
 /// let text = serde_json::to_string(&data)?;
 /// let problem = serde_json::from_str::<RobotProblem>(&text)?.build()?;
@@ -45,31 +45,32 @@ use std::sync::Arc;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RobotProblem {
-    /// The robot.
+    /// Robot.
     pub model: Model,
-    /// The initial state (q, v).
+    /// Initial state (q, v).
     pub x0: Vec<f64>,
-    /// The kinds of knots.
+    /// Kinds of knots.
     pub knots: Vec<Knot>,
-    /// The index of one of them for each knot of the horizon.
-    pub stages: Vec<usize>,
-    /// The knot after the last one: the end, or an impact.
+    /// Index of one of them for each knot of the horizon.
+    #[cfg_attr(feature = "serde", serde(alias = "stages"))]
+    pub knot_models: Vec<usize>,
+    /// Knot after the last one: the end, or an impact.
     pub terminal: Knot,
 }
 
-/// A knot as data.
+/// Knot as data.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Knot {
-    /// The rule by which the state goes on.
+    /// Rule by which the state goes on.
     pub dynamics: Dynamics,
-    /// The costs.
+    /// Costs.
     pub costs: Vec<Cost>,
     /// Other costs in their place, by the number of a knot of the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
-    /// The limits.
+    /// Limits.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub limits: Vec<Limit>,
     /// Other limits in their place, by the number of a knot of the horizon.
@@ -78,25 +79,25 @@ pub struct Knot {
     /// Bounds on the controls, if there are any.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub bounds: Option<ControlBounds>,
-    /// How the controls go through the knot's time; constant at an impact and at the end, which have none.
+    /// Polynomial of the controls in time; constant at an impact and at the terminal knot, which have no controls.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "ControlPolynomial::is_constant"))]
     pub controls: ControlPolynomial,
 }
 
-/// Bounds on the controls of a knot, nu numbers each, infinite where there is none; of polynomials, at each of their nodes.
+/// Bounds on the controls of a knot, nu numbers each, infinite for an unbounded control. They hold at each node of a polynomial.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ControlBounds {
-    /// The least values.
+    /// Least values.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
-    /// The greatest values.
+    /// Greatest values.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
 
-/// The rule by which the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
+/// Rule by which the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
@@ -108,14 +109,14 @@ pub enum Dynamics {
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// The integrator.
+        /// Integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
     },
     /// [`ContactDynamics`](super::ContactDynamics).
     Contact {
-        /// The contacts that hold.
+        /// Contacts that hold.
         contacts: Vec<Contact>,
         /// μ (1/kg).
         damping: f64,
@@ -123,42 +124,43 @@ pub enum Dynamics {
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// The integrator.
+        /// Integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
     },
     /// [`ImpulseDynamics`].
     Impulse {
-        /// The contacts that set in.
+        /// Contacts that set in.
         contacts: Vec<Contact>,
         /// ε, from 0 to 1.
         restitution: f64,
         /// μ (1/kg).
         damping: f64,
     },
-    /// [`InverseDynamics`](super::InverseDynamics).
+    /// [`FreeInverseDynamics`](super::FreeInverseDynamics).
     Inverse {
-        /// The integrator.
+        /// Integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
     },
     /// [`ContactInverseDynamics`](super::ContactInverseDynamics).
     ContactInverse {
-        /// The contacts that hold.
+        /// Contacts that hold.
         contacts: Vec<Contact>,
         /// S.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// The integrator.
+        /// Integrator.
         integrator: Integrator,
         /// Δt (s).
         dt: f64,
     },
     /// [`FreeDynamics::terminal`], after the last knot.
-    End,
+    #[cfg_attr(feature = "serde", serde(alias = "end"))]
+    Terminal,
 }
 
 impl Dynamics {
@@ -169,36 +171,47 @@ impl Dynamics {
             | Self::Contact { dt, .. }
             | Self::Inverse { dt, .. }
             | Self::ContactInverse { dt, .. } => Some(dt),
-            Self::Impulse { .. } | Self::End => None,
+            Self::Impulse { .. } | Self::Terminal => None,
+        }
+    }
+
+    /// Sets Δt (s), except for an impact and the terminal knot, which take no time.
+    pub fn set_dt(&mut self, seconds: f64) {
+        match self {
+            Self::Free { dt, .. }
+            | Self::Contact { dt, .. }
+            | Self::Inverse { dt, .. }
+            | Self::ContactInverse { dt, .. } => *dt = seconds,
+            Self::Impulse { .. } | Self::Terminal => {}
         }
     }
 }
 
 impl RobotProblem {
-    /// The problem. Allocates.
+    /// Returns the problem. Allocates.
     ///
     /// # Errors
     /// Those of the knots' constructors and of [`Problem::new`].
     pub fn build(&self) -> Result<Problem, Error> {
         let model = Arc::new(self.model.clone());
         let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
-        Problem::new(self.x0.clone(), knots, self.stages.clone(), self.terminal.build(&model)?)
+        Problem::new(self.x0.clone(), knots, self.knot_models.clone(), self.terminal.build(&model)?)
     }
 }
 
 impl Knot {
-    /// A knot with these costs wherever it serves, without limits and bounds.
+    /// Returns a knot with these costs wherever it serves, without limits and bounds.
     pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
         let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
         let controls = ControlPolynomial::Constant;
         Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None, controls }
     }
 
-    /// The action. Allocates.
+    /// Returns the action. Allocates.
     ///
     /// # Errors
-    /// Those of its constructor; [`Error::Length`] for bounds of another length than nu; [`Error::Actuation`] for controls that
-    /// are not constant where there are none.
+    /// The errors of its constructor; [`Error::Length`] for bounds of another length than nu; [`Error::Actuation`] for a
+    /// polynomial of controls at a knot without controls.
     pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
         let (model, costs) = (model.clone(), self.costs.clone());
         let drives = |actuation: &Option<DMatrix<f64>>| match actuation {
@@ -223,12 +236,12 @@ impl Knot {
                 self.bounded(Integrated::new(inner, *integrator, *dt)?)
             }
             Dynamics::Impulse { contacts, restitution, damping } => {
-                let action = ImpulseDynamics::new(model.clone(), contacts, *restitution, *damping, costs)?;
+                let action = ImpulseDynamics::instant(model.clone(), contacts, *restitution, *damping, costs)?;
                 self.check_bounds(0)?;
                 self.check_no_controls()?;
                 Ok(Box::new(self.complete(action)?))
             }
-            Dynamics::End => {
+            Dynamics::Terminal => {
                 self.check_bounds(0)?;
                 self.check_no_controls()?;
                 Ok(Box::new(self.complete(FreeDynamics::terminal(model, costs)?)?))
@@ -237,8 +250,11 @@ impl Knot {
     }
 
     /// Gives an action the limits, and the costs and limits of single knots.
-    fn complete<K: HasRobot>(&self, mut action: K) -> Result<K, Error> {
-        let terms = &mut action.robot_mut().terms;
+    fn complete<K: RobotKind>(
+        &self,
+        mut action: Integrated<RobotAcceleration<K>>,
+    ) -> Result<Integrated<RobotAcceleration<K>>, Error> {
+        let terms = action.terms_mut();
         terms.set_limits(None, self.limits.clone())?;
         for (&t, costs) in &self.costs_at {
             terms.set_costs(t, costs.clone())?;
@@ -267,7 +283,7 @@ impl Knot {
         }
     }
 
-    fn bounded<M: ContinuousModel + HasRobot>(&self, action: Integrated<M>) -> Result<Box<dyn ActionModel>, Error> {
+    fn bounded<K: RobotKind>(&self, action: Integrated<RobotAcceleration<K>>) -> Result<Box<dyn ActionModel>, Error> {
         let action = self.complete(action)?.with_controls(self.controls);
         self.check_bounds(action.inner().nu())?;
         Ok(match &self.bounds {

@@ -2,21 +2,12 @@
 
 use crate::lq::Hessian;
 use condyle_dynamics::{
-    DifferenceArgument, IntegrateArgument, Joint, Model, difference, difference_jacobian, integrate, integrate_jacobian,
+    DifferenceArgument, IntegrateArgument, Joint, Model, difference, difference_jacobian, integrate_jacobian,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::lane_dual::LaneDual;
 use core::ops::Range;
 use nalgebra::DMatrix;
-
-/// x ⊕ δx, with δx = (δq, δv): q ⊕ δq in the configuration space, v + δv.
-pub(super) fn state_integrate(model: &Model, x: &[f64], dx: &[f64], out: &mut [f64]) {
-    let (nq, nv) = (model.nq(), model.nv());
-    integrate(model, &x[..nq], &dx[..nv], &mut out[..nq]);
-    for k in 0..nv {
-        out[nq + k] = x[nq + k] + dx[nv + k];
-    }
-}
 
 /// x₁ ⊖ x₀ = (q₁ ⊖ q₀, v₁ − v₀).
 pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut [f64]) {
@@ -27,13 +18,14 @@ pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut 
     }
 }
 
-/// The coordinates of each joint of a robot whose positions are no vector space: elsewhere the Jacobians of ⊕ and ⊖ are ±1.
+/// Returns the coordinates of each joint of a robot whose positions are no vector space: elsewhere the Jacobians of ⊕
+/// and ⊖ are ±1.
 pub fn groups(model: &Model) -> Vec<Range<usize>> {
     let group = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
     model.bodies()[1..].iter().filter(|b| group(b.joint)).map(|b| b.idx_v..b.idx_v + b.joint.nv()).collect()
 }
 
-/// Room for the second derivatives of q ⊕ δ along the groups, empty where there are none.
+/// Workspace for the second derivatives of q ⊕ δ along the groups; empty without groups.
 #[derive(Debug)]
 pub(super) struct GroupHessian {
     /// δ, with one coordinate of each group moving. Shape: nv. Written by: `run`.
@@ -53,7 +45,8 @@ impl GroupHessian {
         Self { delta: vec![zero; n], E: DMatrix::from_element(n, n, zero), back: square.clone(), M: square }
     }
 
-    /// The second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) by δ₀ and ε, at zero, of each group.
+    /// Computes the second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) by δ₀ and ε, at zero, of each
+    /// group.
     ///
     /// Let E(δ) = J_exp(δ), M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. In the group θ = λᵀ log(exp(Tδ₀) exp(η)), T = Ad exp(−δ), where
     /// dη = J_log(η) E(δ + ε) dε, thus

@@ -2,7 +2,7 @@
 #![allow(dead_code)] // each test file uses some of them
 #![allow(non_snake_case)] // A, B, T, E
 
-use condyle_optimal::{ActionModel, LqNode, Problem};
+use condyle_optimal::{ActionModel, GroupModel, LqKnot, Problem};
 use nalgebra::DMatrix;
 use rand::{Rng, RngExt, SeedableRng, rngs::StdRng};
 use std::ops::Range;
@@ -17,42 +17,42 @@ pub(crate) fn random_matrix(random: &mut impl Rng, m: usize, n: usize) -> DMatri
 }
 
 /// Returns an LQ knot with random entries and a cost that is strictly convex in (δx, δu).
-pub(crate) fn random_node(random: &mut impl Rng, ndx: usize, nu: usize) -> LqNode {
-    let mut node = LqNode::zeros(ndx, nu);
+pub(crate) fn random_knot(random: &mut impl Rng, ndx: usize, nu: usize) -> LqKnot {
+    let mut knot = LqKnot::zeros(ndx, nu);
     let root = random_matrix(random, ndx + nu, ndx + nu);
     let hessian = &root * root.transpose() + DMatrix::identity(ndx + nu, ndx + nu);
-    node.A = random_matrix(random, ndx, ndx);
-    node.B = random_matrix(random, ndx, nu);
-    node.f = random_matrix(random, ndx, 1).column(0).into_owned();
-    node.Q.copy_from(&hessian.view((0, 0), (ndx, ndx)));
-    node.S.copy_from(&hessian.view((0, ndx), (ndx, nu)));
-    node.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
-    node.q = random_matrix(random, ndx, 1).column(0).into_owned();
-    node.r = random_matrix(random, nu, 1).column(0).into_owned();
-    node
+    knot.A = random_matrix(random, ndx, ndx);
+    knot.B = random_matrix(random, ndx, nu);
+    knot.f = random_matrix(random, ndx, 1).column(0).into_owned();
+    knot.Q.copy_from(&hessian.view((0, 0), (ndx, ndx)));
+    knot.S.copy_from(&hessian.view((0, ndx), (ndx, nu)));
+    knot.R.copy_from(&hessian.view((ndx, ndx), (nu, nu)));
+    knot.q = random_matrix(random, ndx, 1).column(0).into_owned();
+    knot.r = random_matrix(random, nu, 1).column(0).into_owned();
+    knot
 }
 
 /// Returns a knot as [`random_node`] does, whose A and B belong to semi-implicit Euler. q and v have nv entries each. T
 /// and E are the identity, except for random blocks over `blocks`.
-pub(crate) fn random_euler_node(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqNode {
-    let (mut node, dt) = (random_node(random, 2 * nv, nu), 0.05);
+pub(crate) fn random_euler_knot(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqKnot {
+    let (mut knot, dt) = (random_knot(random, 2 * nv, nu), 0.05);
     let (mut T, mut E) = (DMatrix::identity(nv, nv), DMatrix::identity(nv, nv));
-    for (block, range) in node.structure.set_euler(dt, blocks).iter_mut().zip(blocks) {
+    for (block, range) in knot.structure.set_euler(dt, blocks).iter_mut().zip(blocks) {
         block.T = random_matrix(random, range.len(), range.len());
         block.E = random_matrix(random, range.len(), range.len());
         T.view_mut((range.start, range.start), block.T.shape()).copy_from(&block.T);
         E.view_mut((range.start, range.start), block.E.shape()).copy_from(&block.E);
     }
-    let mut upper = &E * node.A.rows(nv, nv) * dt;
+    let mut upper = &E * knot.A.rows(nv, nv) * dt;
     upper += T.resize_horizontally(2 * nv, 0.0);
-    node.A.rows_mut(0, nv).copy_from(&upper);
-    let upper = &E * node.B.rows(nv, nv) * dt;
-    node.B.rows_mut(0, nv).copy_from(&upper);
-    node
+    knot.A.rows_mut(0, nv).copy_from(&upper);
+    let upper = &E * knot.B.rows(nv, nv) * dt;
+    knot.B.rows_mut(0, nv).copy_from(&upper);
+    knot
 }
 
 /// LQ knot as an action: x⁺ = A x + B u + f with a quadratic cost.
-pub(crate) struct Linear(pub(crate) LqNode);
+pub(crate) struct Linear(pub(crate) LqKnot);
 
 impl ActionModel for Linear {
     fn nx(&self) -> usize {
@@ -62,16 +62,16 @@ impl ActionModel for Linear {
         self.0.nu()
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        let node = &self.0;
+        let knot = &self.0;
         let (x, u) = (nalgebra::DVectorView::from_slice(x, x.len()), nalgebra::DVectorView::from_slice(u, u.len()));
-        next.copy_from_slice((&node.A * x + &node.B * u + &node.f).as_slice());
-        (&node.Q * x).dot(&x) / 2.0
-            + (&node.S * u).dot(&x)
-            + (&node.R * u).dot(&u) / 2.0
-            + node.q.dot(&x)
-            + node.r.dot(&u)
+        next.copy_from_slice((&knot.A * x + &knot.B * u + &knot.f).as_slice());
+        (&knot.Q * x).dot(&x) / 2.0
+            + (&knot.S * u).dot(&x)
+            + (&knot.R * u).dot(&u) / 2.0
+            + knot.q.dot(&x)
+            + knot.r.dot(&u)
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], out: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], out: &mut LqKnot) {
         let (x, u) = (nalgebra::DVectorView::from_slice(x, x.len()), nalgebra::DVectorView::from_slice(u, u.len()));
         let f = std::mem::replace(&mut out.f, nalgebra::DVector::zeros(0));
         *out = self.0.clone();
@@ -88,6 +88,12 @@ pub(crate) struct Unicycle {
     pub(crate) lanes: usize,
 }
 
+impl GroupModel for Unicycle {
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+}
+
 const UNICYCLE_STEP: f64 = 0.1;
 const UNICYCLE_WEIGHT: f64 = 100.0;
 
@@ -98,8 +104,8 @@ impl ActionModel for Unicycle {
     fn nu(&self) -> usize {
         self.nu
     }
-    fn lanes(&self) -> usize {
-        self.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         if let [v, w] = u {
@@ -110,20 +116,20 @@ impl ActionModel for Unicycle {
         let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
         0.5 * (UNICYCLE_WEIGHT * square(x) + square(u))
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let (s, c) = x[2].sin_cos();
-        node.Q.fill_with_identity();
-        node.Q *= UNICYCLE_WEIGHT;
-        for (q, x) in node.q.iter_mut().zip(x) {
+        knot.Q.fill_with_identity();
+        knot.Q *= UNICYCLE_WEIGHT;
+        for (q, x) in knot.q.iter_mut().zip(x) {
             *q = UNICYCLE_WEIGHT * x;
         }
         if let [v, _] = u {
             let h = UNICYCLE_STEP;
-            node.A.copy_from_slice(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -h * v * s, h * v * c, 1.0]);
-            node.B.copy_from_slice(&[h * c, h * s, 0.0, 0.0, 0.0, h]);
-            node.S.fill(0.0);
-            node.R.fill_with_identity();
-            node.r.copy_from_slice(u);
+            knot.A.copy_from_slice(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -h * v * s, h * v * c, 1.0]);
+            knot.B.copy_from_slice(&[h * c, h * s, 0.0, 0.0, 0.0, h]);
+            knot.S.fill(0.0);
+            knot.R.fill_with_identity();
+            knot.r.copy_from_slice(u);
         }
     }
 }
@@ -135,15 +141,21 @@ pub(crate) struct Limited<A> {
     pub(crate) upper: Vec<f64>,
 }
 
-impl<A: ActionModel> ActionModel for Limited<A> {
+impl<A: GroupModel> GroupModel for Limited<A> {
+    fn lanes(&self) -> usize {
+        self.action.lanes()
+    }
+}
+
+impl<A: GroupModel> ActionModel for Limited<A> {
     fn nx(&self) -> usize {
         self.action.nx()
     }
     fn nu(&self) -> usize {
         self.action.nu()
     }
-    fn lanes(&self) -> usize {
-        self.action.lanes()
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn bounds(&self, _: usize) -> Option<(&[f64], &[f64])> {
         Some((&self.lower, &self.upper))
@@ -151,13 +163,13 @@ impl<A: ActionModel> ActionModel for Limited<A> {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.action.calc(t, x, u, next)
     }
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.action.calc_diff(t, x, u, node);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.action.calc_diff(t, x, u, knot);
     }
 }
 
 /// Creates a problem whose knots are all the same.
-fn horizon_of<A: ActionModel>(
+fn horizon_of<A: GroupModel>(
     x0: &[f64],
     horizon: usize,
     action: A,
@@ -195,6 +207,12 @@ pub(crate) struct Cartpole {
     pub(crate) weights: [f64; 5],
 }
 
+impl GroupModel for Cartpole {
+    fn lanes(&self) -> usize {
+        self.lanes
+    }
+}
+
 const CART: f64 = 1.0;
 const POLE: f64 = 0.1;
 const LENGTH: f64 = 0.5;
@@ -217,8 +235,8 @@ impl ActionModel for Cartpole {
     fn nu(&self) -> usize {
         self.nu
     }
-    fn lanes(&self) -> usize {
-        self.lanes
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         if let [f] = u {
@@ -234,12 +252,12 @@ impl ActionModel for Cartpole {
         let weights = self.cost_weights();
         0.5 * x.iter().chain(u).zip(weights).map(|(z, w)| w * z * z).sum::<f64>()
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let weights = self.cost_weights();
-        node.Q.fill(0.0);
+        knot.Q.fill(0.0);
         for i in 0..4 {
-            node.Q[(i, i)] = weights[i];
-            node.q[i] = weights[i] * x[i];
+            knot.Q[(i, i)] = weights[i];
+            knot.q[i] = weights[i] * x[i];
         }
         if let [f] = u {
             let ((s, c), rate, h) = (x[1].sin_cos(), x[3], CARTPOLE_STEP);
@@ -254,19 +272,19 @@ impl ActionModel for Cartpole {
                     / mu;
             let (cart_rate, pole_rate) = (-2.0 * POLE * LENGTH * s * rate / mu, -2.0 * POLE * c * s * rate / mu);
             let (cart_force, pole_force) = (1.0 / mu, c / (LENGTH * mu));
-            node.A.fill_with_identity();
+            knot.A.fill_with_identity();
             for (column, cart, pole) in [(1, cart_angle, pole_angle), (3, cart_rate, pole_rate)] {
-                node.A[(0, column)] += h * h * cart;
-                node.A[(1, column)] += h * h * pole;
-                node.A[(2, column)] += h * cart;
-                node.A[(3, column)] += h * pole;
+                knot.A[(0, column)] += h * h * cart;
+                knot.A[(1, column)] += h * h * pole;
+                knot.A[(2, column)] += h * cart;
+                knot.A[(3, column)] += h * pole;
             }
-            node.A[(0, 2)] += h;
-            node.A[(1, 3)] += h;
-            node.B.copy_from_slice(&[h * h * cart_force, h * h * pole_force, h * cart_force, h * pole_force]);
-            node.S.fill(0.0);
-            node.R[0] = weights[4];
-            node.r[0] = weights[4] * f;
+            knot.A[(0, 2)] += h;
+            knot.A[(1, 3)] += h;
+            knot.B.copy_from_slice(&[h * h * cart_force, h * h * pole_force, h * cart_force, h * pole_force]);
+            knot.S.fill(0.0);
+            knot.R[0] = weights[4];
+            knot.r[0] = weights[4] * f;
         }
     }
 }
@@ -320,12 +338,12 @@ impl ActionModel for Circle {
         let angle = x[1].atan2(x[0]);
         0.5 * (angle * angle + 0.1 * u.iter().map(|u| u * u).sum::<f64>())
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        (node.A[0], node.Q[0], node.q[0]) = (1.0, 1.0, x[1].atan2(x[0]));
-        node.B.fill(1.0);
-        node.S.fill(0.0);
-        node.R.fill(0.1);
-        for (r, u) in node.r.iter_mut().zip(u) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        (knot.A[0], knot.Q[0], knot.q[0]) = (1.0, 1.0, x[1].atan2(x[0]));
+        knot.B.fill(1.0);
+        knot.S.fill(0.0);
+        knot.R.fill(0.1);
+        for (r, u) in knot.r.iter_mut().zip(u) {
             *r = 0.1 * u;
         }
     }

@@ -49,7 +49,7 @@ fn mixed() -> Problem {
         Box::new(free(0.1)),
         Box::new(second),
         Box::new(Constrained::new(Box::new(free(0.3)), Box::new(AutoDiffConstraint::new(Slow)))),
-        Box::new(InverseDynamics::running(arm.clone(), DT, costs(0.4)).unwrap()),
+        Box::new(FreeInverseDynamics::running(arm.clone(), DT, costs(0.4)).unwrap()),
         Box::new(condyle_optimal::NumDiff(free(0.5))),
     ];
     let end = FreeDynamics::terminal(arm, vec![plain("reach", reach(0.6))]).unwrap();
@@ -82,7 +82,7 @@ fn a_cost_is_found_by_its_name_whatever_the_dynamics() {
     assert!(problem.cost_mut(0, "grasp").is_none() && problem.cost_mut(5, "reach").is_none());
     assert!(problem.cost_at_mut(3, "rest").is_none()); // that knot has its own costs
     let unicycle = condyle_optimal::Unicycle::default();
-    let end = Box::new(unicycle.clone().at_the_end());
+    let end = Box::new(unicycle.clone().terminal());
     let mut other = Problem::new(vec![0.0; 3], vec![Box::new(unicycle)], vec![0; 2], end).unwrap();
     assert!(other.cost_mut(0, "reach").is_none() && !other.change_costs("reach", |_| Ok(())).unwrap());
 }
@@ -202,10 +202,6 @@ impl ActionModel for Wrapper {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.0.calc(t, x, u, next)
     }
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        self.0.outputs(t, x, u, show);
-        show("something else", &[1.0; 5]);
-    }
 }
 
 #[test]
@@ -256,7 +252,7 @@ fn copied(arm: &Arc<Model>) -> Problem {
     ];
     let free = FreeDynamics::running(arm.clone(), DT, costs.clone()).unwrap();
     let slow = Constrained::new(Box::new(free.clone()), Box::new(AutoDiffConstraint::new(Slow)));
-    let inverse = InverseDynamics::running(arm.clone(), DT, costs.clone()).unwrap();
+    let inverse = FreeInverseDynamics::running(arm.clone(), DT, costs.clone()).unwrap();
     let models: Vec<Box<dyn ActionModel>> = vec![Box::new(free), Box::new(slow), Box::new(inverse)];
     let end = FreeDynamics::terminal(arm.clone(), costs[..2].to_vec()).unwrap();
     Problem::new(vec![0.1; 14], models, vec![0, 0, 0, 1, 1, 2, 2], Box::new(end)).unwrap()
@@ -266,7 +262,7 @@ fn copied(arm: &Arc<Model>) -> Problem {
 fn an_action_without_a_copy_is_named() {
     let error = mixed().try_clone().unwrap_err();
     assert_eq!(error, Error::NoCopy { model: Some(4) });
-    assert_eq!(error.to_string(), "models[4]: cannot be copied, as its `fork` returns `None`");
+    assert_eq!(error.to_string(), "models[4]: cannot be copied, as its `try_clone` returns `None`");
     let arm = Arc::new(robots::arm7());
     let end = condyle_optimal::NumDiff(FreeDynamics::terminal(arm.clone(), vec![]).unwrap());
     let knot = FreeDynamics::running(arm, DT, vec![]).unwrap();
@@ -281,15 +277,15 @@ fn a_copy_of_a_quadrupeds_problem_has_the_same_derivatives() {
     let contacts = feet(&model, ReferenceFrame::Local);
     let stand = ContactDynamics::running(model.clone(), &contacts, DT, contact_costs(&model, &contacts, 12, &mut rng));
     let inverse = ContactInverseDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
-    let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
+    let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
     let models: Vec<Box<dyn ActionModel>> = vec![Box::new(stand.unwrap()), Box::new(inverse), Box::new(impact)];
     let end = Box::new(FreeDynamics::terminal(model.clone(), vec![]).unwrap());
     let mut problem = Problem::new(random_state(&model, &mut rng), models, vec![0, 0, 2, 1], end).unwrap();
     let mut copy = problem.try_clone().unwrap();
     let xs: Vec<_> = (0..5).flat_map(|_| random_state(&model, &mut rng)).collect();
     let us = random(12 + 12 + 18 + 6, 1.0, &mut rng);
-    let (mut nodes, mut same) = (problem.nodes(), problem.nodes());
-    problem.calc_diff(&xs, &us, &mut nodes);
+    let (mut lq_knots, mut same) = (problem.lq_knots(), problem.lq_knots());
+    problem.calc_diff(&xs, &us, &mut lq_knots);
     copy.calc_diff(&xs, &us, &mut same);
-    assert_eq!(nodes, same);
+    assert_eq!(lq_knots, same);
 }

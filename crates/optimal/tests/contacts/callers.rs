@@ -3,7 +3,7 @@
 
 use super::*;
 use condyle_optimal::robot::{OwnResidual, RobotProblem};
-use condyle_optimal::{AugmentedLagrangian, DdpMethod, Hessian, Lqr, Settings, Solution};
+use condyle_optimal::{AugmentedLagrangian, DdpMethod, GroupModel, Hessian, Lqr, Settings, Solution};
 
 #[path = "../../../../tests/common/panics.rs"]
 mod panics;
@@ -30,13 +30,13 @@ fn a_panic_is_at_the_callers_line() {
     let x0 = [0.1; 14];
     let (xs, us, mut problem) = (x0.repeat(4), [0.0; 21], arm_problem(&arm));
     let solution = Fddp::new(&problem).solve(&mut problem, &xs, &us).unwrap().clone();
-    let (mut next, mut costs, mut nodes) = ([0.0; 42], [0.0; 4], problem.nodes());
+    let (mut next, mut costs, mut lq_knots) = ([0.0; 42], [0.0; 4], problem.lq_knots());
     panics!("`t` is 5, expected at most the horizon 3", problem.nu(5));
     panics!("`t` is 4, expected at most the horizon 3", problem.control_range(4));
     panics!("`xs` has length 55, expected 56", problem.calc(&xs[1..], &us, &mut next, &mut costs));
     panics!("`costs` has length 3, expected 4", problem.calc(&xs, &us, &mut next, &mut costs[1..]));
-    panics!("`us` has length 20, expected 21", problem.calc_diff(&xs, &us[1..], &mut nodes));
-    panics!("`nodes` has length 3, expected 4", problem.calc_diff(&xs, &us, &mut nodes[1..]));
+    panics!("`us` has length 20, expected 21", problem.calc_diff(&xs, &us[1..], &mut lq_knots));
+    panics!("`lq_knots` has length 3, expected 4", problem.calc_diff(&xs, &us, &mut lq_knots[1..]));
     panics!("`x1` has length 13, expected 14", problem.difference(&x0, &x0[1..], &mut next[..14]));
     panics!("`u` has length 3, expected 7", problem.outputs(0, &x0, &us[..3], &mut |_, _| ()));
     panics!("`t` is 4, expected at most the horizon 3", problem.cost_at_mut(4, "rest").map(|_| ()));
@@ -48,28 +48,28 @@ fn a_panic_is_at_the_callers_line() {
     panics!("`x` has length 13, expected 14", knot.calc(0, &x0[1..], &us[..7], &mut next[..14]));
     panics!("`u` has length 8, expected 7", knot.calc(0, &x0, &us[..8], &mut next[..14]));
     panics!("`next` has length 42, expected 14", knot.calc(0, &x0, &us[..7], &mut next));
-    panics!("`u` has length 0, expected 7", knot.calc_diff(0, &x0, &[], &mut nodes[0]));
+    panics!("`u` has length 0, expected 7", knot.calc_diff(0, &x0, &[], &mut lq_knots[0]));
     panics!("`xs` has length 14, expected 28", knot.calc_group(&[0, 1], &x0, &us[..14], &mut next[..28], &mut costs[..2]));
-    panics!("`nodes` has length 4, expected 1", knot.calc_diff_group(&[0], &x0, &us[..7], &mut nodes));
+    panics!("`lq_knots` has length 4, expected 1", knot.calc_diff_group(&[0], &x0, &us[..7], &mut lq_knots));
     panics!("`dx` has length 3, expected 14", knot.integrate(&x0, &[0.0; 3], &mut next[..14]));
     panics!("`x` has length 3, expected 14", knot.quasi_static(&x0[..3]));
     panics!("`upper` has length 6, expected 7", knot.clone().with_bounds(vec![0.0; 7], vec![0.0; 6]));
     let free = || FreeAcceleration::new(arm.clone(), Actuation::joints(&arm), vec![]).unwrap();
-    panics!("`model` has 7 controls, expected 0 at the end", Integrated::end(free()));
-    let mut impact = ImpulseDynamics::new(arm.clone(), &[], 0.0, 0.0, vec![]).unwrap();
+    panics!("`model` has 7 controls, expected 0 at the end", Integrated::without_time(free()));
+    let mut impact = ImpulseDynamics::instant(arm.clone(), &[], 0.0, 0.0, vec![]).unwrap();
     panics!("`x` has length 3, expected 14", impact.calc(0, &[0.0; 3], &[], &mut next[..14]));
     panics!("`next` has length 1, expected 14", impact.calc(0, &x0, &[], &mut next[..1]));
     let weighted = Activation::Weighted(vec![1.0; 2]);
     let message = "`r` has length 3, expected at most 2: the activation has weights or bounds for these";
     panics!(message, weighted.value(&[0.0; 3]));
-    panics!("expected at most 4096 states and controls, found 5000 and 1", LqNode::zeros(5000, 1));
-    panics!("`nodes` is empty, expected at least the terminal node", Sweep::new(&[]));
-    let (short, mut wide) = (vec![LqNode::zeros(2, 1), LqNode::zeros(2, 0)], LqNode::zeros(2, 1));
+    panics!("expected at most 4096 states and controls, found 5000 and 1", LqKnot::zeros(5000, 1));
+    panics!("`knots` is empty, expected at least the terminal knot", Sweep::new(&[]));
+    let (short, mut wide) = (vec![LqKnot::zeros(2, 1), LqKnot::zeros(2, 0)], LqKnot::zeros(2, 1));
     wide.B = DMatrix::zeros(2, 3);
     let mut sweep = Sweep::new(&short);
-    panics!("`nodes` has length 1, expected 2", sweep.run(&short[..1], 0.0));
+    panics!("`knots` has length 1, expected 2", sweep.run(&short[..1], 0.0));
     panics!("`segments` is 0, expected at least 1", sweep.set_segments(0));
-    panics!("`B` has shape (2, 3), expected (2, 1)", Sweep::new(&[wide.clone(), LqNode::zeros(2, 0)]));
+    panics!("`B` has shape (2, 3), expected (2, 1)", Sweep::new(&[wide.clone(), LqKnot::zeros(2, 0)]));
     panics!("`B` has shape (2, 3), expected (2, 1)", Lqr::new(wide));
     let cone = FrictionCone { facets: 0, ..FrictionCone::new(0.5) };
     panics!("`facets` is 0, expected from 4 to 1000", cone.rows());

@@ -44,7 +44,7 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let grip = Residual::FrictionCone { contact: stance_foot, cone };
     stance.limits_at.insert(1, vec![Limit::new("grip", grip, lower, upper)]);
     let mut end = Knot::new(
-        Dynamics::End,
+        Dynamics::Terminal,
         vec![
             Cost::new("stand", 1.0, stand, Activation::Quadratic),
             Cost::new("point", 1.0, point.clone(), Activation::Quadratic),
@@ -61,7 +61,7 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
             Knot { controls: ControlPolynomial::Quadratic, ..knot(inverse, still(nv), None) },
             knot(backwards, still(nv + 12), None),
         ],
-        stages: vec![0, 1, 1, 2, 3, 4, 0],
+        knot_models: vec![0, 1, 1, 2, 3, 4, 0],
         terminal: end,
         model,
     }
@@ -82,9 +82,9 @@ fn a_problem_in_a_file_is_the_same_problem() {
     let [one, other] = problems.each_mut().map(|problem| {
         let (mut next, mut costs) = (vec![0.0; problem.horizon() * problem.nx()], vec![0.0; problem.horizon() + 1]);
         problem.calc(&xs, &us, &mut next, &mut costs);
-        let mut nodes = problem.nodes();
-        problem.calc_diff(&xs, &us, &mut nodes);
-        (next, costs, nodes)
+        let mut lq_knots = problem.lq_knots();
+        problem.calc_diff(&xs, &us, &mut lq_knots);
+        (next, costs, lq_knots)
     });
     assert_eq!(one.1, other.1);
     assert_eq!((one.0, one.2), (other.0, other.2));
@@ -119,9 +119,9 @@ fn what_is_wrong_in_a_file_is_said() {
         contacts[0].constraint.axes.x.x = 2.0;
     };
     assert!(built(&bent).contains("its axes are no rotation"));
-    assert!(built(&|data| data.stages[1] = 7).contains("there is no action model 7"));
+    assert!(built(&|data| data.knot_models[1] = 7).contains("there is no action model 7"));
     assert_eq!(
-        built(&|data| data.knots[0] = Knot::new(Dynamics::End, vec![])),
+        built(&|data| data.knots[0] = Knot::new(Dynamics::Terminal, vec![])),
         "knot 0: models[0] has no next state, as an action of the end; a running one has a duration or an impact"
     );
     assert_eq!(

@@ -3,9 +3,9 @@
 use super::{DT, contact_costs, feet, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Vec3, robots};
 use condyle_optimal::robot::{
-    Activation, ContactDynamics, Cost, FrameName, FreeDynamics, InverseDynamics, Limit, Residual,
+    Activation, ContactDynamics, Cost, FrameName, FreeDynamics, FreeInverseDynamics, Limit, Residual,
 };
-use condyle_optimal::{ActionModel, LqNode};
+use condyle_optimal::{GroupModel, LqKnot};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ fn knots_side_by_side_are_single_knots() {
         quadratic("gravity", Residual::ControlGravity),
         quadratic("com", Residual::CenterOfMass { target: Vec3::new(0.1, 0.2, 0.3) }),
     ];
-    check_group(InverseDynamics::running(model.clone(), DT, given).unwrap(), &model, &mut rng);
+    check_group(FreeInverseDynamics::running(model.clone(), DT, given).unwrap(), &model, &mut rng);
 }
 
 /// The same for knots of a group that differ in targets, in weights, and in their sets of costs.
@@ -68,23 +68,23 @@ fn knots_with_costs_of_their_own_are_single_knots() {
     check_group(stance, &model, &mut rng);
 }
 
-fn check_group(mut action: impl ActionModel, model: &Model, rng: &mut StdRng) {
+fn check_group(mut action: impl GroupModel, model: &Model, rng: &mut StdRng) {
     for count in [1, 2, 3, 8, 21] {
         let knots: Vec<usize> = (0..count).collect();
         let xs = knots.iter().flat_map(|_| random_state(model, rng)).collect::<Vec<_>>();
         let us = random(count * action.nu(), 5.0, rng);
         let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
         let (mut next, mut costs) = (vec![0.0; count * nx], vec![0.0; count]);
-        let mut nodes = vec![LqNode::zeros(ndx, nu); count];
+        let mut lq_knots = vec![LqKnot::zeros(ndx, nu); count];
         action.calc_group(&knots, &xs, &us, &mut next, &mut costs);
-        action.calc_diff_group(&knots, &xs, &us, &mut nodes);
+        action.calc_diff_group(&knots, &xs, &us, &mut lq_knots);
         for t in knots {
             let (x, u) = (&xs[t * nx..][..nx], &us[t * nu..][..nu]);
-            let (mut alone, mut node) = (vec![0.0; nx], LqNode::zeros(ndx, nu));
+            let (mut alone, mut knot) = (vec![0.0; nx], LqKnot::zeros(ndx, nu));
             assert_eq!(action.calc(t, x, u, &mut alone), costs[t], "{count}");
             assert_eq!(alone, next[t * nx..][..nx]);
-            action.calc_diff(t, x, u, &mut node);
-            assert!(node == nodes[t], "knot {t} of {count} has other derivatives");
+            action.calc_diff(t, x, u, &mut knot);
+            assert!(knot == lq_knots[t], "knot {t} of {count} has other derivatives");
         }
     }
 }

@@ -5,7 +5,7 @@ use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, ControlPolynomial, Cost, FreeAcceleration, FreeDynamics, Integrator, Residual,
 };
-use condyle_optimal::{ActionModel, LqNode};
+use condyle_optimal::{ActionModel, LqKnot};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, rngs::StdRng};
 use std::sync::Arc;
@@ -65,20 +65,21 @@ fn equal_controls_of_a_polynomial_are_constant() {
         };
         let (x, u) = (random_state(&arm, &mut rng), random(7, 1.0, &mut rng));
         let (mut constant, mut expected, mut same) =
-            (knot(ControlPolynomial::Constant), [0.0; 14], LqNode::zeros(14, 7));
+            (knot(ControlPolynomial::Constant), [0.0; 14], LqKnot::zeros(14, 7));
         let cost = constant.calc(0, &x, &u, &mut expected);
         constant.calc_diff(0, &x, &u, &mut same);
         for controls in [ControlPolynomial::Linear, ControlPolynomial::Quadratic] {
             let (mut action, n) = (knot(controls), controls.nodes());
-            let (w, mut next, mut node) = (u.repeat(n), [0.0; 14], LqNode::zeros(14, 7 * n));
-            assert_eq!((action.nu(), action.hold(0, &x)), (7 * n, constant.hold(0, &x).repeat(n)));
+            let (w, mut next, mut knot) = (u.repeat(n), [0.0; 14], LqKnot::zeros(14, 7 * n));
+            let still = |action: &mut dyn ActionModel| action.quasi_static(0, &x);
+            assert_eq!((action.nu(), still(&mut action)), (7 * n, still(&mut constant).repeat(n)));
             assert_eq!(action.bounds(0), Some((&vec![-1.0; 7 * n][..], &vec![1.0; 7 * n][..])));
             let same_cost = (action.calc(0, &x, &w, &mut next) - cost).abs() < ROUNDING;
             assert!(same_cost && largest_difference(&next, &expected) < ROUNDING, "{method:?} {controls:?}");
-            action.calc_diff(0, &x, &w, &mut node);
-            let by_all: DMatrix<f64> = (0..n).map(|k| node.B.columns(7 * k, 7).into_owned()).sum(); // ∂w/∂u = [1; 1; 1]
+            action.calc_diff(0, &x, &w, &mut knot);
+            let by_all: DMatrix<f64> = (0..n).map(|k| knot.B.columns(7 * k, 7).into_owned()).sum(); // ∂w/∂u = [1; 1; 1]
             assert!(largest_difference(by_all.as_slice(), same.B.as_slice()) < ROUNDING, "{method:?} {controls:?}");
-            let blocks = (0..n * n).map(|k| node.R.view((7 * (k % n), 7 * (k / n)), (7, 7)).into_owned());
+            let blocks = (0..n * n).map(|k| knot.R.view((7 * (k % n), 7 * (k / n)), (7, 7)).into_owned());
             let R: DMatrix<f64> = blocks.sum();
             assert!(largest_difference(R.as_slice(), same.R.as_slice()) < ROUNDING, "{method:?} {controls:?}");
         }

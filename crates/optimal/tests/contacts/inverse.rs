@@ -4,11 +4,13 @@ use super::limits::check_gradient;
 use super::{DT, check_derivatives, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, Vec3, integrate, neutral, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, ContactInverseDynamics,
-    ControlledContactAcceleration, Cost, FreeDynamics, FrictionCone, Integrated, Integrator, InverseDynamics, Limit,
-    Residual,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, ContactInverseDynamics, ContinuousModel,
+    ControlledContactAcceleration, Cost, FreeDynamics, FreeInverseDynamics, FrictionCone, Integrated, Integrator,
+    Limit, Residual,
 };
-use condyle_optimal::{ActionModel, AugmentedLagrangian, ConstraintSettings, Fddp, Problem, Settings, Status};
+use condyle_optimal::{
+    ActionModel, AugmentedLagrangian, ConstraintSettings, Fddp, GroupModel, Problem, Settings, Status,
+};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, rngs::StdRng};
 use std::collections::BTreeMap;
@@ -86,7 +88,7 @@ fn derivatives_of_an_arm_are_those_of_the_action() {
         costs.push(Cost::new("gravity", 0.1, Residual::ControlGravity, Activation::Quadratic));
         let action = ContactInverseDynamics::running(arm.clone(), &contacts, DT, costs.clone()).unwrap();
         if contacts.is_empty() {
-            let mut free = InverseDynamics::running(arm.clone(), DT, costs).unwrap();
+            let mut free = FreeInverseDynamics::running(arm.clone(), DT, costs).unwrap();
             let (x, u, mut other) = (random_state(&arm, &mut rng), random(7, 1.0, &mut rng), action.clone());
             let (mut next, mut same) = (vec![0.0; 14], vec![0.0; 14]);
             let costs = [free.calc(0, &x, &u, &mut next), other.calc(0, &x, &u, &mut same)];
@@ -96,7 +98,7 @@ fn derivatives_of_an_arm_are_those_of_the_action() {
     }
 }
 
-fn outputs(action: &mut dyn ActionModel, x: &[f64], u: &[f64]) -> BTreeMap<String, Vec<f64>> {
+fn outputs<M: ContinuousModel>(action: &mut Integrated<M>, x: &[f64], u: &[f64]) -> BTreeMap<String, Vec<f64>> {
     let mut all = BTreeMap::new();
     action.outputs(0, x, u, &mut |name, numbers| {
         all.insert(name.to_owned(), numbers.to_vec());
@@ -310,7 +312,7 @@ fn what_does_not_fit_is_refused() {
     let driven = "cost `r`: all efforts of this knot are those of drives";
     assert_eq!(forward(Residual::UndrivenEffort).unwrap_err().to_string(), driven);
     let arm = Arc::new(robots::arm7());
-    let arm = InverseDynamics::running(arm, DT, cost(Residual::UndrivenEffort));
+    let arm = FreeInverseDynamics::running(arm, DT, cost(Residual::UndrivenEffort));
     assert_eq!(arm.unwrap_err().to_string(), driven);
     let end = FreeDynamics::terminal(model.clone(), cost(Residual::UndrivenEffort));
     assert_eq!(end.unwrap_err().to_string(), "cost `r`: there is no effort at this knot");

@@ -3,10 +3,10 @@
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
 use condyle_optimal::robot::{
-    Activation, Actuation, ContactDynamics, Cost, FrameName, FreeAcceleration, FreeDynamics, ImpulseDynamics,
-    Integrated, Integrator, InverseDynamics, Limit, Residual,
+    Activation, Actuation, ContactDynamics, Cost, FrameName, FreeAcceleration, FreeDynamics, FreeInverseDynamics,
+    ImpulseDynamics, Integrated, Integrator, Limit, Residual,
 };
-use condyle_optimal::{ActionModel, Error, LqNode};
+use condyle_optimal::{ActionModel, Error, GroupModel, LqKnot};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -59,8 +59,8 @@ fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
 pub(super) fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
     let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
     let (x, u) = (random_state(model, rng), random(nu, effort, rng));
-    let mut node = LqNode::zeros(ndx, nu);
-    action.calc_diff(0, &x, &u, &mut node);
+    let mut knot = LqKnot::zeros(ndx, nu);
+    action.calc_diff(0, &x, &u, &mut knot);
     let (mut moved, mut next) = (vec![0.0; nx], vec![0.0; nx]);
     let mut numeric = vec![];
     for k in 0..ndx + nu {
@@ -76,10 +76,10 @@ pub(super) fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &
         });
         numeric.push((costs[0] - costs[1]) / (2.0 * STEP));
     }
-    let exact: Vec<_> = node.q.iter().chain(node.r.iter()).copied().collect();
+    let exact: Vec<_> = knot.q.iter().chain(knot.r.iter()).copied().collect();
     let error = largest_difference(&exact, &numeric);
     assert!(error < DIFFERENCES, "{what}: off by {error:e}");
-    for H in [&node.Q, &node.R] {
+    for H in [&knot.Q, &knot.R] {
         assert!(largest_difference(H.as_slice(), H.transpose().as_slice()) < ROUNDING, "{what}: not symmetric");
     }
 }
@@ -122,7 +122,8 @@ fn derivatives_of_limits_are_those_of_the_terms() {
         let of_dynamics = 3;
         let kinds = none.len() - 1 - of_forces - of_dynamics;
         assert_eq!(check(&format!("end of the {name}"), &model, &none, end, 0.0, &mut rng), kinds);
-        let impact = |l| ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, still(0)).unwrap().with_limits(l);
+        let impact =
+            |l| ImpulseDynamics::instant(model.clone(), &contacts, 0.3, 1e-9, still(0)).unwrap().with_limits(l);
         let kinds = check(&format!("impact of the {name}"), &model, &none, impact, 0.0, &mut rng);
         assert_eq!(kinds, none.len() - of_dynamics);
     }
@@ -143,7 +144,7 @@ fn derivatives_of_limits_of_other_steps_are_those_of_the_terms() {
         assert_eq!(check(&format!("{method:?}"), &model, &all, make, 0.3, &mut rng), all.len() - 3);
     }
     let all = limits(&model, 18, &mut rng);
-    let inverse = |l| InverseDynamics::running(model.clone(), DT, vec![]).unwrap().with_limits(l);
+    let inverse = |l| FreeInverseDynamics::running(model.clone(), DT, vec![]).unwrap().with_limits(l);
     assert_eq!(check("inverse dynamics", &model, &all, inverse, 1.0, &mut rng), all.len() - 3);
 }
 

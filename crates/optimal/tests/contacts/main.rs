@@ -18,9 +18,9 @@ use condyle_dynamics::{
 };
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FrameName, FreeAcceleration,
-    FreeDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
+    FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, Residual, WrenchCone,
 };
-use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
+use condyle_optimal::{ActionModel, DynamicsStructure, Error, Fddp, LqKnot, NumDiff, Problem, Status, Sweep};
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
@@ -66,7 +66,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
     let (ndx, nu) = (action.ndx(), action.nu());
     let mut oracle = NumDiff(action.clone());
-    let (mut exact, mut numeric) = (LqNode::zeros(ndx, nu), LqNode::zeros(ndx, nu));
+    let (mut exact, mut numeric) = (LqKnot::zeros(ndx, nu), LqKnot::zeros(ndx, nu));
     let (x, u) = (random_state(model, rng), random(nu, effort, rng));
     action.calc_diff(0, &x, &u, &mut exact);
     oracle.calc_diff(0, &x, &u, &mut numeric);
@@ -212,7 +212,7 @@ fn derivatives_in_contact_along_axes_are_those_of_the_action() {
             check_derivatives(&what, action, &model, 5.0, &mut rng);
             let kept = ["state", "com", "momentum", "force", "cone"];
             costs.retain(|cost| kept.contains(&cost.name.as_str()));
-            let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 0.0, costs).unwrap();
+            let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.3, 0.0, costs).unwrap();
             check_derivatives(&format!("impact, {what}"), impact, &model, 0.0, &mut rng);
         }
     }
@@ -240,7 +240,7 @@ fn derivatives_of_an_impact_are_those_of_the_action() {
         let mut costs = contact_costs(&model, &contacts, 0, &mut rng);
         costs.retain(|cost| kept.contains(&cost.name.as_str()));
         costs.push(Cost::new("jump", 0.4, Residual::ImpulseCenterOfMass, Activation::Quadratic));
-        let action = ImpulseDynamics::new(model.clone(), &contacts, 0.3, 1e-9, costs).unwrap();
+        let action = ImpulseDynamics::instant(model.clone(), &contacts, 0.3, 1e-9, costs).unwrap();
         check_derivatives(&format!("impact of the {}", model.name()), action, &model, 0.0, &mut rng);
     }
 }
@@ -261,7 +261,7 @@ fn derivatives_of_inverse_dynamics_are_those_of_the_action() {
             Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic),
             Cost::new("change", 0.1, Residual::Control { reference: random(nv, 1.0, &mut rng) }, Activation::Quadratic),
         ];
-        let action = InverseDynamics::running(model.clone(), DT, costs).unwrap();
+        let action = FreeInverseDynamics::running(model.clone(), DT, costs).unwrap();
         check_derivatives(&format!("inverse dynamics of {}", model.name()), action, &model, 1.0, &mut rng);
     }
 }
@@ -293,7 +293,8 @@ fn inverse_and_forward_dynamics_have_one_optimum() {
     let mut forward = FreeDynamics::running(arm.clone(), 0.05, running()).unwrap();
     let hold = forward.quasi_static(&x0).repeat(20);
     let by_effort = solve(Box::new(forward), &hold);
-    let by_acceleration = solve(Box::new(InverseDynamics::running(arm.clone(), 0.05, running()).unwrap()), &[0.0; 140]);
+    let by_acceleration =
+        solve(Box::new(FreeInverseDynamics::running(arm.clone(), 0.05, running()).unwrap()), &[0.0; 140]);
     assert!((by_effort - by_acceleration).abs() < OPTIMUM * by_effort, "{by_effort} and {by_acceleration}");
 }
 
@@ -408,7 +409,7 @@ fn what_does_not_fit_is_refused_by_name() {
         refused(&point, term(Residual::WrenchCone { contact: "toe".into(), cone: flat })),
         "cost `grip`: a wrench cone needs a rigid contact, of 6 rows; this one has 3"
     );
-    let bounce = ImpulseDynamics::new(model.clone(), &contacts, 2.0, 0.0, vec![]).unwrap_err();
+    let bounce = ImpulseDynamics::instant(model.clone(), &contacts, 2.0, 0.0, vec![]).unwrap_err();
     assert_eq!(bounce.to_string(), "contact `restitution`: ε is 2, not from 0 to 1");
     let drives = Actuation::matrix(&model, DMatrix::zeros(3, 2)).unwrap_err();
     assert_eq!(drives.to_string(), format!("actuation: its map is 3 × 2, expected {} rows", model.nv()));
@@ -455,25 +456,25 @@ fn derivatives_have_the_form_of_euler_steps() {
         let (ndx, nu) = (2 * model.nv(), model.nv() - 6);
         let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
         let mut stand = ContactDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
-        let mut impact = ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
-        let mut nodes = [nu, 0, nu, 0].map(|nu| LqNode::zeros(ndx, nu));
-        for (t, node) in nodes.iter_mut().enumerate() {
-            let (x, u) = (random_state(&model, &mut rng), random(node.nu(), 5.0, &mut rng));
+        let mut impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, vec![]).unwrap();
+        let mut lq_knots = [nu, 0, nu, 0].map(|nu| LqKnot::zeros(ndx, nu));
+        for (t, knot) in lq_knots.iter_mut().enumerate() {
+            let (x, u) = (random_state(&model, &mut rng), random(knot.nu(), 5.0, &mut rng));
             match t {
-                1 => impact.calc_diff(t, &x, &u, node),
+                1 => impact.calc_diff(t, &x, &u, knot),
                 3 => {}
-                _ => stand.calc_diff(t, &x, &u, node),
+                _ => stand.calc_diff(t, &x, &u, knot),
             }
-            assert!(t == 3 || node.structure != Structure::default());
-            node.Q.fill_with_identity();
-            node.R.fill_with_identity();
+            assert!(t == 3 || knot.structure != DynamicsStructure::default());
+            knot.Q.fill_with_identity();
+            knot.R.fill_with_identity();
         }
-        let mut sweep = Sweep::new(&nodes);
-        sweep.run(&nodes, 1e-6).unwrap();
-        let structured = sweep.knots().to_vec();
-        nodes.iter_mut().for_each(|node| node.structure.set_dense());
-        sweep.run(&nodes, 1e-6).unwrap();
-        for (a, b) in structured.iter().zip(sweep.knots()) {
+        let mut sweep = Sweep::new(&lq_knots);
+        sweep.run(&lq_knots, 1e-6).unwrap();
+        let structured = sweep.feedback().to_vec();
+        lq_knots.iter_mut().for_each(|knot| knot.structure.set_dense());
+        sweep.run(&lq_knots, 1e-6).unwrap();
+        for (a, b) in structured.iter().zip(sweep.feedback()) {
             for (name, a, b) in [("K", a.K.as_slice(), b.K.as_slice()), ("Vxx", a.Vxx.as_slice(), b.Vxx.as_slice())] {
                 let error = largest_difference(a, b);
                 assert!(error < SAME, "{}: {name} is off by {error:e}", model.name());

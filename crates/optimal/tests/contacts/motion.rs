@@ -100,7 +100,7 @@ fn motion_of_an_arm_is_that_of_its_dynamics() {
         assert!(motion.contacts.is_empty() && !motion.is_impact() && motion.contact("none").is_none());
     }
     // accelerations as controls
-    let knot = InverseDynamics::running(arm.clone(), DT, vec![]).unwrap();
+    let knot = FreeInverseDynamics::running(arm.clone(), DT, vec![]).unwrap();
     let motion = single(Box::new(knot), &arm, &x).motion_at(0, &x, &a).unwrap();
     assert_eq!(motion.acceleration, a);
     assert!(largest_difference(&motion.effort, &u) < SAME);
@@ -111,7 +111,7 @@ fn motion_of_an_arm_is_that_of_its_dynamics() {
 
 fn no_robot() -> Problem {
     let unicycle = condyle_optimal::Unicycle::default();
-    let end = Box::new(unicycle.clone().at_the_end());
+    let end = Box::new(unicycle.clone().terminal());
     Problem::new(vec![0.0; 3], vec![Box::new(unicycle)], vec![0; 2], end).unwrap()
 }
 
@@ -134,7 +134,7 @@ impl ContinuousModel for Mass {
         self.zero[0] = 2.0 * input.u[0];
         (self.zero.as_slice(), 0.0)
     }
-    fn calc_diff(&mut self, _: KnotInput<'_>, _: f64, _: &mut LqNode) -> Derivatives<'_> {
+    fn calc_diff(&mut self, _: KnotInput<'_>, _: f64, _: &mut LqKnot) -> Derivatives<'_> {
         unreachable!("it is not differentiated")
     }
 }
@@ -143,7 +143,7 @@ impl ContinuousModel for Mass {
 fn dynamics_of_a_user_have_accelerations_alone() {
     let mass = || Mass { zero: DMatrix::zeros(1, 1) };
     let knot = Integrated::new(mass(), Integrator::SemiImplicitEuler, DT).unwrap();
-    let end = Box::new(condyle_optimal::Lqr::new(LqNode::zeros(2, 0)));
+    let end = Box::new(condyle_optimal::Lqr::new(LqKnot::zeros(2, 0)));
     let mut problem = Problem::new(vec![0.0; 2], vec![Box::new(knot)], vec![0], end).unwrap();
     let motion = problem.motion_at(0, &[0.0; 2], &[3.0]).unwrap();
     assert_eq!((&motion.acceleration[..], &motion.effort[..]), (&[6.0][..], &[][..]));
@@ -196,7 +196,7 @@ fn impulses_change_velocities() {
         set.proximal = ProximalSettings { mu: 0.0, iterations: 1 };
         let after = impulse_dynamics(&model, &mut data, &mut set, q, v, 0.2).v.to_vec();
         let change: Vec<_> = after.iter().zip(v).map(|(after, before)| after - before).collect();
-        let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.2, 0.0, vec![]).unwrap();
+        let impact = ImpulseDynamics::instant(model.clone(), &contacts, 0.2, 0.0, vec![]).unwrap();
         let motion = single(Box::new(impact.clone()), &model, &x).motion_at(0, &x, &[]).unwrap();
         assert!(motion.is_impact() && motion.acceleration.is_empty() && motion.effort.is_empty());
         assert!(largest_difference(&motion.velocity_change, &change) < SAME);
@@ -235,15 +235,15 @@ fn a_solution_of_a_trot_has_forces_at_the_feet_that_stand() {
     let stand = |pair: [&str; 2]| -> Box<dyn ActionModel> {
         Box::new(ContactDynamics::running(model.clone(), &pair.map(foot), DT, costs()).unwrap())
     };
-    let touch = ImpulseDynamics::new(model.clone(), &pairs[1].map(foot), 0.0, 1e-9, vec![]).unwrap();
+    let touch = ImpulseDynamics::instant(model.clone(), &pairs[1].map(foot), 0.0, 1e-9, vec![]).unwrap();
     let models = vec![stand(pairs[0]), Box::new(touch) as Box<dyn ActionModel>, stand(pairs[1])];
     let end = Box::new(FreeDynamics::terminal(model.clone(), costs().drain(..1).collect()).unwrap());
-    let stages = vec![0, 0, 0, 0, 1, 2, 2, 2];
-    let mut problem = Problem::new(x0.clone(), models, stages.clone(), end).unwrap();
+    let knot_models = vec![0, 0, 0, 0, 1, 2, 2, 2];
+    let mut problem = Problem::new(x0.clone(), models, knot_models.clone(), end).unwrap();
     let xs = x0.repeat(9);
     let us = problem.quasi_static(&xs).unwrap();
     let solution = Fddp::new(&problem).solve(&mut problem, &xs, &us).unwrap().clone();
-    for (t, stage) in stages.iter().enumerate() {
+    for (t, stage) in knot_models.iter().enumerate() {
         let motion = problem.motion(&solution, t).unwrap();
         let names: Vec<_> = motion.contacts.iter().map(|contact| &*contact.name).collect();
         assert_eq!(names, if *stage == 0 { pairs[0] } else { pairs[1] });

@@ -4,7 +4,7 @@ use super::*;
 use condyle_optimal::robot::{
     ContactInverseDynamics, GenericResidual, Inputs, Limit, OwnConstraint, OwnResidual, RobotState,
 };
-use condyle_optimal::{AugmentedLagrangian, Constrained, PathConstraint};
+use condyle_optimal::{AugmentedLagrangian, Constrained, GroupModel, PathConstraint};
 use condyle_spatial::Scalar;
 
 /// Tolerance of the same formulas in another order.
@@ -98,14 +98,14 @@ fn both(model: &Arc<Model>, frame: &str, nu: usize) -> [Vec<Cost>; 2] {
 }
 
 /// Compares two actions at knots side by side.
-fn compare(what: &str, mut a: impl ActionModel, mut b: impl ActionModel, model: &Model, rng: &mut StdRng) {
+fn compare(what: &str, mut a: impl GroupModel, mut b: impl GroupModel, model: &Model, rng: &mut StdRng) {
     let (ndx, nx, nu, knots) = (a.ndx(), a.nx(), a.nu(), [0, 1, 2, 3, 4]);
     let xs: Vec<_> = knots.iter().flat_map(|_| random_state(model, rng)).collect();
     let us = random(nu * knots.len(), 1.0, rng);
-    let mut nodes = [(); 2].map(|()| knots.map(|_| LqNode::zeros(ndx, nu)));
+    let mut lq_knots = [(); 2].map(|()| knots.map(|_| LqKnot::zeros(ndx, nu)));
     let mut next = vec![0.0; nx * knots.len()];
     let mut costs = [[0.0; 5]; 2];
-    let [by_a, by_b] = &mut nodes;
+    let [by_a, by_b] = &mut lq_knots;
     a.calc_group(&knots, &xs, &us, &mut next, &mut costs[0]);
     b.calc_group(&knots, &xs, &us, &mut next, &mut costs[1]);
     a.calc_diff_group(&knots, &xs, &us, by_a);
@@ -142,7 +142,7 @@ fn own_residuals_are_the_built_in_ones() {
         let make = |costs| ContactInverseDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
         let [a, b] = both(&model, &frame, model.nv() + rows).map(make);
         compare(model.name(), a, b, &model, &mut rng);
-        let make = |costs| ImpulseDynamics::new(model.clone(), &contacts, 0.0, 1e-9, costs).unwrap();
+        let make = |costs| ImpulseDynamics::instant(model.clone(), &contacts, 0.0, 1e-9, costs).unwrap();
         let [a, b] = both(&model, &frame, 0).map(make);
         compare(model.name(), a, b, &model, &mut rng);
     }

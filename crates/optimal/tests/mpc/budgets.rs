@@ -1,6 +1,6 @@
 //! Time budgets: the effect of a delay on a controller, and its recovery.
 
-use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqNode, Problem, Solution, Status};
+use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqKnot, Problem, Solution, Status};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
@@ -38,21 +38,21 @@ impl ActionModel for Unstable {
         next[1] = x[1] + 0.1 * (3.0 * x[0].sin() + u);
         0.5 * (10.0 * x[0] * x[0] + x[1] * x[1] + 0.1 * u * u)
     }
-    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let delay = self.delay.swap(0, Ordering::SeqCst);
         if delay > 0 {
             std::thread::sleep(Duration::from_millis(delay));
         }
         let factor = if self.broken.load(Ordering::SeqCst) > 0 { f64::NAN } else { 1.0 };
-        node.A.copy_from_slice(&[1.0, 0.3 * x[0].cos(), 0.1, 1.0]);
-        node.Q.copy_from_slice(&[10.0, 0.0, 0.0, 1.0]);
-        node.q.copy_from_slice(&[10.0 * x[0] * factor, x[1]]);
+        knot.A.copy_from_slice(&[1.0, 0.3 * x[0].cos(), 0.1, 1.0]);
+        knot.Q.copy_from_slice(&[10.0, 0.0, 0.0, 1.0]);
+        knot.q.copy_from_slice(&[10.0 * x[0] * factor, x[1]]);
         for i in 0..self.nu {
-            (node.B[(0, i)], node.B[(1, i)], node.R[(i, i)], node.r[i]) = (0.0, 0.1, 0.1, 0.1 * u[i]);
-            (node.S[(0, i)], node.S[(1, i)]) = (0.0, 0.0);
+            (knot.B[(0, i)], knot.B[(1, i)], knot.R[(i, i)], knot.r[i]) = (0.0, 0.1, 0.1, 0.1 * u[i]);
+            (knot.S[(0, i)], knot.S[(1, i)]) = (0.0, 0.0);
         }
     }
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         Some(Box::new(self.clone()))
     }
 }

@@ -13,7 +13,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use rust::{ActionModel, LqNode};
+use rust::{ActionModel, GroupModel, LqKnot};
 use std::any::Any;
 use std::sync::Arc;
 
@@ -191,7 +191,7 @@ impl Own {
         read().map_err(|error| named(py, "calc", knots, error))
     }
 
-    fn try_calc_diff(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], nodes: &mut [LqNode]) -> PyResult<()> {
+    fn try_calc_diff(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], lq_knots: &mut [LqKnot]) -> PyResult<()> {
         let result = self.written.functions.call(py, 1, self.arguments(py, knots, at)?)?;
         let mut read = || {
             let given = result.cast::<PyDict>().map_err(|_| {
@@ -203,9 +203,9 @@ impl Own {
                 if !["A", "B", "Q", "S", "R", "q", "r"].contains(&name.as_str()) {
                     return Err(PyValueError::new_err(format!("expected A, B, Q, S, R, q or r, found '{name}'")));
                 }
-                for (k, node) in nodes.iter_mut().enumerate() {
+                for (k, knot) in lq_knots.iter_mut().enumerate() {
                     let entry = if self.written.batch { &entry.get_item(k)? } else { &entry };
-                    write(node, &name, entry)?;
+                    write(knot, &name, entry)?;
                 }
             }
             Ok(())
@@ -219,20 +219,20 @@ impl Own {
         py: Python<'_>,
         knots: &[usize],
         [xs, us]: [&[f64]; 2],
-        nodes: &mut [LqNode],
+        lq_knots: &mut [LqKnot],
     ) -> PyResult<bool> {
         let Written { space, nu, functions, batch, way, .. } = &self.written;
         if !functions.has(1) {
             let all = Differentiated { functions, space, nu: *nu, batch: *batch, terminal: self.terminal };
-            return all.action(py, way, knots, [xs, us], nodes);
+            return all.action(py, way, knots, [xs, us], lq_knots);
         }
         if *batch {
-            return self.try_calc_diff(py, knots, [xs, us], nodes).map(|()| true);
+            return self.try_calc_diff(py, knots, [xs, us], lq_knots).map(|()| true);
         }
         let nx = space.nx();
         for (k, t) in knots.iter().enumerate() {
             let at = [&xs[k * nx..][..nx], &us[k * nu..][..*nu]];
-            self.try_calc_diff(py, &[*t], at, &mut nodes[k..=k])?;
+            self.try_calc_diff(py, &[*t], at, &mut lq_knots[k..=k])?;
         }
         Ok(true)
     }
@@ -255,21 +255,43 @@ impl ActionModel for Own {
         self.written.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
-    /// Returns whether `other` is a copy of the same action, so that the knots of both are computed as one group.
-    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
-        let other: &mut dyn Any = other;
-        let same = |other: &mut Self| {
-            self.written.functions.are(&other.written.functions)
-                && self.written.space.is(&other.written.space)
-                && Arc::ptr_eq(&self.fault, &other.fault)
-        };
-        other.downcast_mut::<Self>().is_some_and(same)
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
 
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         let mut cost = [0.0];
         let done = unless_failed(&self.fault, |py| self.try_calc(py, &[t], [x, u], next, &mut cost));
         done.map_or(f64::NAN, |()| cost[0])
+    }
+
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        self.calc_diff_group(&[t], x, u, std::slice::from_mut(knot));
+    }
+
+    fn check_state(&self, x: &[f64]) -> Result<(), String> {
+        self.written.space.check(x)
+    }
+
+    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
+        self.written.space.integrate(x, dx, out, &self.fault);
+    }
+
+    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
+        self.written.space.difference(x0, x1, out, &self.fault);
+    }
+}
+
+impl GroupModel for Own {
+    /// Returns whether `other` is a copy of the same action, so that their knots form one group.
+    fn is_same(&self, other: &dyn ActionModel) -> bool {
+        let other: &dyn Any = other;
+        let same = |other: &Self| {
+            self.written.functions.are(&other.written.functions)
+                && self.written.space.is(&other.written.space)
+                && Arc::ptr_eq(&self.fault, &other.fault)
+        };
+        other.downcast_ref::<Self>().is_some_and(same)
     }
 
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
@@ -286,39 +308,23 @@ impl ActionModel for Own {
         }
     }
 
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.calc_diff_group(&[t], x, u, std::slice::from_mut(node));
-    }
-
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        for node in nodes.iter_mut() {
-            for field in [&mut node.A, &mut node.B, &mut node.Q, &mut node.S, &mut node.R] {
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        for knot in lq_knots.iter_mut() {
+            for field in [&mut knot.A, &mut knot.B, &mut knot.Q, &mut knot.S, &mut knot.R] {
                 field.fill(0.0);
             }
-            node.q.fill(0.0);
-            node.r.fill(0.0);
+            knot.q.fill(0.0);
+            knot.r.fill(0.0);
         }
-        match unless_failed(&self.fault, |py| self.try_derivatives(py, knots, [xs, us], nodes)) {
+        match unless_failed(&self.fault, |py| self.try_derivatives(py, knots, [xs, us], lq_knots)) {
             Some(true) => {}
             Some(false) => {
                 let (nx, nu, mut by_differences) = (self.nx(), self.nu(), rust::NumDiff(self.clone()));
                 for (i, &t) in knots.iter().enumerate() {
-                    by_differences.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
+                    by_differences.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut lq_knots[i]);
                 }
             }
-            None => nodes.iter_mut().for_each(|node| node.q.fill(f64::NAN)),
+            None => lq_knots.iter_mut().for_each(|knot| knot.q.fill(f64::NAN)),
         }
-    }
-
-    fn check_state(&self, x: &[f64]) -> Result<(), String> {
-        self.written.space.check(x)
-    }
-
-    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
-        self.written.space.integrate(x, dx, out, &self.fault);
-    }
-
-    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
-        self.written.space.difference(x0, x1, out, &self.fault);
     }
 }

@@ -9,7 +9,7 @@ use super::space::{Space, hyper_slopes, hyper_state};
 use crate::arrays::Number;
 use crate::hyper_dual::Hyper;
 use condyle::Scalar;
-use condyle::optimal::LqNode;
+use condyle::optimal::LqKnot;
 use pyo3::exceptions::{PyException, PyTypeError};
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -65,23 +65,23 @@ impl Differentiated<'_> {
         way: &Way,
         knots: &[usize],
         [xs, us]: [&[f64]; 2],
-        nodes: &mut [LqNode],
+        lq_knots: &mut [LqKnot],
     ) -> PyResult<bool> {
         let (nx, nu) = (self.space.nx(), self.nu);
         way.descend(py, |way| match way {
-            TOGETHER => self.expand_action(py, knots, [xs, us], nodes),
-            _ => knots.iter().zip(nodes.iter_mut()).enumerate().try_for_each(|(k, (t, node))| {
+            TOGETHER => self.expand_action(py, knots, [xs, us], lq_knots),
+            _ => knots.iter().zip(lq_knots.iter_mut()).enumerate().try_for_each(|(k, (t, knot))| {
                 let at = [&xs[k * nx..][..nx], &us[k * nu..][..nu]];
                 match way {
-                    ALONE => self.expand_action(py, &[*t], at, std::slice::from_mut(node)),
-                    _ => self.hyper_action(py, *t, at, node),
+                    ALONE => self.expand_action(py, &[*t], at, std::slice::from_mut(knot)),
+                    _ => self.hyper_action(py, *t, at, knot),
                 }
             }),
         })
     }
 
     /// Writes the derivatives of the accelerations at a knot to `slopes`, nv × n, row by row, and the derivatives of
-    /// the cost to a node. Returns false if no method works.
+    /// the cost to a knot. Returns false if no method works.
     pub(super) fn dynamics(
         &self,
         py: Python<'_>,
@@ -89,7 +89,7 @@ impl Differentiated<'_> {
         t: usize,
         at: [&[f64]; 2],
         slopes: &mut [f64],
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) -> PyResult<bool> {
         let d = self.directions(true);
         let nv = slopes.len() / d.n.max(1);
@@ -97,7 +97,7 @@ impl Differentiated<'_> {
             TOGETHER | ALONE => {
                 let (a, cost) = next_and_cost(&self.expand(py, d, &[t], at)?)?;
                 let cost = Expansion::read("calc, the cost", &cost, d, 1, 1)?;
-                write_cost(node, d, cost[0].knot(0));
+                write_cost(knot, d, cost[0].knot(0));
                 if !a.is_none() {
                     let a = Expansion::read("calc, the accelerations", &a, d, nv, 1)?;
                     for (row, y) in slopes.chunks_exact_mut(d.n).zip(&a) {
@@ -108,11 +108,11 @@ impl Differentiated<'_> {
             }
             _ => self.hyper_pairs(py, t, at, |[i, j], state, cost| {
                 let cost = Hyper::read_one("calc, the cost", &cost)?;
-                write_curvature(node, i, j, cost.curvature());
+                write_curvature(knot, i, j, cost.curvature());
                 if i != j {
                     return Ok(());
                 }
-                write_gradient(node, i, cost.slopes()[0]);
+                write_gradient(knot, i, cost.slopes()[0]);
                 if !state.is_none() {
                     let a = Hyper::read::<numpy::Ix1>("calc, the accelerations", &state, &[nv])?;
                     for (row, y) in slopes.chunks_exact_mut(d.n).zip(a) {
@@ -159,21 +159,21 @@ impl Differentiated<'_> {
         way: &Way,
         t: usize,
         at: [&[f64]; 2],
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) -> PyResult<bool> {
         let d = self.directions(true);
         way.descend(py, |way| match way {
             TOGETHER | ALONE => {
                 let cost = Expansion::read("calc", &self.expand(py, d, &[t], at)?, d, 1, 1)?;
-                write_cost(node, d, cost[0].knot(0));
+                write_cost(knot, d, cost[0].knot(0));
                 Ok(())
             }
             _ => (0..d.n).try_for_each(|i| {
                 (0..=i).try_for_each(|j| {
                     let cost = Hyper::read_one("calc", &self.hyper_result(py, t, at, [i, j])?)?;
-                    write_curvature(node, i, j, cost.curvature());
+                    write_curvature(knot, i, j, cost.curvature());
                     if i == j {
-                        write_gradient(node, i, cost.slopes()[0]);
+                        write_gradient(knot, i, cost.slopes()[0]);
                     }
                     Ok(())
                 })
@@ -182,7 +182,7 @@ impl Differentiated<'_> {
     }
 
     /// Writes the derivatives of the accelerations a at a knot, as `dynamics` does, and the second derivatives of μᵀ a.
-    /// The latter are stored in the node instead of the Hessian of a cost. Returns false if no method works.
+    /// The latter are stored in the knot instead of the Hessian of a cost. Returns false if no method works.
     pub(super) fn curvature(
         &self,
         py: Python<'_>,
@@ -191,7 +191,7 @@ impl Differentiated<'_> {
         at: [&[f64]; 2],
         mu: &[f64],
         slopes: &mut [f64],
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) -> PyResult<bool> {
         let d = self.directions(true);
         way.descend(py, |way| match way {
@@ -204,14 +204,14 @@ impl Differentiated<'_> {
                 for i in 0..d.n {
                     for j in 0..=i {
                         let sum = a.iter().zip(mu).map(|(y, mu)| mu * y.knot(0)[d.place(i, j)]).sum();
-                        write_curvature(node, i, j, sum);
+                        write_curvature(knot, i, j, sum);
                     }
                 }
                 Ok(())
             }
             _ => self.hyper_pairs(py, t, at, |[i, j], a, _| {
                 let a = Hyper::read::<numpy::Ix1>("calc, the accelerations", &a, &[mu.len()])?;
-                write_curvature(node, i, j, a.iter().zip(mu).map(|(y, mu)| mu * y.curvature()).sum());
+                write_curvature(knot, i, j, a.iter().zip(mu).map(|(y, mu)| mu * y.curvature()).sum());
                 if i == j {
                     slopes.chunks_exact_mut(d.n).zip(&a).for_each(|(row, y)| row[i] = y.slopes()[0]);
                 }
@@ -244,23 +244,23 @@ impl Differentiated<'_> {
         self.functions.call(py, 0, (t, row(x)?, row(u)?))
     }
 
-    fn expand_action(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], nodes: &mut [LqNode]) -> PyResult<()> {
+    fn expand_action(&self, py: Python<'_>, knots: &[usize], at: [&[f64]; 2], lq_knots: &mut [LqKnot]) -> PyResult<()> {
         let (d, nx, ndx, count) = (self.directions(true), self.space.nx(), self.space.ndx(), knots.len());
         let (state, cost) = next_and_cost(&self.expand(py, d, knots, at)?)?;
         let cost = Expansion::read("calc, the cost", &cost, d, 1, count)?;
         if !state.is_none() {
             let next = Expansion::read("calc, the next state", &state, d, nx, count)?;
             let slopes = self.space.slopes(py, d, &next, count)?;
-            for (node, slopes) in nodes.iter_mut().zip(slopes.chunks_exact(ndx * d.n)) {
+            for (knot, slopes) in lq_knots.iter_mut().zip(slopes.chunks_exact(ndx * d.n)) {
                 for (i, row) in slopes.chunks_exact(d.n).enumerate() {
-                    row.iter().enumerate().for_each(|(j, slope)| write_slope(node, i, j, *slope));
+                    row.iter().enumerate().for_each(|(j, slope)| write_slope(knot, i, j, *slope));
                 }
             }
         } else if !self.terminal {
             return Err(PyTypeError::new_err("calc, the next state: found None"));
         }
-        for (k, node) in nodes.iter_mut().enumerate() {
-            write_cost(node, d, cost[0].knot(k));
+        for (k, knot) in lq_knots.iter_mut().enumerate() {
+            write_cost(knot, d, cost[0].knot(k));
         }
         Ok(())
     }
@@ -319,18 +319,18 @@ impl Differentiated<'_> {
         Ok(())
     }
 
-    fn hyper_action(&self, py: Python<'_>, t: usize, at: [&[f64]; 2], node: &mut LqNode) -> PyResult<()> {
+    fn hyper_action(&self, py: Python<'_>, t: usize, at: [&[f64]; 2], knot: &mut LqKnot) -> PyResult<()> {
         self.hyper_pairs(py, t, at, |[i, j], state, cost| {
             let cost = Hyper::read_one("calc, the cost", &cost)?;
-            write_curvature(node, i, j, cost.curvature());
+            write_curvature(knot, i, j, cost.curvature());
             if i != j {
                 return Ok(());
             }
-            write_gradient(node, i, cost.slopes()[0]);
+            write_gradient(knot, i, cost.slopes()[0]);
             if !state.is_none() {
                 let next = Hyper::read::<numpy::Ix1>("calc, the next state", &state, &[self.space.nx()])?;
                 for (row, slopes) in hyper_slopes(self.space, &next).into_iter().enumerate() {
-                    write_slope(node, row, i, slopes[0]);
+                    write_slope(knot, row, i, slopes[0]);
                 }
             }
             Ok(())
@@ -347,33 +347,33 @@ pub(super) fn next_and_cost<'py>(result: &Bound<'py, PyAny>) -> PyResult<(Bound<
 }
 
 /// Writes the gradient and the Hessian of a cost.
-fn write_cost(node: &mut LqNode, d: Directions, numbers: &[f64]) {
+fn write_cost(knot: &mut LqKnot, d: Directions, numbers: &[f64]) {
     for i in 0..d.n {
-        write_gradient(node, i, numbers[1 + i]);
-        (0..=i).for_each(|j| write_curvature(node, i, j, numbers[d.place(i, j)]));
+        write_gradient(knot, i, numbers[1 + i]);
+        (0..=i).for_each(|j| write_curvature(knot, i, j, numbers[d.place(i, j)]));
     }
 }
 
-fn write_slope(node: &mut LqNode, i: usize, j: usize, slope: f64) {
-    match node.q.len() {
-        ndx if j < ndx => node.A[(i, j)] = slope,
-        ndx => node.B[(i, j - ndx)] = slope,
+fn write_slope(knot: &mut LqKnot, i: usize, j: usize, slope: f64) {
+    match knot.q.len() {
+        ndx if j < ndx => knot.A[(i, j)] = slope,
+        ndx => knot.B[(i, j - ndx)] = slope,
     }
 }
 
-fn write_gradient(node: &mut LqNode, i: usize, slope: f64) {
-    match node.q.len() {
-        ndx if i < ndx => node.q[i] = slope,
-        ndx => node.r[i - ndx] = slope,
+fn write_gradient(knot: &mut LqKnot, i: usize, slope: f64) {
+    match knot.q.len() {
+        ndx if i < ndx => knot.q[i] = slope,
+        ndx => knot.r[i - ndx] = slope,
     }
 }
 
 /// Writes ∂²ℓ/∂zᵢ∂zⱼ for j ≤ i, with z = (x, u).
-pub(super) fn write_curvature(node: &mut LqNode, i: usize, j: usize, curvature: f64) {
-    let ndx = node.q.len();
+pub(super) fn write_curvature(knot: &mut LqKnot, i: usize, j: usize, curvature: f64) {
+    let ndx = knot.q.len();
     match (i < ndx, j < ndx) {
-        (true, _) => (node.Q[(i, j)], node.Q[(j, i)]) = (curvature, curvature),
-        (false, true) => node.S[(j, i - ndx)] = curvature,
-        (false, false) => (node.R[(i - ndx, j - ndx)], node.R[(j - ndx, i - ndx)]) = (curvature, curvature),
+        (true, _) => (knot.Q[(i, j)], knot.Q[(j, i)]) = (curvature, curvature),
+        (false, true) => knot.S[(j, i - ndx)] = curvature,
+        (false, false) => (knot.R[(i - ndx, j - ndx)], knot.R[(j - ndx, i - ndx)]) = (curvature, curvature),
     }
 }

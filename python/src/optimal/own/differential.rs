@@ -16,7 +16,7 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rust::robot::{ContinuousModel, ControlPolynomial, Derivatives, Integrated, Integrator, KnotInput};
-use rust::{ActionModel, Hessian, LqNode};
+use rust::{ActionModel, Hessian, LqKnot};
 use std::ops::Range;
 
 /// An action whose accelerations and cost per second are written in Python; it advances by a time step.
@@ -157,7 +157,7 @@ impl DifferentialAction {
             da_dv: zeros(),
             da_du: vec![0.0; nv * nu],
         };
-        let Some((integrator, dt)) = self.step else { return Ok(Box::new(Integrated::end(inner))) };
+        let Some((integrator, dt)) = self.step else { return Ok(Box::new(Integrated::without_time(inner))) };
         let action = Integrated::new(inner, integrator, dt).map_err(problem_error)?.with_controls(self.controls);
         Ok(match self.bounds.clone() {
             Some([lower, upper]) => Box::new(action.with_bounds(lower, upper)),
@@ -198,12 +198,12 @@ impl OwnDynamics {
     }
 
     /// Writes the derivatives of the accelerations and of the cost. Returns false if only differences can compute them.
-    fn try_calc_diff(&mut self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], node: &mut LqNode) -> PyResult<bool> {
+    fn try_calc_diff(&mut self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], knot: &mut LqKnot) -> PyResult<bool> {
         let Written { nv, nu, functions, space, way } = &self.written;
         if !functions.has(1) {
             let all = Differentiated { functions, space, nu: *nu, batch: false, terminal: self.terminal };
             let mut slopes = vec![0.0; nv * (2 * nv + nu)];
-            let done = all.dynamics(py, way, t, [x, u], &mut slopes, node)?;
+            let done = all.dynamics(py, way, t, [x, u], &mut slopes, knot)?;
             let n = 2 * nv + nu;
             self.set_slopes(|i, k| slopes[i * n + k]);
             return Ok(done);
@@ -223,7 +223,7 @@ impl OwnDynamics {
                         let given = matrix("da_du", &entry, [*nv, *nu])?.to_matrix();
                         self.da_du.copy_from_slice(given.as_slice());
                     }
-                    "q" | "r" | "Q" | "S" | "R" => write(node, &name, &entry)?,
+                    "q" | "r" | "Q" | "S" | "R" => write(knot, &name, &entry)?,
                     other => {
                         let expected = "da_dq, da_dv, da_du, q, r, Q, S or R";
                         return Err(PyValueError::new_err(format!("expected {expected}, found '{other}'")));
@@ -245,12 +245,12 @@ impl OwnDynamics {
     }
 
     /// Computes the derivatives by central differences.
-    fn differ(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn differ(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         let Written { nv, nu, .. } = self.written;
-        let mut full = LqNode::zeros(2 * nv, nu);
+        let mut full = LqKnot::zeros(2 * nv, nu);
         rust::NumDiff(Probe(self.copy())).calc_diff(t, x, u, &mut full);
         self.set_slopes(|i, k| if k < 2 * nv { full.A[(i, k)] } else { full.B[(i, k - 2 * nv)] });
-        (node.Q, node.S, node.R, node.q, node.r) = (full.Q, full.S, full.R, full.q, full.r);
+        (knot.Q, knot.S, knot.R, knot.q, knot.r) = (full.Q, full.S, full.R, full.q, full.r);
     }
 
     fn copy(&self) -> Self {
@@ -295,26 +295,26 @@ impl ContinuousModel for OwnDynamics {
         (&self.a, cost)
     }
 
-    fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
+    fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_> {
         let KnotInput { t, x, u, .. } = input;
-        for field in [&mut node.Q, &mut node.S, &mut node.R, &mut self.da_dq, &mut self.da_dv] {
+        for field in [&mut knot.Q, &mut knot.S, &mut knot.R, &mut self.da_dq, &mut self.da_dv] {
             field.fill(0.0);
         }
         self.da_du.fill(0.0);
-        node.q.fill(0.0);
-        node.r.fill(0.0);
+        knot.q.fill(0.0);
+        knot.r.fill(0.0);
         self.value(t, x, u);
         let fault = self.fault.clone();
-        match unless_failed(&fault, |py| self.try_calc_diff(py, t, [x, u], node)) {
+        match unless_failed(&fault, |py| self.try_calc_diff(py, t, [x, u], knot)) {
             Some(true) => {}
-            Some(false) => self.differ(t, x, u, node),
-            None => node.q.fill(f64::NAN),
+            Some(false) => self.differ(t, x, u, knot),
+            None => knot.q.fill(f64::NAN),
         }
-        for field in [&mut node.Q, &mut node.S, &mut node.R] {
+        for field in [&mut knot.Q, &mut knot.S, &mut knot.R] {
             *field *= scale;
         }
-        node.q *= scale;
-        node.r *= scale;
+        knot.q *= scale;
+        knot.r *= scale;
         Derivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_du: &self.da_du }
     }
 
@@ -323,12 +323,12 @@ impl ContinuousModel for OwnDynamics {
         self.value(t, x, u);
         let Written { nv, nu, functions, space, way } = &self.written;
         let all = Differentiated { functions, space, nu: *nu, batch: false, terminal: false };
-        let (n, mut node) = (2 * nv + nu, LqNode::zeros(2 * nv, *nu));
+        let (n, mut knot) = (2 * nv + nu, LqKnot::zeros(2 * nv, *nu));
         let mut slopes = vec![0.0; nv * n];
-        unless_failed(&fault, |py| all.curvature(py, way, t, [x, u], mu, &mut slopes, &mut node))
+        unless_failed(&fault, |py| all.curvature(py, way, t, [x, u], mu, &mut slopes, &mut knot))
             .filter(|done| *done)?;
         self.set_slopes(|i, k| slopes[i * n + k]);
-        (hessian.xx, hessian.xu, hessian.uu) = (node.Q, node.S, node.R);
+        (hessian.xx, hessian.xu, hessian.uu) = (knot.Q, knot.S, knot.R);
         Some(Derivatives { a: &self.a, da_dq: &self.da_dq, da_dv: &self.da_dv, da_du: &self.da_du })
     }
 

@@ -6,7 +6,7 @@ use crate::exceptions::{problem_error, within};
 use condyle::optimal as rust;
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
-use rust::{ActionModel, LqNode};
+use rust::{ActionModel, LqKnot};
 
 /// An action with linear dynamics x⁺ = A x + B u + f, the quadratic cost ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, and bounds
 /// lower ≤ u ≤ upper.
@@ -43,27 +43,27 @@ impl Lqr {
             _ => 0,
         };
         within("R, rows, or B, columns", nu, 0, MOST_SIZE)?;
-        let mut node = LqNode::zeros(nx, nu);
+        let mut knot = LqKnot::zeros(nx, nu);
         let parts = [("B", B), ("f", f), ("Q", Q), ("S", S), ("R", R), ("q", q), ("r", r)];
         for (name, given) in [("A", Some(A)), ("lower", lower), ("upper", upper)].into_iter().chain(parts) {
-            given.map_or(Ok(()), |given| write(&mut node, name, given))?;
+            given.map_or(Ok(()), |given| write(&mut knot, name, given))?;
         }
-        Ok(Self(rust::Lqr::new(node)))
+        Ok(Self(rust::Lqr::new(knot)))
     }
 
     fn __repr__(&self) -> String {
-        let node = self.0.node();
-        format!("<condyle.optimal.Lqr nx {}, nu {}>", node.ndx(), node.nu())
+        let knot = self.0.knot();
+        format!("<condyle.optimal.Lqr nx {}, nu {}>", knot.ndx(), knot.nu())
     }
 
     #[allow(non_snake_case)]
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let (py, node) = (slf.py(), slf.get().0.node());
+        let (py, knot) = (slf.py(), slf.get().0.knot());
         let array = |of: &DMatrix<f64>| output(py, None, &[of.nrows(), of.ncols()], |out| of.write(out));
-        let (A, B, Q, S, R) = (array(&node.A)?, array(&node.B)?, array(&node.Q)?, array(&node.S)?, array(&node.R)?);
+        let (A, B, Q, S, R) = (array(&knot.A)?, array(&knot.B)?, array(&knot.Q)?, array(&knot.S)?, array(&knot.R)?);
         let vector = |of: &[f64]| of.to_vec();
-        let (f, q, r) = (vector(node.f.as_slice()), vector(node.q.as_slice()), vector(node.r.as_slice()));
-        let (lower, upper) = (vector(node.lower.as_slice()), vector(node.upper.as_slice()));
+        let (f, q, r) = (vector(knot.f.as_slice()), vector(knot.q.as_slice()), vector(knot.r.as_slice()));
+        let (lower, upper) = (vector(knot.lower.as_slice()), vector(knot.upper.as_slice()));
         Ok((slf.get_type(), (A, B, f, Q, S, R, q, r, lower, upper)).into_pyobject(py)?.into_any())
     }
 }
@@ -92,24 +92,24 @@ impl Unicycle {
             return Err(problem_error(rust::Error::TimeStep { dt }));
         }
         let action = rust::Unicycle::new(dt, weights);
-        Ok(Self(if terminal { action.at_the_end() } else { action }))
+        Ok(Self(if terminal { action.terminal() } else { action }))
     }
 
     fn __repr__(&self) -> String {
         let (dt, [x, u]) = (self.0.dt, self.0.weights);
-        let end = if self.0.is_end() { ", the end" } else { "" };
+        let end = if self.0.is_terminal() { ", the end" } else { "" };
         format!("<condyle.optimal.Unicycle {dt} s, weights {x} {u}{end}>")
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let action = &slf.get().0;
-        Ok((slf.get_type(), (action.dt, action.weights, action.is_end())).into_pyobject(slf.py())?.into_any())
+        Ok((slf.get_type(), (action.dt, action.weights, action.is_terminal())).into_pyobject(slf.py())?.into_any())
     }
 }
 
-/// Writes the matrix or vector `name` of a node.
-pub(in crate::optimal) fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
-    let LqNode { A, B, Q, S, R, f, q, r, lower, upper, .. } = node;
+/// Writes the matrix or vector `name` of a knot.
+pub(in crate::optimal) fn write(knot: &mut LqKnot, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
+    let LqKnot { A, B, Q, S, R, f, q, r, lower, upper, .. } = knot;
     let vectors = [("f", f), ("q", q), ("r", r), ("lower", lower), ("upper", upper)];
     let matrices = [("A", A), ("B", B), ("Q", Q), ("S", S), ("R", R)];
     if let Some((_, to)) = vectors.into_iter().find(|(known, _)| *known == name) {

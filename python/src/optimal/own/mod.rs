@@ -21,4 +21,4 @@ pub(super) use residual::{OwnFunction, faults};
 pub(super) use space::Space;
 
 /// Maximum size of a state, a control or a constraint; their matrices are stored once for each knot.
-pub(super) const MOST_SIZE: usize = condyle::optimal::LqNode::MOST_SIZE;
+pub(super) const MOST_SIZE: usize = condyle::optimal::LqKnot::MOST_SIZE;

@@ -6,7 +6,7 @@ use super::lqr::write;
 use super::space::Space;
 use crate::arrays::{matrix, vector};
 use condyle::optimal::robot::{Cost, Knot, Limit, Residual, ResidualFunction};
-use condyle::optimal::{Hessian, LqNode};
+use condyle::optimal::{Hessian, LqKnot};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -71,9 +71,9 @@ impl OwnFunction {
             return Ok(());
         }
         if self.number {
-            let node = self.try_number(py, t, [x, u])?;
-            by_x.copy_from_slice(node.q.as_slice());
-            by_u.copy_from_slice(node.r.as_slice());
+            let knot = self.try_number(py, t, [x, u])?;
+            by_x.copy_from_slice(knot.q.as_slice());
+            by_u.copy_from_slice(knot.r.as_slice());
             return Ok(());
         }
         let mut slopes = vec![0.0; self.size * (ndx + nu)];
@@ -90,9 +90,9 @@ impl OwnFunction {
     }
 
     /// Computes the gradient (q, r) and the Hessian (Q, S, R) of a scalar cost.
-    fn try_number(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2]) -> PyResult<LqNode> {
+    fn try_number(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2]) -> PyResult<LqKnot> {
         let (ndx, nu) = (self.space.ndx(), u.len());
-        let mut node = LqNode::zeros(ndx, nu);
+        let mut knot = LqKnot::zeros(ndx, nu);
         if self.functions.has(1) {
             let given = self.functions.at(py, 1, t, x, u)?;
             let found = given.get_type();
@@ -101,28 +101,28 @@ impl OwnFunction {
             })?;
             for (name, entry) in given.iter() {
                 match name.extract::<String>()?.as_str() {
-                    name @ ("q" | "r" | "Q" | "S" | "R") => write(&mut node, name, &entry)?,
+                    name @ ("q" | "r" | "Q" | "S" | "R") => write(&mut knot, name, &entry)?,
                     other => {
                         let what = format!("calc_diff of a cost: expected q, r, Q, S or R, found '{other}'");
                         return Err(PyValueError::new_err(what));
                     }
                 }
             }
-            return Ok(node);
+            return Ok(knot);
         }
         let all = Differentiated { functions: &self.functions, space: &self.space, nu, batch: false, terminal: false };
-        if !all.number(py, &self.way, t, [x, u], &mut node)? {
+        if !all.number(py, &self.way, t, [x, u], &mut knot)? {
             let mut slopes = vec![0.0; ndx + nu];
             self.differ(py, t, [x, u], &mut slopes)?;
-            node.q.copy_from_slice(&slopes[..ndx]);
-            node.r.copy_from_slice(&slopes[ndx..]);
-            self.differ_twice(py, t, [x, u], &mut node)?;
+            knot.q.copy_from_slice(&slopes[..ndx]);
+            knot.r.copy_from_slice(&slopes[ndx..]);
+            self.differ_twice(py, t, [x, u], &mut knot)?;
         }
-        Ok(node)
+        Ok(knot)
     }
 
     /// Computes the Hessian of a scalar cost by central differences.
-    fn differ_twice(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], node: &mut LqNode) -> PyResult<()> {
+    fn differ_twice(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], knot: &mut LqKnot) -> PyResult<()> {
         let (ndx, n) = (self.space.ndx(), self.space.ndx() + u.len());
         let mut moved = x.to_vec();
         let mut at = |steps: [(usize, f64); 2]| {
@@ -139,7 +139,7 @@ impl OwnFunction {
             for j in 0..=i {
                 let same = at([(i, h), (j, h)])? + at([(i, -h), (j, -h)])?;
                 let curvature = (same - at([(i, h), (j, -h)])? - at([(i, -h), (j, h)])?) / (4.0 * h * h);
-                write_curvature(node, i, j, curvature);
+                write_curvature(knot, i, j, curvature);
             }
         }
         Ok(())
@@ -195,14 +195,14 @@ impl ResidualFunction for OwnFunction {
         [by_x, by_u]: [&mut [f64]; 2],
         hessian: &mut Hessian,
     ) {
-        let Some(node) = unless_failed(&self.fault, |py| self.try_number(py, t, [x, u])) else {
+        let Some(knot) = unless_failed(&self.fault, |py| self.try_number(py, t, [x, u])) else {
             by_x.fill(f64::NAN);
             return;
         };
-        by_x.copy_from_slice(node.q.as_slice());
-        by_u.copy_from_slice(node.r.as_slice());
-        hessian.xx.copy_from(&(node.Q * d[0]));
-        hessian.xu.copy_from(&(node.S * d[0]));
-        hessian.uu.copy_from(&(node.R * d[0]));
+        by_x.copy_from_slice(knot.q.as_slice());
+        by_u.copy_from_slice(knot.r.as_slice());
+        hessian.xx.copy_from(&(knot.Q * d[0]));
+        hessian.xu.copy_from(&(knot.S * d[0]));
+        hessian.uu.copy_from(&(knot.R * d[0]));
     }
 }

@@ -2,13 +2,14 @@
 #![allow(non_snake_case)] // the names of the literature: K, Quu
 
 use super::super::box_qp::BoxQp;
-use super::super::node::{LqKnot, LqNode};
+use super::super::feedback::KnotFeedback;
+use super::super::knot::LqKnot;
 use super::super::workspace::Workspace;
 use condyle_linalg::{SLACK, View, copy_symmetric, dot, eliminate, solve_right, transpose_negated};
 
 /// Elimination of controls, with its scratch.
 #[derive(Debug, Clone)]
-pub(crate) struct Controls {
+pub(super) struct Controls {
     qp: BoxQp,
     /// Lᵀ, for the back substitution.
     upper: Vec<f64>,
@@ -18,12 +19,12 @@ pub(crate) struct Controls {
 
 impl Controls {
     /// Allocates the scratch for m controls.
-    pub(crate) fn new(m: usize) -> Self {
+    pub(super) fn new(m: usize) -> Self {
         Self { qp: BoxQp::new(m), upper: vec![0.0; (m + SLACK) * m], free: 0 }
     }
 
     /// Computes L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a
-    /// bound. Stores Qu and Quu in the knot and, if there are bounds, k in the scratch. Returns the number of these
+    /// bound. Stores Qu and Quu in the feedback and, if there are bounds, k in the scratch. Returns the number of these
     /// controls.
     ///
     /// # Errors
@@ -31,23 +32,23 @@ impl Controls {
     pub(super) fn eliminate(
         &mut self,
         work: &mut Workspace,
-        node: &LqNode,
-        knot: &mut LqKnot,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
     ) -> Result<usize, (usize, f64)> {
-        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+        let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         let H = &mut work.H;
         for j in 0..m {
-            knot.Qu[j] = H[j * ld + m + n];
+            feedback.Qu[j] = H[j * ld + m + n];
         }
-        copy_symmetric(knot.Quu.as_mut_slice(), m, View::new(H, ld), m);
-        if !node.is_bounded() {
+        copy_symmetric(feedback.Quu.as_mut_slice(), m, View::new(H, ld), m);
+        if !knot.is_bounded() {
             self.free = m;
             eliminate(H, ld, [m + n + 1, m + n, m])?;
             return Ok(m);
         }
-        let (lower, upper) = (node.lower.as_slice(), node.upper.as_slice());
-        let start = knot.k.iter().map(|k| -k);
-        self.qp.solve(&knot.Quu, knot.Qu.as_slice(), lower, upper, start)?;
+        let (lower, upper) = (knot.lower.as_slice(), knot.upper.as_slice());
+        let start = feedback.k.iter().map(|k| -k);
+        self.qp.solve(&feedback.Quu, feedback.Qu.as_slice(), lower, upper, start)?;
         let free = &self.qp.free;
         keep_free(H, ld, m, n, free);
         self.free = free.len();
@@ -56,13 +57,19 @@ impl Controls {
     }
 
     /// Computes [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination. The states are rotated by `turn`.
-    pub(super) fn recover_gains(&mut self, work: &mut Workspace, node: &LqNode, knot: &mut LqKnot, turn: usize) {
-        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+    pub(super) fn write_gains(
+        &mut self,
+        work: &mut Workspace,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+        turn: usize,
+    ) {
+        let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         let (Self { qp, upper, free }, H, split) = (self, &mut work.H, n - turn);
         let free = *free;
         solve_right(H, ld, [free, free + n + 1, free], upper);
-        let K = knot.K.as_mut_slice();
-        if node.is_bounded() {
+        let K = feedback.K.as_mut_slice();
+        if knot.is_bounded() {
             K.fill(0.0);
             for i in 0..n {
                 let state = if i < split { i + turn } else { i - split };
@@ -70,23 +77,23 @@ impl Controls {
                     K[state * m + qp.free[j]] = -H[j * ld + free + i];
                 }
             }
-            knot.k.copy_from_slice(&qp.x[..m]);
+            feedback.k.copy_from_slice(&qp.x[..m]);
             for j in 0..m {
                 if qp.free.binary_search(&j).is_err() {
-                    knot.Qu[j] = 0.0;
+                    feedback.Qu[j] = 0.0;
                 }
             }
         } else {
             transpose_negated(&mut K[turn * m..], m, View::new(&H[m..], ld), [split, m]);
             transpose_negated(K, m, View::new(&H[m + split..], ld), [turn, m]);
             for j in 0..m {
-                knot.k[j] = -H[j * ld + m + n];
+                feedback.k[j] = -H[j * ld + m + n];
             }
         }
-        let k = knot.k.as_slice();
-        knot.expected = [dot(knot.Qu.as_slice(), k), 0.0];
-        for (column, k_j) in knot.Quu.column_iter().zip(k) {
-            knot.expected[1] += k_j * dot(column.as_slice(), k);
+        let k = feedback.k.as_slice();
+        feedback.expected = [dot(feedback.Qu.as_slice(), k), 0.0];
+        for (column, k_j) in feedback.Quu.column_iter().zip(k) {
+            feedback.expected[1] += k_j * dot(column.as_slice(), k);
         }
     }
 }

@@ -1,28 +1,39 @@
 //! Quadratic form of a knot whose A and B have no known structure.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …
 
-use super::super::node::{Hessian, LqNode};
+use super::super::feedback::KnotFeedback;
+use super::super::knot::{Hessian, LqKnot};
 use super::super::workspace::Workspace;
-use super::{Curvature, Form};
+use super::controls::Controls;
+use super::{Curvature, KnotForm};
 use condyle_linalg::{SLACK, View, add_product_lower, copy_lower, copy_matrix, product, transpose};
 
 /// Form with full matrices, and with the states in their original order.
 #[derive(Debug, Clone)]
-pub(super) struct Dense;
+pub(super) struct Dense {
+    controls: Controls,
+}
 
-impl Form for Dense {
+impl Dense {
+    /// Allocates the scratch for at most m controls.
+    pub(super) fn new(m: usize) -> Self {
+        Self { controls: Controls::new(m) }
+    }
+}
+
+impl KnotForm for Dense {
     fn turn(&self, _: usize) -> usize {
         0
     }
 
     /// Writes H = [R + ϱ 1 ·; S Q; rᵀ qᵀ] + W [B A],   W = [P B, P A, P f + p]ᵀ.
-    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>) {
-        let (n, m) = (node.ndx(), node.nu());
+    fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>) {
+        let (n, m) = (knot.ndx(), knot.nu());
         let (ld, rows) = (work.stride(m), m + n);
-        write_cost(work, node, 0, curvature);
+        write_cost(work, knot, 0, curvature);
         let Workspace { P, p, F, W, H, .. } = work;
-        transpose(F, ld, View::new(node.B.as_slice(), n), [n, m]);
-        transpose(&mut F[m..], ld, View::new(node.A.as_slice(), n), [n, n]);
+        transpose(F, ld, View::new(knot.B.as_slice(), n), [n, m]);
+        transpose(&mut F[m..], ld, View::new(knot.A.as_slice(), n), [n, n]);
         let F = View::new(F, ld);
         product(W, ld, [rows, n, n], F, View::new(P, n + SLACK));
         for k in 0..n {
@@ -33,21 +44,35 @@ impl Form for Dense {
     }
 
     /// Writes Θ [B A].
-    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
-        let (n, m) = (node.ndx(), node.nu());
+    fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
+        let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
         let Workspace { F, H, .. } = work;
         product(&mut H[m + n + 1..], ld, [n, m + n, n], View::new(Theta, n + SLACK), View::new(F, ld));
+    }
+
+    fn eliminate(
+        &mut self,
+        work: &mut Workspace,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+    ) -> Result<usize, (usize, f64)> {
+        self.controls.eliminate(work, knot, feedback)
+    }
+
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, _: bool) {
+        let turn = self.turn(knot.ndx());
+        self.controls.write_gains(work, knot, feedback, turn);
     }
 }
 
 /// Writes the lower triangle of H = [R ·; S Q; rᵀ qᵀ] + [ψuu ·; ψxu ψxx; 0 0], with the states rotated by `turn`. ψ is
 /// the curvature of the dynamics.
-pub(super) fn write_cost(work: &mut Workspace, node: &LqNode, turn: usize, curvature: &mut Curvature<'_>) {
-    let (n, m) = (node.ndx(), node.nu());
+pub(super) fn write_cost(work: &mut Workspace, knot: &LqKnot, turn: usize, curvature: &mut Curvature<'_>) {
+    let (n, m) = (knot.ndx(), knot.nu());
     let (ld, split) = (work.stride(m), n - turn); // `split`: number of states in H before the rotation wraps around
     let Workspace { H, p, .. } = work;
-    let (R, S, Q) = (View::new(node.R.as_slice(), m), View::new(node.S.as_slice(), n), View::new(node.Q.as_slice(), n));
+    let (R, S, Q) = (View::new(knot.R.as_slice(), m), View::new(knot.S.as_slice(), n), View::new(knot.Q.as_slice(), n));
     copy_lower(H, ld, R, m);
     copy_matrix(&mut H[m..], ld, S.at(turn, 0), [split, m]);
     copy_lower(&mut H[m * ld + m..], ld, Q.at(turn, turn), split);
@@ -57,11 +82,11 @@ pub(super) fn write_cost(work: &mut Workspace, node: &LqNode, turn: usize, curva
         copy_lower(&mut H[(m + split) * (ld + 1)..], ld, Q, turn);
     }
     for j in 0..m {
-        H[j * ld + m + n] = node.r[j];
+        H[j * ld + m + n] = knot.r[j];
     }
     for j in 0..n {
         let state = if j < split { j + turn } else { j - split };
-        H[(m + j) * ld + m + n] = node.q[state];
+        H[(m + j) * ld + m + n] = knot.q[state];
     }
     if let Some(hessian) = curvature.at(p, m) {
         add_hessian(H, ld, hessian, turn);

@@ -12,11 +12,11 @@
 //! The elimination adds the rows of U and G, scaled so that their squares are added, to H tile by tile.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, U
 
-use super::super::gains::take_gains;
-use super::super::inverse_dynamics_form::InverseDynamicsForm;
-use super::super::node::{LqKnot, LqNode};
+use super::super::feedback::{KnotFeedback, take_gains};
+use super::super::knot::LqKnot;
+use super::super::structure::InverseDynamicsForm;
 use super::super::workspace::Workspace;
-use super::{Controls, Curvature, Form};
+use super::{Curvature, KnotForm};
 use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_narrow_level, copy_scaled, eliminate_sum,
     transpose_block,
@@ -53,53 +53,47 @@ impl Driven {
         if n <= 2 * MOST { m } else { 0 }
     }
 
-    /// Returns whether the form applies to a node, if `regularisation` is added to the diagonal of R.
-    pub(super) fn takes(node: &LqNode, regularisation: f64) -> bool {
-        let (nv, InverseDynamicsForm { own, slopes, diagonal, .. }) = (node.ndx() / 2, &node.inverse_dynamics);
+    /// Returns whether the form applies to a knot, if `regularisation` is added to the diagonal of R.
+    pub(super) fn takes(knot: &LqKnot, regularisation: f64) -> bool {
+        let (nv, InverseDynamicsForm { own, slopes, diagonal, .. }) = (knot.ndx() / 2, &knot.inverse_dynamics);
         nv <= MOST
             && *own == [[0, 0, nv]]
-            && node.nu() == nv
-            && node.structure.euler().is_some_and(|(_, blocks)| blocks.is_empty())
+            && knot.nu() == nv
+            && knot.structure.euler().is_some_and(|(_, blocks)| blocks.is_empty())
             && slopes.len() <= MOST_COSTS
             && slopes.iter().all(|slopes| slopes[1] > 0.0)
             && diagonal[nv..].iter().all(|r| r + regularisation > 0.0)
     }
 }
 
-impl Form for Driven {
+impl KnotForm for Driven {
     fn turn(&self, n: usize) -> usize {
         n / 2
     }
 
     /// Writes H without the squares, and U below it.
-    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
-        self.count = node.nu() + node.inverse_dynamics.slopes.len();
-        at_narrow_level(Write { rows: &mut self.rows, stride: self.stride, work, node, regularisation });
+    fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, _: &mut Curvature<'_>) {
+        self.count = knot.nu() + knot.inverse_dynamics.slopes.len();
+        at_narrow_level(Write { rows: &mut self.rows, stride: self.stride, work, knot, regularisation });
     }
 
-    fn write_below(&mut self, _: &mut Workspace, _: &LqNode, _: &[f64]) {
+    fn write_below(&mut self, _: &mut Workspace, _: &LqKnot, _: &[f64]) {
         unreachable!("segments of a horizon take the form for all robots");
     }
 
     /// Adds the squares and eliminates the unknowns. With U below H, the result is [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K], as
-    /// in [`Gains`](super::super::gains::Gains).
-    fn eliminate(
-        &self,
-        work: &mut Workspace,
-        _: &mut Controls,
-        node: &LqNode,
-        _: &mut LqKnot,
-    ) -> Result<usize, (usize, f64)> {
-        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+    /// in [`Gains`](super::super::feedback::Gains).
+    fn eliminate(&mut self, work: &mut Workspace, knot: &LqKnot, _: &mut KnotFeedback) -> Result<usize, (usize, f64)> {
+        let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         let shape = [m + n + 1 + m, m + n, m];
         eliminate_sum(&mut work.H, ld, shape, View::new(&self.rows, self.stride), [m + n + 1, self.count])?;
         Ok(m)
     }
 
-    fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        let (all, ld) = (node.ndx() + node.nu(), work.stride(node.nu()));
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, _: bool) {
+        let (all, ld) = (knot.ndx() + knot.nu(), work.stride(knot.nu()));
         let H = View::new(&work.H, ld);
-        take_gains(H.at(all + 1, 0), H.at(all, 0), node, knot, &mut self.y);
+        take_gains(H.at(all + 1, 0), H.at(all, 0), knot, feedback, &mut self.y);
     }
 }
 
@@ -108,26 +102,26 @@ struct Write<'a> {
     rows: &'a mut [f64],
     stride: usize,
     work: &'a mut Workspace,
-    node: &'a LqNode,
+    knot: &'a LqKnot,
     regularisation: f64,
 }
 
 impl Vectorized for Write<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { rows, stride, work, node, regularisation } = self;
-        let (nv, ld, form) = (node.nu(), work.stride(node.nu()), &node.inverse_dynamics);
+        let Self { rows, stride, work, knot, regularisation } = self;
+        let (nv, ld, form) = (knot.nu(), work.stride(knot.nu()), &knot.inverse_dynamics);
         let (n, all, size) = (2 * nv, 3 * nv, form.stride);
-        let (dt, _) = node.structure.euler().expect("the form is that of Euler steps");
+        let (dt, _) = knot.structure.euler().expect("the form is that of Euler steps");
         let Workspace { P, p, H, .. } = work;
-        let (P, Q) = (View::new(P, n + SLACK), View::new(node.Q.as_slice(), n));
+        let (P, Q) = (View::new(P, n + SLACK), View::new(knot.Q.as_slice(), n));
         let (v, q) = (nv * ld, n * ld); // first elements of the columns of δv and δq
 
         // Nᵀ = Δt P₁₁ + P₁₂,   Π = Δt (Nᵀ + P₂₁) + P₂₂,   and Q + P₁₁ for δq
         let places = ([n, v + n], [0, nv, v + nv]);
         add_in_turn::<V, 2, 3>(H, ld, places, P.at(0, nv), P, dt, [nv, nv]);
         add_blocks::<V>(&mut H[q + n..], ld, Q, P, [nv, nv]);
-        let ((p_q, p_v), (gradient_q, gradient_v)) = (p.split_at(nv), node.q.as_slice().split_at(nv));
+        let ((p_q, p_v), (gradient_q, gradient_v)) = (p.split_at(nv), knot.q.as_slice().split_at(nv));
         for j in 0..nv {
             let y = dt * p_q[j] + p_v[j];
             H[j * ld + all] = y;
@@ -141,7 +135,7 @@ impl Vectorized for Write<'_> {
         let (efforts, costs) = (form.efforts.numbers.chunks_exact(size), form.costs.numbers.chunks_exact(size));
         for (k, (x, row)) in efforts.chain(costs).zip(rows.chunks_exact_mut(stride)).enumerate() {
             let [d, dd] =
-                if k < nv { [node.r[k], form.diagonal[nv + k] + regularisation] } else { form.slopes[k - nv] };
+                if k < nv { [knot.r[k], form.diagonal[nv + k] + regularisation] } else { form.slopes[k - nv] };
             let root = condyle_spatial::Scalar::sqrt(dd);
             copy_scaled::<V>(row, &x[..all], root);
             row[all] = d / root;

@@ -1,11 +1,13 @@
 //! Quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, T, E
 
-use super::super::node::LqNode;
+use super::super::feedback::KnotFeedback;
+use super::super::knot::LqKnot;
 use super::super::structure::{EulerBlock, LARGEST_BLOCK};
 use super::super::workspace::Workspace;
+use super::controls::Controls;
 use super::dense::{add_to_diagonal, write_cost};
-use super::{Curvature, Form};
+use super::{Curvature, KnotForm};
 use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_in_turn, add_matrix, add_product_lower, add_transposed_product_lower,
     at_narrow_level, product, transpose,
@@ -17,16 +19,17 @@ pub(super) struct Euler {
     steps: Steps,
     /// Part of NᵀF_q; its stride equals the stride of Nᵀ and Π.
     M: Vec<f64>,
+    controls: Controls,
 }
 
 impl Euler {
-    /// Allocates the scratch for n states.
-    pub(super) fn new(n: usize) -> Self {
-        Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)] }
+    /// Allocates the scratch for n states and at most m controls.
+    pub(super) fn new(n: usize, m: usize) -> Self {
+        Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)], controls: Controls::new(m) }
     }
 }
 
-impl Form for Euler {
+impl KnotForm for Euler {
     fn turn(&self, n: usize) -> usize {
         n / 2
     }
@@ -37,16 +40,16 @@ impl Form for Euler {
     /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
     /// H = cost + W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T,   Qx_q += Tᵀp_q
     /// ```
-    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>) {
-        let (n, m) = (node.ndx(), node.nu());
+    fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>) {
+        let (n, m) = (knot.ndx(), knot.nu());
         let (nv, ld, rows) = (n / 2, work.stride(m), m + n);
         let ldn = nv + SLACK;
-        let Self { steps, M } = self;
-        write_cost(work, node, nv, curvature);
-        steps.write(work, node);
+        let Self { steps, M, .. } = self;
+        write_cost(work, knot, nv, curvature);
+        steps.write(work, knot);
 
         let Workspace { F, W, H, .. } = work;
-        let (A, B) = (View::new(node.A.as_slice(), n), View::new(node.B.as_slice(), n));
+        let (A, B) = (View::new(knot.A.as_slice(), n), View::new(knot.B.as_slice(), n));
         transpose(F, ld, B.at(nv, 0), [nv, m]);
         transpose(&mut F[m..], ld, A.at(nv, nv), [nv, nv]);
         transpose(&mut F[m + nv..], ld, A.at(nv, 0), [nv, nv]);
@@ -61,18 +64,32 @@ impl Form for Euler {
         add_product_lower(H, ld, [rows + 1, rows, nv], View::new(W, ld), all);
         let H_qq = &mut H[(m + nv) * (ld + 1)..];
         add_transposed_product_lower(H_qq, ld, nv, N, F_q, M, ldn);
-        steps.add_positions(work, node);
+        steps.add_positions(work, knot);
         add_to_diagonal(&mut work.H, ld, m, regularisation);
     }
 
     /// Computes Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v.
-    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
-        let (n, m) = (node.ndx(), node.nu());
+    fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
+        let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
-        self.steps.write_velocities_below(work, node, Theta);
+        self.steps.write_velocities_below(work, knot, Theta);
         let Workspace { F, W: Psi, H, .. } = work;
         product(&mut H[m + n + 1..], ld, [n, m + n, n / 2], View::new(Psi, n + SLACK), View::new(F, ld));
-        self.steps.add_positions_below(work, node, Theta);
+        self.steps.add_positions_below(work, knot, Theta);
+    }
+
+    fn eliminate(
+        &mut self,
+        work: &mut Workspace,
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+    ) -> Result<usize, (usize, f64)> {
+        self.controls.eliminate(work, knot, feedback)
+    }
+
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, _: bool) {
+        let turn = self.turn(knot.ndx());
+        self.controls.write_gains(work, knot, feedback, turn);
     }
 }
 
@@ -102,16 +119,16 @@ impl Steps {
     }
 
     /// Writes Π, N and Δt Eᵀp_q + p_v, by which the value of the next state depends on its velocity.
-    pub(super) fn write(&mut self, work: &Workspace, node: &LqNode) {
-        let (dt, blocks) = steps_of(node);
-        let n = node.ndx();
+    pub(super) fn write(&mut self, work: &Workspace, knot: &LqKnot) {
+        let (dt, blocks) = steps_of(knot);
+        let n = knot.ndx();
         times_blocks(&mut self.PB, &work.P, n + SLACK, n, blocks, |block| &block.E);
         at_narrow_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
     }
 
     /// Adds H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
-    pub(super) fn add_positions(&mut self, work: &mut Workspace, node: &LqNode) {
-        let ((_, blocks), n, m) = (steps_of(node), node.ndx(), node.nu());
+    pub(super) fn add_positions(&mut self, work: &mut Workspace, knot: &LqKnot) {
+        let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
         let (nv, ld) = (n / 2, work.stride(m));
         let Workspace { P, p, H, .. } = work;
         times_blocks(&mut self.PB, P, n + SLACK, nv, blocks, |block| &block.T);
@@ -119,8 +136,8 @@ impl Steps {
     }
 
     /// Computes Ψ = Δt Θ_q E + Θ_v into W, with the stride of Θ.
-    pub(super) fn write_velocities_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
-        let ((dt, blocks), n) = (steps_of(node), node.ndx());
+    pub(super) fn write_velocities_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
+        let ((dt, blocks), n) = (steps_of(knot), knot.ndx());
         let (nv, ld) = (n / 2, n + SLACK);
         let (Self { PB, .. }, Psi) = (self, &mut work.W);
         times_blocks(PB, Theta, ld, n, blocks, |block| &block.E);
@@ -134,8 +151,8 @@ impl Steps {
     }
 
     /// Adds Θ_q T to the columns of δq below H.
-    pub(super) fn add_positions_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
-        let ((_, blocks), n, m) = (steps_of(node), node.ndx(), node.nu());
+    pub(super) fn add_positions_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
+        let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
         let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
         let (Self { PB, .. }, H) = (self, &mut work.H);
         times_blocks(PB, Theta, ldt, n, blocks, |block| &block.T);
@@ -148,9 +165,9 @@ impl Steps {
     }
 }
 
-/// Returns Δt and the blocks of T and E of a node.
-fn steps_of(node: &LqNode) -> (f64, &[EulerBlock]) {
-    node.structure.euler().expect("the form is that of Euler steps")
+/// Returns Δt and the blocks of T and E of a knot.
+fn steps_of(knot: &LqKnot) -> (f64, &[EulerBlock]) {
+    knot.structure.euler().expect("the form is that of Euler steps")
 }
 
 /// Loops of [`Steps::write`].

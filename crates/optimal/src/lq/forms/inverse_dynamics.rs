@@ -24,12 +24,12 @@
 //! U_w K_w and k = U_w k_w equal the explicit form's results, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
-use super::super::gains::Gains;
-use super::super::inverse_dynamics_form::InverseDynamicsForm;
-use super::super::node::{LqKnot, LqNode};
+use super::super::feedback::{Gains, KnotFeedback};
+use super::super::knot::LqKnot;
+use super::super::structure::InverseDynamicsForm;
 use super::super::workspace::Workspace;
 use super::euler::Steps;
-use super::{Controls, Curvature, Form};
+use super::{Curvature, KnotForm};
 use condyle_linalg::{
     OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_narrow_level, copy_block, copy_matrix, copy_scaled,
     eliminate, mask,
@@ -37,7 +37,7 @@ use condyle_linalg::{
 
 /// Inverse-dynamics form, with its scratch.
 #[derive(Debug, Clone)]
-pub(crate) struct InverseDynamics {
+pub(super) struct InverseDynamics {
     steps: Steps,
     /// Outer products, with rows over (w, δv, δq).
     products: OuterProducts,
@@ -49,9 +49,9 @@ pub(crate) struct InverseDynamics {
 }
 
 impl InverseDynamics {
-    /// Returns the maximum requirements of some nodes: numbers in rows, products, dependent coordinates.
-    pub(crate) fn room(nodes: &[LqNode]) -> [usize; 3] {
-        let rooms = nodes.iter().map(|LqNode { inverse_dynamics: form, .. }| {
+    /// Returns the maximum requirements of some knots: numbers in rows, products, dependent coordinates.
+    pub(super) fn room(knots: &[LqKnot]) -> [usize; 3] {
+        let rooms = knots.iter().map(|LqKnot { inverse_dynamics: form, .. }| {
             let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
             [2 * (efforts + steps + costs) * form.stride, efforts + 2 * steps + costs, steps]
         });
@@ -71,19 +71,19 @@ impl InverseDynamics {
     }
 }
 
-impl Form for InverseDynamics {
+impl KnotForm for InverseDynamics {
     fn turn(&self, n: usize) -> usize {
         n / 2
     }
 
     /// Writes H in the order (w, δv, δq).
-    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
-        let (n, m, count) = (node.ndx(), node.nu(), node.inverse_dynamics.dependent.len());
-        let (ld, all, size) = (work.stride(m), m + n, node.inverse_dynamics.stride);
-        self.steps.write(work, node);
+    fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, _: &mut Curvature<'_>) {
+        let (n, m, count) = (knot.ndx(), knot.nu(), knot.inverse_dynamics.dependent.len());
+        let (ld, all, size) = (work.stride(m), m + n, knot.inverse_dynamics.stride);
+        self.steps.write(work, knot);
         self.half.resize((count + SLACK) * count, 0.0);
         let Self { steps, products, half, .. } = self;
-        at_narrow_level(WriteRows { steps, products, half, node, regularisation, H: &mut work.H, ld });
+        at_narrow_level(WriteRows { steps, products, half, knot, regularisation, H: &mut work.H, ld });
 
         // The last rows are D and (Π y + N δq)_d; the latter becomes Z.
         let Z = products.count() - count;
@@ -93,7 +93,7 @@ impl Form for InverseDynamics {
             add_product(Z, size, [all, count, count], View::new(D, size), View::new(half, count + SLACK));
         }
         // DᵀZ + ZᵀD
-        let masks = &node.inverse_dynamics.steps.masks;
+        let masks = &knot.inverse_dynamics.steps.masks;
         for (k, &mask) in masks.iter().enumerate() {
             products.multiply([Z + k, D + k], [u64::MAX, mask]);
         }
@@ -101,15 +101,15 @@ impl Form for InverseDynamics {
             products.multiply([D + k, Z + k], [mask, u64::MAX]);
         }
         products.add_to(&mut work.H, ld);
-        steps.add_positions(work, node);
+        steps.add_positions(work, knot);
     }
 
     /// Computes Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v.
-    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
+    fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m, InverseDynamicsForm { own, dependent, steps: D, stride, .. }) =
-            (node.ndx(), node.nu(), &node.inverse_dynamics);
+            (knot.ndx(), knot.nu(), &knot.inverse_dynamics);
         let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
-        self.steps.write_velocities_below(work, node, Theta);
+        self.steps.write_velocities_below(work, knot, Theta);
         let (Self { steps, below, .. }, Workspace { W: Psi, H, .. }) = (self, &mut *work);
         for k in (0..m).chain(m + nv..m + n) {
             H[k * ld + at..][..n].fill(0.0);
@@ -127,28 +127,22 @@ impl Form for InverseDynamics {
             let (below, D) = (View::new(below, ldt), View::new(&D.numbers, *stride));
             add_product(&mut H[at..], ld, [n, m + n, count], below, D);
         }
-        steps.add_positions_below(work, node, Theta);
+        steps.add_positions_below(work, knot, Theta);
     }
 
-    fn eliminate(
-        &self,
-        work: &mut Workspace,
-        _: &mut Controls,
-        node: &LqNode,
-        _: &mut LqKnot,
-    ) -> Result<usize, (usize, f64)> {
-        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+    fn eliminate(&mut self, work: &mut Workspace, knot: &LqKnot, _: &mut KnotFeedback) -> Result<usize, (usize, f64)> {
+        let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         eliminate(&mut work.H, ld, [m + n + 1, m + n, m])?;
         Ok(m)
     }
 
-    fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        self.gains.write(View::new(&work.H, work.stride(node.nu())), node, knot);
-    }
-
-    fn put_off_gains(&self, work: &Workspace, node: &LqNode, knot: &mut LqKnot) -> bool {
-        Gains::put_off(View::new(&work.H, work.stride(node.nu())), node, knot);
-        true
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, defers: bool) {
+        let left = View::new(&work.H, work.stride(knot.nu()));
+        if defers && knot.nu() > 0 {
+            Gains::defer(left, knot, feedback);
+        } else {
+            self.gains.write(left, knot, feedback);
+        }
     }
 }
 
@@ -158,7 +152,7 @@ struct WriteRows<'a> {
     steps: &'a Steps,
     products: &'a mut OuterProducts,
     half: &'a mut [f64],
-    node: &'a LqNode,
+    knot: &'a LqKnot,
     regularisation: f64,
     H: &'a mut [f64],
     ld: usize,
@@ -167,9 +161,9 @@ struct WriteRows<'a> {
 impl Vectorized for WriteRows<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { steps, products, half, node, regularisation, H, ld } = self;
+        let Self { steps, products, half, knot, regularisation, H, ld } = self;
         let ((N, Pi), py) = (steps.N_and_Pi(), steps.py.as_slice());
-        let (n, m, imp) = (node.ndx(), node.nu(), &node.inverse_dynamics);
+        let (n, m, imp) = (knot.ndx(), knot.nu(), &knot.inverse_dynamics);
         let (nv, all, size) = (n / 2, m + n, imp.stride);
         let ldn = nv + SLACK;
 
@@ -193,11 +187,11 @@ impl Vectorized for WriteRows<'_> {
         for k in forces..m {
             H[k * ld + k..][..=all - k].fill(0.0);
         }
-        let Q = View::new(node.Q.as_slice(), n);
+        let Q = View::new(knot.Q.as_slice(), n);
         copy_block::<V>(&mut H[m * ld + m..], ld, View::new(Pi, ldn), [nv, nv]);
         copy_block::<V>(&mut H[m * ld + m + nv..], ld, View::new(N, ldn), [nv, nv]);
         copy_block::<V>(&mut H[(m + nv) * (ld + 1)..], ld, Q, [nv, nv]);
-        let (q, diagonal) = (node.q.as_slice(), &imp.diagonal[..nv]);
+        let (q, diagonal) = (knot.q.as_slice(), &imp.diagonal[..nv]);
         for j in 0..nv {
             let column = &mut H[(m + j) * ld..][..=all];
             column[m + j] += diagonal[j];
@@ -208,7 +202,7 @@ impl Vectorized for WriteRows<'_> {
         // Uᵀ (R + ϱ 1) U and Gᵀ a″ G
         products.clear(all, size);
         for (k, row) in imp.efforts.numbers.chunks_exact(size).enumerate() {
-            products.square::<V>(row, mask(row), [node.r[k], imp.diagonal[nv + k] + regularisation]);
+            products.square::<V>(row, mask(row), [knot.r[k], imp.diagonal[nv + k] + regularisation]);
         }
         for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
             products.square::<V>(row, mask, slopes);

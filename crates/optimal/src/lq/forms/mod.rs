@@ -2,7 +2,7 @@
 //!
 //! Each knot is a quadratic form H in some unknowns and in the change of its state; the unknowns are eliminated. The
 //! forms differ in how A and B enter H, whether the unknowns are the controls, and the order of the states. Only
-//! [`Forms::of`] selects the form of a node.
+//! [`Forms::of`] selects the form of a knot.
 #![allow(non_snake_case)] // the names of the literature
 
 mod controls;
@@ -11,54 +11,71 @@ mod driven;
 mod euler;
 mod inverse_dynamics;
 
-use super::node::{Hessian, LqKnot, LqNode};
+use super::feedback::KnotFeedback;
+use super::knot::{Hessian, LqKnot};
 use super::workspace::Workspace;
-pub(super) use controls::Controls;
 use dense::Dense;
-pub(super) use driven::Driven;
+use driven::Driven;
 use euler::Euler;
-pub(super) use inverse_dynamics::InverseDynamics;
+use inverse_dynamics::InverseDynamics;
 
 /// Smallest ndx for which the form of Euler steps is faster than the dense form, as measured by `benches/riccati.rs`.
 const EULER_FROM: usize = 16;
 
 /// Form of a knot. The matrices that it reads and writes belong to the [`Workspace`].
-pub(super) trait Form {
+pub(super) trait KnotForm {
     /// Returns the rotation of the n states in H: state i of H is state (i + turn) mod n of x.
     fn turn(&self, n: usize) -> usize;
 
-    /// Writes H, including ϱ, from the node, from P, and from p at the predicted state.
-    fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>);
+    /// Writes H, including ϱ, from the knot, from P, and from p at the predicted state.
+    fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>);
 
     /// After `write`: writes the product of Θ and the map from the unknowns and δx to δx⁺ below H. Θ has n rows (stride
     /// n + SLACK).
-    fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]);
+    fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]);
 
-    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns. By
-    /// default, they are the controls that are not at a bound.
+    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns.
     ///
     /// # Errors
     /// The row and its pivot, if the pivot is not positive.
     fn eliminate(
-        &self,
+        &mut self,
         work: &mut Workspace,
-        controls: &mut Controls,
-        node: &LqNode,
-        knot: &mut LqKnot,
-    ) -> Result<usize, (usize, f64)> {
-        controls.eliminate(work, node, knot)
+        knot: &LqKnot,
+        feedback: &mut KnotFeedback,
+    ) -> Result<usize, (usize, f64)>;
+
+    /// Writes the gains of the knot, from the result of `eliminate` in H. If `defers`, a form may instead store the
+    /// factors from which [`Gains::finish`](super::feedback::Gains::finish) computes them.
+    fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, defers: bool);
+}
+
+/// Sizes for which the workspace of a sweep is allocated.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    /// Number of states.
+    pub(super) n: usize,
+    /// Largest number of controls.
+    pub(super) m: usize,
+    /// Requirements as returned by [`InverseDynamics::room`].
+    room: [usize; 3],
+}
+
+impl Sizes {
+    /// Returns the sizes for some knots.
+    pub(super) fn of(knots: &[LqKnot]) -> Self {
+        let (n, m) = (knots.last().map_or(0, LqKnot::ndx), knots.iter().map(LqKnot::nu).max().unwrap_or(0));
+        Self { n, m, room: InverseDynamics::room(knots) }
     }
 
-    /// Writes the gains of the knot, from the result of `eliminate` in H.
-    fn recover_gains(&mut self, work: &mut Workspace, controls: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        let turn = self.turn(node.ndx());
-        controls.recover_gains(work, node, knot, turn);
+    /// Returns the maximum number of controls of knots whose gains may be deferred: 0 without such knots.
+    pub(super) fn deferred_controls(self) -> usize {
+        if self.room[0] > 0 { self.m } else { 0 }
     }
 
-    /// Stores in the knot the data from which [`Gains::finish`](super::gains::Gains::finish) computes its gains;
-    /// returns whether it did so.
-    fn put_off_gains(&self, _: &Workspace, _: &LqNode, _: &mut LqKnot) -> bool {
-        false
+    /// Returns the number of rows that the forms need below H.
+    pub(super) fn rows_below(self) -> usize {
+        Driven::rows_below(self.n, self.m)
     }
 }
 
@@ -72,26 +89,30 @@ pub(super) struct Forms {
 }
 
 impl Forms {
-    /// Allocates the forms for n states, and for inverse dynamics with at most m controls and the requirements `room`
-    /// of [`InverseDynamics::room`].
-    pub(super) fn new(n: usize, m: usize, room: [usize; 3]) -> Self {
-        let (euler, inverse_dynamics) = (Euler::new(n), InverseDynamics::new(room, n, m));
-        Self { dense: Dense, euler, inverse_dynamics, driven: Driven::new(n) }
-    }
-
-    /// Returns the form for a step at a node.
-    pub(super) fn of_step(&mut self, node: &LqNode, regularisation: f64) -> &mut dyn Form {
-        match node.inverse_dynamics.active && Driven::takes(node, regularisation) {
-            true => &mut self.driven,
-            false => self.of(node),
+    /// Allocates the forms.
+    pub(super) fn new(sizes: Sizes) -> Self {
+        let Sizes { n, m, room } = sizes;
+        Self {
+            dense: Dense::new(m),
+            euler: Euler::new(n, m),
+            inverse_dynamics: InverseDynamics::new(room, n, sizes.deferred_controls()),
+            driven: Driven::new(n),
         }
     }
 
-    /// Returns the form of a node, among the forms that support rows below H.
-    pub(super) fn of(&mut self, node: &LqNode) -> &mut dyn Form {
-        if node.inverse_dynamics.active {
+    /// Returns the form for a step at a knot.
+    pub(super) fn of_step(&mut self, knot: &LqKnot, regularisation: f64) -> &mut dyn KnotForm {
+        match knot.structure.is_inverse_dynamics() && Driven::takes(knot, regularisation) {
+            true => &mut self.driven,
+            false => self.of(knot),
+        }
+    }
+
+    /// Returns the form of a knot, among the forms that support rows below H.
+    pub(super) fn of(&mut self, knot: &LqKnot) -> &mut dyn KnotForm {
+        if knot.structure.is_inverse_dynamics() {
             &mut self.inverse_dynamics
-        } else if node.structure.euler().is_some() && node.ndx() >= EULER_FROM {
+        } else if knot.structure.euler().is_some() && knot.ndx() >= EULER_FROM {
             &mut self.euler
         } else {
             &mut self.dense
@@ -99,20 +120,24 @@ impl Forms {
     }
 }
 
+/// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it did so.
+pub(super) type CurvatureFn<'a> = dyn FnMut(usize, &[f64], &mut Hessian) -> bool + 'a;
+
 /// Request for the curvature of a knot's dynamics; see [`Sweep::run_with`](crate::Sweep::run_with).
 pub(super) struct Curvature<'a> {
     /// Index of the knot.
     pub(super) knot: usize,
-    /// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it did so.
-    pub(super) ask: &'a mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
-    /// Storage for these derivatives, one entry for each number of controls.
+    /// Function that computes the curvature; `None` if the dynamics count as linear.
+    pub(super) ask: Option<&'a mut CurvatureFn<'a>>,
+    /// Storage for the curvature, one entry for each number of controls.
     pub(super) hessians: &'a mut [Hessian],
 }
 
 impl Curvature<'_> {
     /// Returns the second derivatives of λᵀφ at a knot with nu controls; `None` if the dynamics count as linear.
     fn at(&mut self, lambda: &[f64], nu: usize) -> Option<&Hessian> {
+        let ask = self.ask.as_mut()?;
         let hessian = self.hessians.iter_mut().find(|hessian| hessian.uu.nrows() == nu)?;
-        (self.ask)(self.knot, lambda, hessian).then_some(&*hessian)
+        ask(self.knot, lambda, hessian).then_some(&*hessian)
     }
 }

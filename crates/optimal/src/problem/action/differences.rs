@@ -1,7 +1,7 @@
 //! Derivatives of an action by central differences.
 
 use super::ActionModel;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use nalgebra::DMatrix;
 
 /// Step of first differences, about ε^⅓, which balances truncation h² and rounding ε/h.
@@ -27,7 +27,7 @@ pub(crate) fn at<A: ActionModel + ?Sized>(
 }
 
 /// Computes [`calc_diff`](ActionModel::calc_diff) by differences of [`calc`](ActionModel::calc).
-pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
     let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
     // A terminal action does not write `next`: start from x, which is a valid state on any manifold.
     let (mut centre, mut plus, mut minus) = (x.to_vec(), x.to_vec(), x.to_vec());
@@ -47,10 +47,10 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
         action.difference(&centre, &minus, &mut down);
         for i in 0..ndx {
             let slope = (up[i] - down[i]) / (2.0 * FIRST);
-            if j < ndx { node.A[(i, j)] = slope } else { node.B[(i, j - ndx)] = slope }
+            if j < ndx { knot.A[(i, j)] = slope } else { knot.B[(i, j - ndx)] = slope }
         }
         let slope = (above - below) / (2.0 * FIRST);
-        if j < ndx { node.q[j] = slope } else { node.r[j - ndx] = slope }
+        if j < ndx { knot.q[j] = slope } else { knot.r[j - ndx] = slope }
     }
 
     for i in 0..ndx + nu {
@@ -65,7 +65,7 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
                 z[j] = 0.0;
             }
             let curvature = sum / (4.0 * SECOND * SECOND);
-            write_curvature([&mut node.Q, &mut node.S, &mut node.R], ndx, (i, j), curvature);
+            write_curvature([&mut knot.Q, &mut knot.S, &mut knot.R], ndx, (i, j), curvature);
         }
     }
 }

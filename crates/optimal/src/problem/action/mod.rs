@@ -1,23 +1,17 @@
-//! Dynamics and cost of one knot, evaluated for many knots at a time.
+//! Dynamics and cost of one knot.
 
 pub(crate) mod differences;
-pub(crate) mod hold;
+pub(crate) mod quasi_static;
 
-use super::multipliers::Visit;
-use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
+use super::group::{GroupModel, KnotGroup};
+use crate::lq::{Hessian, LqKnot};
 use std::any::Any;
 
 /// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of the knots t that the action serves.
 ///
-/// Only the sizes and [`calc`](Self::calc) must be written; derivatives by hand are faster than the default ones. The
-/// solver calls the methods for a **group**: consecutive knots of the horizon, or the trials of a line search at one
-/// knot. The default group methods loop over the states. An implementation that computes several states at a time in
-/// the lanes of a vector register overrides them, and returns its preferred number of states from
-/// [`lanes`](Self::lanes).
-///
-/// Each knot of a group is given by its index t in the horizon. One model can therefore serve all knots that differ
-/// only in a reference (a foot's path, a tracked posture), and these knots form one group.
+/// Only the sizes and [`calc`](Self::calc) must be written; derivatives by hand are faster than the default ones. Each
+/// knot is given by its index t in the horizon. One model can therefore serve all knots that differ only in a reference
+/// (a foot's path, a tracked posture). An action that computes several knots in one call is a [`GroupModel`] as well.
 ///
 /// # The terminal knot
 /// A terminal action has nu = 0 and only a cost. It is called like any other, but its outputs `next` and `A` are never
@@ -32,7 +26,7 @@ use std::any::Any;
 /// # Examples
 /// The double integrator x⁺ = x + Δt (v, u) with the cost ½ Δt (‖x‖² + u²):
 /// ```
-/// use condyle_optimal::{ActionModel, LqNode};
+/// use condyle_optimal::{ActionModel, LqKnot};
 ///
 /// struct DoubleIntegrator { dt: f64 }
 ///
@@ -44,21 +38,20 @@ use std::any::Any;
 ///         next[1] = x[1] + self.dt * u[0];
 ///         0.5 * self.dt * (x[0] * x[0] + x[1] * x[1] + u[0] * u[0])
 ///     }
-///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-///         node.A.copy_from_slice(&[1.0, 0.0, self.dt, 1.0]); // column after column
-///         node.B.copy_from_slice(&[0.0, self.dt]);
-///         node.Q.copy_from_slice(&[self.dt, 0.0, 0.0, self.dt]);
-///         node.S.fill(0.0);
-///         node.R[0] = self.dt;
-///         node.q.copy_from_slice(&[self.dt * x[0], self.dt * x[1]]);
-///         node.r[0] = self.dt * u[0];
+///     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+///         knot.A.copy_from_slice(&[1.0, 0.0, self.dt, 1.0]); // column after column
+///         knot.B.copy_from_slice(&[0.0, self.dt]);
+///         knot.Q.copy_from_slice(&[self.dt, 0.0, 0.0, self.dt]);
+///         knot.S.fill(0.0);
+///         knot.R[0] = self.dt;
+///         knot.q.copy_from_slice(&[self.dt * x[0], self.dt * x[1]]);
+///         knot.r[0] = self.dt * u[0];
 ///     }
 /// }
 ///
-/// let mut action = DoubleIntegrator { dt: 0.5 };
-/// let (mut next, mut costs) = ([0.0; 4], [0.0; 2]);
-/// action.calc_group(&[0, 1], &[1.0, 2.0, 3.0, 4.0], &[0.0, 1.0], &mut next, &mut costs);
-/// assert_eq!(next, [2.0, 2.0, 5.0, 4.5]);
+/// let mut next = [0.0; 2];
+/// DoubleIntegrator { dt: 0.5 }.calc(0, &[3.0, 4.0], &[1.0], &mut next);
+/// assert_eq!(next, [5.0, 4.5]);
 /// ```
 pub trait ActionModel: Any + Send + Sync {
     /// Returns the number of entries of a state x.
@@ -75,22 +68,8 @@ pub trait ActionModel: Any + Send + Sync {
 
     /// Returns whether the action has no next state, so that it may only serve the end of a horizon. By default false:
     /// an action may serve both.
-    fn is_end(&self) -> bool {
+    fn is_terminal(&self) -> bool {
         false
-    }
-
-    /// Returns the number of states that a group call computes at the cost of one; 1 unless it uses vector lanes.
-    ///
-    /// A line search tries this number of step lengths side by side.
-    fn lanes(&self) -> usize {
-        1
-    }
-
-    /// Returns the maximum numbers of dependent coordinates and of rows of costs, if the action can write its knots as
-    /// equations of inverse dynamics.
-    #[doc(hidden)]
-    fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        None
     }
 
     /// Returns the smallest and largest allowed controls of knot t, nu numbers each, infinite for an unbounded control;
@@ -107,38 +86,6 @@ pub trait ActionModel: Any + Send + Sync {
         None
     }
 
-    /// Passes the constraints of knot t that contribute augmented Lagrangian terms to its cost to `visit`, in their
-    /// order.
-    #[doc(hidden)]
-    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
-        let _ = (t, visit);
-    }
-
-    /// Allocates the action's workspace, unless it exists. A problem calls this when it is created.
-    #[doc(hidden)]
-    fn reserve(&mut self) {}
-
-    /// Takes over the knots of another action that differs only in costs, references and weights, and returns whether
-    /// it did so. This action then represents the models of both, its own first, and the other one becomes unused. Thus
-    /// the knots of a problem that has one action per knot are computed in groups.
-    #[doc(hidden)]
-    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
-        let _ = other;
-        false
-    }
-
-    /// Selects, among the models that this action represents, the one that is to be changed.
-    #[doc(hidden)]
-    fn choose(&mut self, model: usize) {
-        let _ = model;
-    }
-
-    /// Assigns knot t, of `horizon` knots, to one of the models that this action represents.
-    #[doc(hidden)]
-    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
-        let _ = (t, horizon, model);
-    }
-
     /// Computes x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64;
 
@@ -149,8 +96,8 @@ pub trait ActionModel: Any + Send + Sync {
     /// The default takes central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff) does: slow,
     /// allocating, and accurate to about 1e-9 (the Hessian to 1e-7). [`AutoDiff`](crate::AutoDiff) computes exact
     /// derivatives of functions that are written for any scalar.
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        differences::calc_diff(self, t, x, u, node);
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+        differences::calc_diff(self, t, x, u, knot);
     }
 
     /// Computes the second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for
@@ -161,75 +108,28 @@ pub trait ActionModel: Any + Send + Sync {
         false
     }
 
-    /// Computes [`calc`](Self::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control of
-    /// `us`. States and controls are stored one after the other, and so are the states written to `next`.
-    ///
-    /// # Panics
-    /// If the lengths differ from knots.len() times nx, nu, nx and 1.
-    #[track_caller]
-    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        let (nx, nu) = (self.nx(), self.nu());
-        assert_length("xs", xs.len(), knots.len() * nx);
-        assert_length("us", us.len(), knots.len() * nu);
-        assert_length("next", next.len(), knots.len() * nx);
-        assert_length("costs", costs.len(), knots.len());
-        for (i, &t) in knots.iter().enumerate() {
-            let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
-            costs[i] = self.calc(t, x, u, &mut next[i * nx..][..nx]);
-        }
+    /// Returns this action as a [`GroupModel`], if it is one; `None` by default.
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        None
     }
 
-    /// Returns the number of accelerations and forces from which the inverse-dynamics form of a knot starts; zero
-    /// without that form.
+    /// Returns the group of knots of this crate that the action is.
     #[doc(hidden)]
-    fn motion_size(&self) -> usize {
-        0
+    fn knot_group(&self) -> Option<&dyn KnotGroup> {
+        None
     }
 
-    /// Computes as [`calc_group`](Self::calc_group) does, and writes the accelerations and forces of each knot to the
-    /// beginning of its part of `motions`. `motions` has as many equal parts as there are knots.
+    /// Returns the same group as [`knot_group`](Self::knot_group), for computing.
     #[doc(hidden)]
-    #[track_caller]
-    fn calc_group_with_motion(
-        &mut self,
-        knots: &[usize],
-        xs: &[f64],
-        us: &[f64],
-        next: &mut [f64],
-        costs: &mut [f64],
-        motions: &mut [f64],
-    ) {
-        let _ = motions;
-        self.calc_group(knots, xs, us, next, costs);
-    }
-
-    /// Computes [`calc_diff`](Self::calc_diff) for a group.
-    ///
-    /// # Panics
-    /// If the lengths differ from knots.len() times nx, nu and 1.
-    #[track_caller]
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        let (nx, nu) = (self.nx(), self.nu());
-        assert_length("xs", xs.len(), knots.len() * nx);
-        assert_length("us", us.len(), knots.len() * nu);
-        assert_length("nodes", nodes.len(), knots.len());
-        for (i, &t) in knots.iter().enumerate() {
-            self.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut nodes[i]);
-        }
-    }
-
-    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute besides the next state; none
-    /// by default. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of
-    /// each contact. A contact's force is expressed in the axes of its rows; at an impact it is an impulse.
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        let _ = (t, x, u, show);
+    fn knot_group_mut(&mut self) -> Option<&mut dyn KnotGroup> {
+        None
     }
 
     /// Returns the controls that hold the state x of knot t still, if the state can stand still: φ(x, u) = x, as nearly
     /// as controls can reach. By default at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as in Crocoddyl; a robot's
     /// controls follow from statics. Allocates.
-    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
-        hold::newton(self, t, x)
+    fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        quasi_static::newton(self, t, x)
     }
 
     /// Notifies the action that the horizon has [moved](crate::Problem::shift) by one knot: data of knot t now belong
@@ -239,7 +139,7 @@ pub trait ActionModel: Any + Send + Sync {
     /// Returns a copy that computes the same, for another thread or another problem; `None` by default. An action
     /// without a copy is differentiated on one thread, whatever the setting [`threads`](crate::Settings::threads). A
     /// problem with such an action cannot be copied ([`Problem::try_clone`](crate::Problem::try_clone)).
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         None
     }
 

@@ -9,13 +9,14 @@ use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
     LimbElimination, invert_blocks, restore, solve_blocks, write_drift, write_jacobian, write_motion,
 };
+use crate::problem::Evaluation;
 use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, SHARED, constraint_set};
-use crate::robot::continuous::Wanted;
-use crate::robot::horizon_terms::HorizonTerms;
-use crate::robot::knot::{KnotData, WIDEST, unpack};
+use crate::robot::continuous::KnotInput;
+use crate::robot::horizon::HorizonTerms;
+use crate::robot::knot_data::{KnotData, WIDEST, unpack};
+use crate::robot::residuals::gravity_residual::GravityResidual;
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
-use crate::robot::residuals::surplus::Surplus;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
     constrained_equations_at, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
@@ -26,43 +27,71 @@ use condyle_spatial::{Matrix, matrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// The law from which accelerations follow.
+/// Law from which accelerations follow.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Law {
+pub(crate) enum DynamicsKind {
     /// Nowhere: time stands still, or the state jumps.
     None,
     /// q̈ = M⁻¹ (τ − h).
     Free,
     /// M q̈ + h = τ + Jᵀλ, J q̈ + γ = 0, with the damping μ.
     Contact(Vec<Contact>, f64),
-    /// The controls: q̈ = u, and τ = M q̈ + h follows.
+    /// v⁺ − v = −M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v.
+    Impact {
+        contacts: Vec<Contact>,
+        /// ε.
+        restitution: f64,
+        /// μ.
+        damping: f64,
+    },
+    /// Controls: q̈ = u, and τ = M q̈ + h follows.
     Inverse,
-    /// The controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
+    /// Controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
     ContactInverse(Vec<Contact>, Actuation),
 }
 
-/// A law with the scratch that it takes.
+/// States of some knots, and the quantities that are computed there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Group<'a> {
+    /// Indices of the knots.
+    pub knots: &'a [usize],
+    /// States and controls, one after the other.
+    pub xs: &'a [f64],
+    pub us: &'a [f64],
+    pub what: Evaluation<'a>,
+    /// Whether limits count: not at later stages of a step.
+    pub limited: bool,
+}
+
+impl<'a> Group<'a> {
+    /// Returns the group of one knot.
+    pub(crate) fn one(input: &'a KnotInput<'a>, what: Evaluation<'a>, limited: bool) -> Self {
+        Self { knots: core::slice::from_ref(&input.t), xs: input.x, us: input.u, what, limited }
+    }
+}
+
+/// Law with the scratch that it takes.
 #[derive(Debug)]
 pub(crate) enum Pass<S> {
     None,
     Free,
-    /// The constraints, and J. Shape: rows × nv.
+    /// Constraints, and J. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, Matrix<S>),
     Inverse,
     /// As [`Self::Contact`].
     ContactInverse(Box<ConstraintSet<S>>, Matrix<S>),
 }
 
-/// The dynamics of as many knots as a scalar has lanes.
+/// Dynamics of as many knots as a scalar has lanes.
 #[derive(Debug)]
 pub(crate) struct KnotBatch<S> {
     pub data: Data<S>,
     pub pass: Pass<S>,
-    surplus: Surplus<S>,
+    gravity_residual: GravityResidual<S>,
     residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
-    /// The output that the controls drive: τ, or q̈.
+    /// Output that the controls drive: τ, or q̈.
     tau: Vec<S>,
     a: Vec<S>,
     lambda: Vec<S>,
@@ -74,54 +103,46 @@ pub(crate) struct KnotBatch<S> {
 impl<S: Block<Number = f64>> KnotBatch<S> {
     /// Scratch for a robot whose accelerations obey a law that was checked.
     #[inline(never)]
-    pub(crate) fn new(model: &Model, law: &Law) -> Self {
+    pub(crate) fn new(model: &Model, kind: &DynamicsKind) -> Self {
         let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
-        let pass = match law {
-            Law::None => Pass::None,
-            Law::Free => Pass::Free,
-            Law::Contact(contacts, damping) => {
+        let pass = match kind {
+            DynamicsKind::None | DynamicsKind::Impact { .. } => Pass::None,
+            DynamicsKind::Free => Pass::Free,
+            DynamicsKind::Contact(contacts, damping) => {
                 let set = Box::new(constraint_set(model, contacts, *damping).expect("was checked when it was given"));
                 let J = matrix(set.rows(), nv, S::zero());
                 Pass::Contact(set, J)
             }
-            Law::Inverse => Pass::Inverse,
-            Law::ContactInverse(contacts, _) => {
+            DynamicsKind::Inverse => Pass::Inverse,
+            DynamicsKind::ContactInverse(contacts, _) => {
                 let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
                 let J = matrix(set.rows(), nv, S::zero());
                 Pass::ContactInverse(set, J)
             }
         };
-        let (data, surplus, residuals) = (Data::new(model), Surplus::new(nv), ResidualKernel::new(nv));
+        let (data, gravity_residual, residuals) = (Data::new(model), GravityResidual::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
         let lambda = zeros(rows);
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Vec::new());
-        Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
+        Self { data, pass, gravity_residual, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
-    pub(crate) fn reserve(&mut self, tableau: Tableau, stages: Vec<Arc<LimbElimination>>) {
-        self.linear = LinearEquations::new(tableau, stages);
+    pub(crate) fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
+        self.linear = LinearEquations::new(tableau, eliminations);
     }
 
-    /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
-    /// the residuals see of those that look at the same as the first one.
-    pub(crate) fn run(
-        &mut self,
-        model: &Model,
-        knots: &[usize],
-        xs: &[f64],
-        terms: &HorizonTerms,
-        wanted: Wanted,
-        to: &mut [KnotData],
-    ) {
-        self.pack(model, xs, to);
+    /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and
+    /// what the residuals see of those that read the same as the first one.
+    pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: &HorizonTerms, to: &mut [KnotData]) {
+        self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
-        match wanted {
-            Wanted::Equations => self.run_equations(model, to),
-            _ => self.run_pass(model, wanted == Wanted::Derivatives, terms.layout().forces, to),
+        match group.what {
+            Evaluation::Equations(_) => self.run_equations(model, to),
+            what => self.run_pass(model, what == Evaluation::Derivatives, terms.layout().forces, to),
         }
-        self.run_residuals(model, knots, terms, wanted != Wanted::Motion, to);
+        self.run_residuals(model, group, terms, to);
     }
 
     /// Sets the states of some knots.
@@ -132,7 +153,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = false;
     }
 
-    /// Accelerations and forces, and their derivatives; those of forces only if they are looked at.
+    /// Computes accelerations and forces, and their derivatives; derivatives of forces only if a residual needs them.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
         let Self { data, pass, q, v, tau, a, lambda, .. } = self;
         match pass {
@@ -190,13 +211,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// The equations of some knots at their states, for the accelerations and forces that the data of each holds.
+    /// Computes the equations of some knots at their states, for the accelerations and forces that the data of each
+    /// holds.
     pub(crate) fn run_equations_at(&mut self, model: &Model, xs: &[f64], to: &mut [KnotData]) {
         self.pack(model, xs, to);
         self.run_equations(model, to);
     }
 
-    /// The equations that accelerations and forces satisfy, which are known, with the limbs and the base solved.
+    /// Computes the equations that accelerations and forces satisfy, which are known, with the limbs and the base
+    /// solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
         let Self { data, pass, q, v, a, lambda, linear, .. } = self;
         pack(to.len(), |k| &to[k].a, a);
@@ -224,42 +247,40 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     pub(crate) fn run_residuals_at(
         &mut self,
         model: &Model,
-        t: usize,
-        x: &[f64],
+        group: Group<'_>,
         terms: &HorizonTerms,
-        slopes: bool,
         to: &mut KnotData,
     ) {
         let to = core::slice::from_mut(to);
-        self.pack(model, x, to);
+        self.pack(model, group.xs, to);
         pack(1, |_| &to[0].a, &mut self.a);
-        self.run_residuals(model, &[t], terms, slopes, to);
+        self.run_residuals(model, group, terms, to);
     }
 
-    /// Computes what the residuals see of those knots that look at the same as the first one.
+    /// Computes what the residuals see of those knots that read the same as the first one.
     fn run_residuals(
         &mut self,
         model: &Model,
-        knots: &[usize],
+        Group { knots, what, limited, .. }: Group<'_>,
         terms: &HorizonTerms,
-        slopes: bool,
         to: &mut [KnotData],
     ) {
-        let first = terms.at(knots[0]);
+        let first = terms.at(knots[0], limited);
         let mut each = [first; WIDEST];
         for (k, to) in to.iter_mut().enumerate() {
             to.residuals.reserve(model.nv(), terms.layouts());
-            let own = terms.at(knots[k]);
+            let own = terms.at(knots[k], limited);
             to.residuals.is_written = own.is_alike(first);
             if to.residuals.is_written {
                 each[k] = own;
             }
         }
-        let Self { data, surplus, residuals, q, v, a, visited, .. } = self;
+        let Self { data, gravity_residual, residuals, q, v, a, visited, .. } = self;
         let requirements = first.layout().requirements;
-        let mut group = KnotGroup { terms: &each[..to.len()], data: to, slopes, visited: *visited };
+        let mut group =
+            KnotGroup { terms: &each[..to.len()], data: to, slopes: what != Evaluation::Values, visited: *visited };
         if requirements.gravity {
-            surplus.run(model, data, [q, v, a], requirements.inertia, &mut group);
+            gravity_residual.run(model, data, [q, v, a], requirements.inertia, &mut group);
             group.visited = true;
         }
         if requirements.placements || requirements.velocities {
@@ -268,44 +289,46 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 }
 
-/// The linear equations of some knots, side by side.
+/// Linear equations of some knots, side by side.
 #[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
-    /// What is solved, one after the other: the limbs, and the base.
-    stages: Vec<Arc<LimbElimination>>,
+    /// Eliminations in their order: of the limbs, and of the base.
+    eliminations: Vec<Arc<LimbElimination>>,
     tableau: Vec<S>,
-    /// The tableau before a stage.
+    /// Tableau before an elimination.
     before: Vec<S>,
-    /// B⁻¹ of each block of a stage, and Y of one.
+    /// B⁻¹ of each block of an elimination, and Y of one.
     inverses: Vec<S>,
     Y: Vec<S>,
 }
 
 impl<S: Block<Number = f64>> LinearEquations<S> {
-    fn new(size: Tableau, stages: Vec<Arc<LimbElimination>>) -> Self {
-        let most = |room: fn(&LimbElimination) -> usize| stages.iter().map(|stage| room(stage)).max().unwrap_or(0);
+    fn new(size: Tableau, eliminations: Vec<Arc<LimbElimination>>) -> Self {
+        let most = |room: fn(&LimbElimination) -> usize| {
+            eliminations.iter().map(|elimination| room(elimination)).max().unwrap_or(0)
+        };
         let zeros = |n| vec![S::zero(); n];
         let (inverses, Y) = (zeros(most(LimbElimination::room)), zeros(most(LimbElimination::columns)));
-        Self { size, stages, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
+        Self { size, eliminations, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
     }
 
     /// Solves the limbs and the base of the knots where that can be, and writes the equations to the data of each.
     fn solve(&mut self, to: &mut [KnotData]) {
-        let Self { size, stages, tableau, before, inverses, Y } = self;
+        let Self { size, eliminations, tableau, before, inverses, Y } = self;
         let mut singular = S::zero();
-        to.iter_mut().for_each(|to| to.stages = 0);
-        for stage in stages {
+        to.iter_mut().for_each(|to| to.eliminations = 0);
+        for elimination in eliminations {
             let mut each = [0.0; WIDEST];
-            invert_blocks(stage, *size, tableau, inverses, &mut singular);
+            invert_blocks(elimination, *size, tableau, inverses, &mut singular);
             scatter(core::slice::from_ref(&singular), to.len(), &mut each);
             let each = &each[..to.len()];
-            to.iter_mut().zip(each).for_each(|(to, singular)| to.stages += usize::from(*singular == 0.0));
+            to.iter_mut().zip(each).for_each(|(to, singular)| to.eliminations += usize::from(*singular == 0.0));
             let all = each.iter().all(|singular| *singular == 0.0);
             if !all {
                 before.copy_from_slice(tableau);
             }
-            solve_blocks(stage, *size, tableau, inverses, Y);
+            solve_blocks(elimination, *size, tableau, inverses, Y);
             if !all {
                 restore(singular, before, tableau);
             }

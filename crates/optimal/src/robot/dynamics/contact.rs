@@ -1,21 +1,21 @@
 //! Dynamics of a robot in contact with the world.
 
-use super::batch::Law;
+use super::acceleration::{InContact, RobotAcceleration};
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
-#[derive(Clone, Debug)]
-pub struct ContactAcceleration(pub(super) RobotDynamics);
+pub type ContactAcceleration = RobotAcceleration<InContact>;
 
-/// A knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
+/// Knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
 ///
 /// ```text
 /// [ M  Jᵀ ] [  q̈ ]   [ S u − h ]
@@ -44,10 +44,10 @@ pub struct ContactAcceleration(pub(super) RobotDynamics);
 pub type ContactDynamics = Integrated<ContactAcceleration>;
 
 impl ContactAcceleration {
-    /// A robot with some drives, in contact, with the damping μ.
+    /// Returns a robot with some drives, in contact, with the damping μ.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular beside another one on the same
+    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular with another one on the same
     /// body without damping; [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for drives of another
     /// robot, or a robot with joints that move no mass.
     pub fn new(
@@ -59,14 +59,15 @@ impl ContactAcceleration {
     ) -> Result<Self, Error> {
         let nu = actuation.nu();
         let capabilities = Capabilities { nu, effort: true, contacts: rows_of(contacts), ..Capabilities::default() };
-        let law = Law::Contact(contacts.to_vec(), damping);
-        RobotDynamics::new(model, actuation, capabilities, law, costs).map(Self)
+        let kind = DynamicsKind::Contact(contacts.to_vec(), damping);
+        RobotDynamics::new(model, actuation, capabilities, kind, costs).map(Self::of)
     }
 }
 
 impl ContactDynamics {
-    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler, without damping.
-    /// For other drives, integrators and damping see [`ContactAcceleration::new`] and [`Integrated::new`].
+    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler,
+    /// without damping. For other drives, integrators and damping see [`ContactAcceleration::new`] and
+    /// [`Integrated::new`].
     ///
     /// # Errors
     /// As [`ContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
@@ -74,14 +75,5 @@ impl ContactDynamics {
         let actuation = Actuation::joints(&model);
         let inner = ContactAcceleration::new(model, actuation, contacts, 0.0, costs)?;
         Self::new(inner, Integrator::SemiImplicitEuler, dt)
-    }
-
-    /// The smallest controls and forces that hold the robot still at a state, (u, λ) = [S Jᵀ]⁺ g(q): u of them. Allocates.
-    ///
-    /// # Panics
-    /// If `x` has not nq + nv numbers.
-    #[track_caller]
-    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.hold(x)
     }
 }

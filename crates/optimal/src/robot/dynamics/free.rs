@@ -1,20 +1,20 @@
 //! Dynamics of a robot that touches nothing.
 
-use super::batch::Law;
+use super::acceleration::{Free, RobotAcceleration};
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
-#[derive(Clone, Debug)]
-pub struct FreeAcceleration(pub(super) RobotDynamics);
+pub type FreeAcceleration = RobotAcceleration<Free>;
 
-/// A knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
+/// Knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = aba(q, v, S u),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
@@ -38,20 +38,20 @@ pub struct FreeAcceleration(pub(super) RobotDynamics);
 pub type FreeDynamics = Integrated<FreeAcceleration>;
 
 impl FreeAcceleration {
-    /// A robot with some drives.
+    /// Returns a robot with some drives.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for drives of another robot, or a robot with
     /// joints that move no mass.
     pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
         let capabilities = Capabilities { nu: actuation.nu(), effort: true, ..Capabilities::default() };
-        RobotDynamics::new(model, actuation, capabilities, Law::Free, costs).map(Self)
+        RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Free, costs).map(Self::of)
     }
 }
 
 impl FreeDynamics {
-    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other
-    /// drives or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
+    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler. For
+    /// other drives or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
@@ -61,21 +61,13 @@ impl FreeDynamics {
         Self::new(FreeAcceleration::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 
-    /// The knot after the last one. Terms of the control must have an empty reference: there is none.
+    /// Creates the terminal knot. Terms of the control must have an empty reference, because it has no controls.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.
     pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
         let none = Actuation::none(&model);
-        Ok(Self::end(FreeAcceleration(RobotDynamics::new(model, none, Capabilities::default(), Law::None, costs)?)))
-    }
-
-    /// The efforts that hold the robot still at a state, u = S⁺ g(q): the smallest ones that come nearest to it. Allocates.
-    ///
-    /// # Panics
-    /// If `x` has not nq + nv numbers.
-    #[track_caller]
-    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.hold(x)
+        let robot = RobotDynamics::new(model, none, Capabilities::default(), DynamicsKind::None, costs)?;
+        Ok(Self::without_time(FreeAcceleration::of(robot)))
     }
 }

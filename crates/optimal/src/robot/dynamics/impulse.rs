@@ -1,35 +1,29 @@
 //! Impacts: knots without time and controls, at which velocities jump.
 
-use super::batch::Law;
-use super::robot::{Parts, RobotDynamics, Work};
-use super::sensitivities::DynamicsSensitivities;
-use crate::ActionModel;
+use super::acceleration::{InImpact, RobotAcceleration};
+use super::batch::DynamicsKind;
+use super::robot::RobotDynamics;
 use crate::Error;
-use crate::error::assert_length;
-use crate::lq::LqNode;
-use crate::problem::Visit;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::{Capabilities, Output};
 use crate::robot::contact::{Contact, check_contacts, constraint_set, rows_of};
 use crate::robot::costs::Cost;
-use crate::robot::knot::{KnotData, KnotState};
-use crate::robot::on_demand::OnDemand;
-use crate::robot::state::{state_difference, state_integrate};
+use crate::robot::integrators::Integrated;
+use crate::robot::knot_data::{Capabilities, KnotData};
+use crate::robot::residuals::terms::KnotTerms;
 use condyle_dynamics::{
     ConstraintSet, Data, Model, centroidal_derivatives, forward_velocities, impulse_dynamics,
     impulse_dynamics_derivatives,
 };
-use std::any::Any;
 use std::sync::Arc;
 
-/// A knot at which contacts set in, with the restitution ε and the damping μ:
+/// Knot at which contacts are made, with the restitution ε and the damping μ:
 ///
 /// ```text
 /// q⁺ = q,   v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v,   ℓ = Σ w a(r)
 /// ```
 ///
-/// It takes no time and has no controls. Residuals look at the state before the impact. Of the contacts, frames and axes
-/// count. These are Crocoddyl's rules (`ActionModelImpulseFwdDynamics`).
+/// It takes no time and has no controls. Residuals are functions of the state before the impact. Only the frames and axes
+/// of the contacts count. These are Crocoddyl's rules (`ActionModelImpulseFwdDynamics`).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -38,7 +32,7 @@ use std::sync::Arc;
 /// use std::sync::Arc;
 /// let quadruped = Arc::new(robots::quadruped());
 /// let foot = Contact::new("foot", ContactConstraint::point(quadruped.frame("LF_foot").unwrap()));
-/// let mut touchdown = ImpulseDynamics::new(quadruped.clone(), &[foot], 0.0, 1e-12, vec![])?;
+/// let mut touchdown = ImpulseDynamics::instant(quadruped.clone(), &[foot], 0.0, 1e-12, vec![])?;
 /// let (mut x, mut next) = (condyle_dynamics::neutral(&quadruped), vec![0.0; 37]);
 /// x.extend([0.0; 18]);
 /// x[19 + 2] = -1.0; // falling
@@ -46,24 +40,16 @@ use std::sync::Arc;
 /// assert!(next[19 + 2] > -1.0 && next[..19] == x[..19]);
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-#[derive(Clone, Debug)]
-pub struct ImpulseDynamics {
-    pub(super) robot: RobotDynamics,
-    pub(super) contacts: Vec<Contact>,
-    restitution: f64,
-    damping: f64,
-    set: OnDemand<ConstraintSet<f64>>,
-    /// Zeros. Shape: nv.
-    zero: Vec<f64>,
-}
+pub type ImpulseDynamics = Integrated<RobotAcceleration<InImpact>>;
 
 impl ImpulseDynamics {
-    /// An impact of some contacts.
+    /// Creates the knot of an impact of some contacts.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular beside another one on the same
-    /// body without damping, and for a restitution that is not from 0 to 1; [`Error::Cost`] for a term that does not fit.
-    pub fn new(
+    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular with another one on the same
+    /// body without damping, and for a restitution that is not from 0 to 1; [`Error::Cost`] for a term that does not fit;
+    /// [`Error::Actuation`] for a robot with joints that move no mass.
+    pub fn instant(
         model: Arc<Model>,
         contacts: &[Contact],
         restitution: f64,
@@ -76,44 +62,59 @@ impl ImpulseDynamics {
         }
         check_contacts(&model, contacts, damping)?;
         let capabilities = Capabilities { impulse: true, contacts: rows_of(contacts), ..Capabilities::default() };
-        let (none, zero) = (Actuation::none(&model), vec![0.0; model.nv()]);
-        let robot = RobotDynamics::new(model, none, capabilities, Law::None, costs)?;
-        Ok(Self { robot, contacts: contacts.to_vec(), restitution, damping, set: OnDemand::default(), zero })
+        let (none, kind) =
+            (Actuation::none(&model), DynamicsKind::Impact { contacts: contacts.to_vec(), restitution, damping });
+        RobotDynamics::new(model, none, capabilities, kind, costs)
+            .map(|robot| Self::impact(RobotAcceleration::of(robot)))
+    }
+}
+
+/// Impact of some contacts, with its workspace.
+#[derive(Debug)]
+pub(super) struct Impact {
+    set: ConstraintSet<f64>,
+    restitution: f64,
+    /// Zeros. Shape: nv.
+    zero: Vec<f64>,
+}
+
+impl Impact {
+    /// Allocates the workspace for dynamics that are an impact.
+    pub(super) fn new(model: &Model, kind: &DynamicsKind) -> Option<Self> {
+        let DynamicsKind::Impact { contacts, restitution, damping } = kind else { return None };
+        let set = constraint_set(model, contacts, *damping).expect("was checked when it was given");
+        Some(Self { set, restitution: *restitution, zero: vec![0.0; model.nv()] })
     }
 
-    /// Computes v⁺ − v and the impulses at a state, with their derivatives if these are asked for, and what the residuals
-    /// see.
-    #[track_caller]
-    fn evaluate(&mut self, t: usize, x: &[f64], slopes: bool) {
-        let Self { robot, contacts, damping, set, restitution, zero } = self;
-        assert_length("x", x.len(), robot.model.nq() + robot.model.nv());
-        let Parts { model, terms, work: Work { single, data, .. }, .. } = robot.parts();
-        let set = set.get(|| made_constraints(model, contacts, *damping));
-        let ((q, v), knot) = (x.split_at(model.nq()), &mut data[0]);
-        knot.residuals.reserve(v.len(), terms.layouts());
+    /// Computes v⁺ − v and the impulses at a state, with their derivatives if `slopes` is set, and what the terms need of
+    /// them.
+    pub(super) fn run(
+        &mut self,
+        model: &Model,
+        data: &mut Data<f64>,
+        x: &[f64],
+        terms: KnotTerms<'_>,
+        slopes: bool,
+        to: &mut KnotData,
+    ) {
+        let (Self { set, restitution, zero }, (q, v)) = (self, x.split_at(model.nq()));
         if slopes {
-            let d = impulse_dynamics_derivatives(model, &mut single.data, set, q, v, *restitution);
-            write_change(v, d.v, d.lambda, knot);
-            let KnotData { da: [by_q, by_v, _], dlambda: [force_by_q, force_by_v, _], .. } = knot;
+            let d = impulse_dynamics_derivatives(model, data, set, q, v, *restitution);
+            write_change(v, d.v, d.lambda, to);
+            let KnotData { da: [by_q, by_v, _], dlambda: [force_by_q, force_by_v, _], .. } = to;
             by_q.copy_from(d.dv_dq);
             by_v.copy_from(d.dv_dv);
             by_v.iter_mut().step_by(v.len() + 1).for_each(|x| *x -= 1.0); // ∂(v⁺ − v)/∂v
             force_by_q.copy_from(d.dlambda_dq);
             force_by_v.copy_from(d.dlambda_dv);
         } else {
-            let after = impulse_dynamics(model, &mut single.data, set, q, v, *restitution);
-            write_change(v, after.v, after.lambda, knot);
+            let after = impulse_dynamics(model, data, set, q, v, *restitution);
+            write_change(v, after.v, after.lambda, to);
         }
-        if terms.at(t).layout().requirements.impulse_com {
-            write_com_change(model, &mut single.data, [q, zero], slopes, knot);
+        if terms.layout().requirements.impulse_com {
+            write_com_change(model, data, [q, zero], slopes, to);
         }
-        single.run_residuals_at(model, t, x, terms, slopes, knot);
     }
-}
-
-/// The constraints of contacts that were checked.
-fn made_constraints(model: &Model, contacts: &[Contact], damping: f64) -> ConstraintSet<f64> {
-    constraint_set(model, contacts, damping).expect("was checked when it was given")
 }
 
 fn write_change(v: &[f64], after: &[f64], lambda: &[f64], to: &mut KnotData) {
@@ -129,98 +130,5 @@ fn write_com_change(model: &Model, data: &mut Data<f64>, [q, zero]: [&[f64]; 2],
         let d = centroidal_derivatives(model, data, q, change, zero);
         residuals.dcom_change[0].copy_from(d.dvcom_dq);
         residuals.dcom_change[1].copy_from(d.dcom_dq);
-    }
-}
-
-impl ActionModel for ImpulseDynamics {
-    fn nx(&self) -> usize {
-        self.robot.model.nq() + self.robot.model.nv()
-    }
-
-    fn ndx(&self) -> usize {
-        2 * self.robot.model.nv()
-    }
-
-    fn nu(&self) -> usize {
-        0
-    }
-
-    fn shift(&mut self) {
-        self.robot.terms.shift();
-    }
-
-    fn reserve(&mut self) {
-        self.robot.reserve();
-        let Self { robot: RobotDynamics { model, .. }, contacts, damping, set, .. } = self;
-        set.get(|| made_constraints(model, contacts, *damping));
-    }
-
-    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
-        let other: &mut dyn Any = other;
-        let Some(other) = other.downcast_mut::<Self>() else { return false };
-        let same =
-            (&self.contacts, self.restitution, self.damping) == (&other.contacts, other.restitution, other.damping);
-        same && self.robot.merge(&mut other.robot)
-    }
-
-    fn choose(&mut self, model: usize) {
-        self.robot.terms.choose(model);
-    }
-
-    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
-        self.robot.terms.serve(t, horizon, model);
-    }
-
-    fn outputs(&mut self, t: usize, x: &[f64], _: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        self.evaluate(t, x, false);
-        self.robot.outputs(0, show);
-    }
-
-    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
-        self.robot.terms.limits.visit(t, visit);
-    }
-
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        Some(Box::new(self.clone()))
-    }
-
-    #[track_caller]
-    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        self.evaluate(t, x, false);
-        assert_length("next", next.len(), x.len());
-        let Parts { model, terms, work: Work { data, .. }, .. } = self.robot.parts();
-        let (nq, data) = (model.nq(), &data[0]);
-        next.copy_from_slice(x);
-        (0..model.nv()).for_each(|k| next[nq + k] += data.a[k]);
-        terms.calc(t, KnotState { x, u, data }) + terms.limits.term
-    }
-
-    #[track_caller]
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
-        self.evaluate(t, x, true);
-        let Parts { model, actuation, terms, work: Work { data, .. }, .. } = self.robot.parts();
-        let (nv, data) = (model.nv(), &data[0]);
-        let sensitivities = DynamicsSensitivities { given: Output::Effort, data, actuation };
-        terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, 1.0, node);
-        // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v]: that of an Euler step that takes no time
-        node.structure.set_euler(0.0, &[]);
-        node.A.fill_with_identity();
-        let [by_q, by_v, _] = &data.da;
-        let mut below = node.A.rows_mut(nv, nv);
-        below.columns_mut(0, nv).copy_from(by_q);
-        below.columns_mut(nv, nv).zip_apply(by_v, |a, change| *a += change);
-    }
-
-    fn check_state(&self, x: &[f64]) -> Result<(), String> {
-        let model = &self.robot.model;
-        model.check_position(&x[..model.nq()]).map_err(|error| error.to_string())
-    }
-
-    fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
-        state_integrate(&self.robot.model, x, dx, out);
-    }
-
-    fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
-        state_difference(&self.robot.model, x0, x1, out);
     }
 }

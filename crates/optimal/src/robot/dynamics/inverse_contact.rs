@@ -1,23 +1,23 @@
 //! Dynamics of a robot in contact whose accelerations and forces are the controls, and whose efforts follow.
 
-use super::batch::Law;
+use super::acceleration::{ControlledInContact, RobotAcceleration};
+use super::batch::DynamicsKind;
 use super::robot::RobotDynamics;
 use crate::Error;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Capabilities;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
+use crate::robot::knot_data::Capabilities;
 use crate::robot::limits::Limit;
 use crate::robot::residuals::residual::Residual;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
 /// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈ + γ = 0.
-#[derive(Clone, Debug)]
-pub struct ControlledContactAcceleration(pub(super) RobotDynamics);
+pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 
-/// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
+/// Knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
 /// Euler:
 ///
 /// ```text
@@ -28,9 +28,9 @@ pub struct ControlledContactAcceleration(pub(super) RobotDynamics);
 ///
 /// The equations are [`Limit`]s that the knot has of itself, called `undriven efforts` and `contact …`, before those that are
 /// given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they are costs.
-/// Nothing is inverted, so that contacts may be redundant and M singular. Solutions are those of
-/// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations where it serves. Without contacts it is
-/// [`InverseDynamics`](crate::robot::InverseDynamics) with drives. These are Crocoddyl's rules
+/// Nothing is inverted, so that contacts may be redundant and M singular. Its solutions equal the solutions with
+/// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations if it applies. Without contacts it is
+/// [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with drives. These are Crocoddyl's rules
 /// (`DifferentialActionModelContactInvDynamics`, and `DifferentialActionModelFreeInvDynamics` without contacts).
 ///
 /// ```
@@ -50,7 +50,7 @@ pub struct ControlledContactAcceleration(pub(super) RobotDynamics);
 pub type ContactInverseDynamics = Integrated<ControlledContactAcceleration>;
 
 impl ControlledContactAcceleration {
-    /// A robot with some drives, in contact.
+    /// Returns a robot with some drives, in contact.
     ///
     /// # Errors
     /// [`Error::Contact`] for a contact that does not fit or is named twice; [`Error::Cost`] for a term that does not fit;
@@ -66,16 +66,16 @@ impl ControlledContactAcceleration {
         let nu = model.nv() + named.last().map_or(0, |(_, rows)| rows.end);
         let capabilities =
             Capabilities { nu, effort: true, inverse: true, undriven, contacts: named, ..Capabilities::default() };
-        let law = Law::ContactInverse(contacts.to_vec(), actuation);
-        let mut robot = RobotDynamics::new(model, all, capabilities, law, costs)?;
+        let kind = DynamicsKind::ContactInverse(contacts.to_vec(), actuation);
+        let mut robot = RobotDynamics::new(model, all, capabilities, kind, costs)?;
         robot.terms.require(limits)?;
-        Ok(Self(robot))
+        Ok(Self::of(robot))
     }
 }
 
 impl ContactInverseDynamics {
-    /// A knot of Δt seconds, driven at every joint but a free-flyer at the root, by semi-implicit Euler. For other drives and
-    /// integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
+    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler. For
+    /// other drives and integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// As [`ControlledContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
@@ -83,15 +83,5 @@ impl ContactInverseDynamics {
         let actuation = Actuation::joints(&model);
         let inner = ControlledContactAcceleration::new(model, actuation, contacts, costs)?;
         Self::new(inner, Integrator::SemiImplicitEuler, dt)
-    }
-
-    /// No accelerations, and the forces among the smallest efforts and forces that hold the robot still at a state,
-    /// (τ, λ) = [S Jᵀ]⁺ g(q): u = (0, λ). Allocates.
-    ///
-    /// # Panics
-    /// If `x` has not nq + nv numbers.
-    #[track_caller]
-    pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
-        self.inner_mut().0.hold(x)
     }
 }

@@ -16,61 +16,60 @@
 #![allow(non_snake_case)] // J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
-use crate::robot::capabilities::Output;
-use crate::robot::knot::Sensitivities;
+use crate::robot::knot_data::Output;
+use crate::robot::knot_data::Sensitivities;
 use crate::robot::residuals::rows::Row;
 use condyle_linalg::{Runs, SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
 use core::ops::Range;
 
-/// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
+/// Pivot among the unknowns that are preferred may be so much smaller than the largest of all.
 pub(super) const PREFERENCE: f64 = 1e-2;
-/// A pivot that is so much smaller than the row's largest entry was at first counts as zero.
+/// Pivot that is so much smaller than the row's largest entry was at first counts as zero.
 const REDUNDANT: f64 = 1e-7;
 
-/// The size of the tableau of a knot: a row for each contact's row and each coordinate, over
-/// (δa, δf, δv, δq).
+/// Size of the tableau of a knot: a row for each contact's row and each coordinate, over (δa, δf, δv, δq).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tableau {
     pub nv: usize,
-    /// The number of rows of all contacts.
+    /// Number of rows of all contacts.
     pub rows: usize,
 }
 
 condyle_spatial::same_layout!(Tableau);
 
 impl Tableau {
-    /// The distance from one row to the next.
+    /// Returns the distance from one row to the next.
     pub(crate) fn stride(self) -> usize {
         3 * self.nv + self.rows + SLACK
     }
 
-    /// The number of its entries.
+    /// Returns the number of its entries.
     pub(crate) fn len(self) -> usize {
         (self.rows + self.nv) * self.stride()
     }
 }
 
-/// The elimination for one set of contacts, and its scratch.
+/// Elimination for one set of contacts, and its scratch.
 #[derive(Debug)]
 pub(crate) struct KktElimination {
     tableau: Tableau,
-    /// The number of coordinates, the first ones, that are not driven.
+    /// Number of coordinates, the first ones, that are not driven.
     passive: usize,
-    /// The coordinates that each contact's row prefers.
+    /// Coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
-    /// The rows that are solved before, stage after stage, each with its column.
+    /// Rows that are solved before, elimination after elimination, each with its column.
     before: Vec<Vec<(usize, usize)>>,
-    /// The column that each row was solved for.
+    /// Column that each row was solved for.
     pivots: Vec<usize>,
-    /// The rows that are solved here.
+    /// Rows that are solved here.
     late: Vec<usize>,
-    /// The pivots for which places and runs were found.
+    /// Pivots for which places and runs were found.
     laid_out: Vec<usize>,
-    /// The place of each column of δa and δf: its unknown, if it is one, or else the row of D or of forces for it.
+    /// Place of each column of δa and δf: its unknown, if it is one, or else the row of D or of forces for it.
     place: Vec<Place>,
     /// From the columns of δa, and of δf, to the unknowns that they are.
     runs: [Runs; 2],
-    /// The forces that are not unknowns, over (w, δv, δq).
+    /// Forces that are not unknowns, over (w, δv, δq).
     forces: SparseRows,
 }
 
@@ -80,15 +79,15 @@ enum Place {
     Row(usize),
 }
 
-/// The driven coordinates that move a contact's row r and no other contact's.
+/// Returns the driven coordinates that move a contact's row r and no other contact's.
 pub(super) fn own_coordinates(moved_by: &[Vec<usize>], r: usize, passive: usize) -> Vec<usize> {
     let alone = |k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
     moved_by[r].iter().copied().filter(|k| *k >= passive && alone(k)).collect()
 }
 
 impl KktElimination {
-    /// The elimination for contacts whose rows are moved by some coordinates each, of a robot whose first `passive`
-    /// coordinates are not driven.
+    /// Returns the elimination for contacts whose rows are moved by some coordinates each, of a robot whose first
+    /// `passive` coordinates are not driven.
     pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
         let rows = moved_by.len();
         let preferred = (0..rows).map(|r| {
@@ -112,38 +111,44 @@ impl KktElimination {
         elimination
     }
 
-    /// What is solved before, from now on: see
+    /// Sets the rows that are solved before: see
     /// [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
     pub(crate) fn follow(&mut self, before: Vec<Vec<(usize, usize)>>) {
         self.before = before;
     }
 
-    /// The columns that the rows of the base are best solved for in a tableau whose limbs are solved.
+    /// Returns the columns that the rows of the base are best solved for in a tableau whose limbs are solved.
     pub(crate) fn base_pivots(&mut self, tableau: &mut [f64]) -> Option<Vec<usize>> {
         let (mut form, Tableau { nv, rows }) = (InverseDynamicsForm::default(), self.tableau);
         form.reserve(nv, nv - self.passive, [self.most_dependent(), 0]);
         self.run(tableau, 1, 1.0, &mut form).then(|| self.pivots[rows..].to_vec())
     }
 
-    /// The most coordinates that are not unknowns.
+    /// Returns the most coordinates that are not unknowns.
     pub(crate) fn most_dependent(&self) -> usize {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau of which so many stages are solved; says whether there were
-    /// pivots. Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], stages: usize, dt: f64, form: &mut InverseDynamicsForm) -> bool {
+    /// Writes U and D for steps of Δt, from a tableau in which a number of eliminations are done; returns whether pivots
+    /// exist. Overwrites the tableau.
+    pub(crate) fn run(
+        &mut self,
+        tableau: &mut [f64],
+        eliminations: usize,
+        dt: f64,
+        form: &mut InverseDynamicsForm,
+    ) -> bool {
         let mut done = false;
-        at_level(Run { elimination: self, T: tableau, stages, dt, form, done: &mut done });
+        at_level(Run { elimination: self, T: tableau, eliminations, dt, form, done: &mut done });
         done
     }
 
-    /// The sensitivities of outputs by (w, δv, δq), for a knot whose U and D are these.
+    /// Returns the sensitivities of outputs by (w, δv, δq), for a knot whose U and D are these.
     pub(crate) fn sensitivities<'a>(&'a self, form: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
         Unknowns { elimination: self, form, dt }
     }
 
-    /// The column with the largest entry of a row, and the entry.
+    /// Returns the column with the largest entry of a row, and the entry.
     #[inline(always)]
     fn largest(&self, row: &[f64], columns: impl Iterator<Item = usize>) -> (usize, f64) {
         let mut best = (0, 0.0);
@@ -155,7 +160,7 @@ impl KktElimination {
         best
     }
 
-    /// The column to solve row r for.
+    /// Returns the column to solve row r for.
     #[inline(always)]
     fn choose(&self, r: usize, row: &[f64], scale: [f64; 2]) -> Option<usize> {
         let Tableau { nv, rows } = self.tableau;
@@ -173,11 +178,11 @@ impl KktElimination {
     }
 }
 
-/// How many rows are subtracted at once: as many as those of a base that moves freely.
+/// Number of rows that are subtracted at once: the number of coordinates of a base that moves freely.
 const TOGETHER: usize = 6;
 
 impl KktElimination {
-    /// Solves the rows that have no pivot yet; says whether all have one now.
+    /// Solves the rows that have no pivot yet; returns whether all have one now.
     #[inline(always)]
     fn eliminate<V: Vector>(&mut self, T: &mut [f64], motion: &mut [f64]) -> bool {
         let (Tableau { nv, rows }, stride) = (self.tableau, self.tableau.stride());
@@ -263,7 +268,7 @@ impl KktElimination {
 struct Run<'a> {
     elimination: &'a mut KktElimination,
     T: &'a mut [f64],
-    stages: usize,
+    eliminations: usize,
     dt: f64,
     form: &'a mut InverseDynamicsForm,
     done: &'a mut bool,
@@ -272,12 +277,12 @@ struct Run<'a> {
 impl Vectorized for Run<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { elimination: e, T, stages, dt, form, done } = self;
+        let Self { elimination: e, T, eliminations, dt, form, done } = self;
         let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
         let solved = rows + e.passive;
         e.pivots.clear();
         e.pivots.resize(solved, usize::MAX);
-        e.before[..stages].iter().flatten().for_each(|(r, k)| e.pivots[*r] = *k);
+        e.before[..eliminations].iter().flatten().for_each(|(r, k)| e.pivots[*r] = *k);
         let (T, motion) = T.split_at_mut(solved * stride);
         if e.pivots.contains(&usize::MAX) && !e.eliminate::<V>(T, motion) {
             return;
@@ -315,7 +320,7 @@ impl Vectorized for Run<'_> {
 /// From the columns (δa, δf, δv, δq) to (w, δv, δq).
 struct Gather<'a> {
     runs: &'a [Runs; 2],
-    /// The columns of (δv, δq).
+    /// Columns of (δv, δq).
     states: Range<usize>,
     m: usize,
 }
@@ -330,7 +335,7 @@ impl Gather<'_> {
     }
 }
 
-/// The sensitivities of a knot by (w, δv, δq); see [`KktElimination::sensitivities`].
+/// Sensitivities of a knot by (w, δv, δq); see [`KktElimination::sensitivities`].
 pub(crate) struct Unknowns<'a> {
     elimination: &'a KktElimination,
     form: &'a InverseDynamicsForm,

@@ -23,30 +23,30 @@ use condyle_spatial::{Matrix, Scalar, kernel, same_layout};
 use core::ops::Range;
 use std::sync::Arc;
 
-/// How many rows are solved together: those of a point and of a sole, or of a base that moves freely.
+/// Number of rows that are solved together, for a point, for a sole, and for a base that moves freely.
 const SIZES: [usize; 2] = [3, 6];
 const MOST: usize = SIZES[1];
 /// B of a base that touches nothing is positive definite: a pivot so much smaller than its row's largest entry is
 /// rounding.
 const DEFINITE: f64 = 1e-9;
-/// The columns for a base in contact were chosen at another posture: a pivot that is so much smaller than its row's
-/// largest entry takes more digits than one that is chosen for the knot.
+/// Columns for a base in contact were chosen at another posture: a pivot that is so much smaller than its row's largest
+/// entry takes more digits than one that is chosen for the knot.
 const CHOSEN_ELSEWHERE: f64 = 1e-3;
 
 /// Some rows of the tableau that are solved for as many columns.
 #[derive(Clone, Debug, PartialEq)]
 struct Block {
-    /// The rows.
+    /// Rows.
     rows: Range<usize>,
-    /// The columns: of coordinates, or of forces.
+    /// Columns: of coordinates, or of forces.
     solved: Vec<usize>,
-    /// The other columns in which the rows have entries, in runs.
+    /// Other columns in which the rows have entries, in runs.
     columns: Vec<Range<usize>>,
-    /// The other rows in which the solved columns have entries.
+    /// Other rows in which the solved columns have entries.
     others: Vec<usize>,
-    /// The columns, of both kinds, in which a row's largest entry is looked for.
+    /// Columns, of both kinds, in which a row's largest entry is looked for.
     compared: Vec<usize>,
-    /// The least pivot of B, over the row's largest entry.
+    /// Least pivot of B, over the row's largest entry.
     least: f64,
 }
 
@@ -58,7 +58,7 @@ struct Pattern {
 }
 
 impl Pattern {
-    /// The entries for contacts whose rows are moved by some coordinates each, with damping or without.
+    /// Returns the entries for contacts whose rows are moved by some coordinates each, with damping or without.
     fn new(model: &Model, tableau: Tableau, moved_by: &[Vec<usize>], damped: bool) -> Self {
         let (Tableau { nv, rows }, coupled) = (tableau, coupled(model));
         let width = 3 * nv + rows;
@@ -117,9 +117,9 @@ pub(crate) struct LimbElimination {
 same_layout!(LimbElimination);
 
 impl LimbElimination {
-    /// The limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved by some
-    /// coordinates each, with damping or without; and then the base, for columns that are found for the limbs. What has
-    /// no blocks is left out.
+    /// Returns the limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved
+    /// by some coordinates each, with damping or without; and then the base, for columns that are found for the limbs.
+    /// What has no blocks is left out.
     pub(crate) fn new(
         model: &Model,
         passive: usize,
@@ -151,10 +151,10 @@ impl LimbElimination {
         };
         let base = base.map(|(solved, compared, least)| pattern.solve(rows..rows + passive, solved, compared, least));
         let base = Arc::new(Self { blocks: base.into_iter().collect() });
-        [limbs, base].into_iter().filter(|stage| !stage.blocks.is_empty()).collect()
+        [limbs, base].into_iter().filter(|elimination| !elimination.blocks.is_empty()).collect()
     }
 
-    /// The column that each row of a tableau was solved for, if it was.
+    /// Returns the column that each row of a tableau was solved for, if it was.
     pub(crate) fn solved(&self) -> Vec<(usize, usize)> {
         self.blocks.iter().flat_map(|block| block.rows.clone().zip(block.solved.iter().copied())).collect()
     }
@@ -171,7 +171,7 @@ impl LimbElimination {
     }
 }
 
-/// Whether two coordinates move one body, so that M has an entry for them. Shape: nv × nv.
+/// Returns whether two coordinates move one body, so that M has an entry for them. Shape: nv × nv.
 fn coupled(model: &Model) -> Vec<bool> {
     let nv = model.nv();
     let mut coupled = vec![false; nv * nv];
@@ -211,7 +211,7 @@ kernel! {
 }
 
 kernel! {
-    /// Writes the rows of the contacts but for J, [· μ1 c_v c_q], into a tableau.
+    /// Writes the rows of the contacts except J, [· μ1 c_v c_q], into a tableau.
     pub(crate) fn write_drift<S>(
         tableau: Tableau, dgamma_dv: &Matrix<S>, dgamma_dq: &Matrix<S>, mu: f64, T: &mut [S],
     ) {
@@ -377,7 +377,7 @@ fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], i
     }
 }
 
-/// The larger of x and |y|.
+/// Returns the larger of x and |y|.
 #[inline(always)]
 fn larger<S: Scalar>(x: S, y: S) -> S {
     S::select(x.lt(y.abs()), y.abs(), x)

@@ -1,13 +1,13 @@
 //! Dynamics of a robot: knots that move freely, in contact, by given accelerations, or that jump.
 
-mod batch;
+pub(super) mod acceleration;
+pub(super) mod batch;
 pub(super) mod contact;
 pub(super) mod free;
 pub(super) mod impulse;
 pub(super) mod inverse;
 pub(super) mod inverse_contact;
 pub(super) mod kkt_elimination;
-pub(super) mod knots;
 mod limb_elimination;
-mod robot;
+pub(crate) mod robot;
 mod sensitivities;

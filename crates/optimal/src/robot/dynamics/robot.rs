@@ -1,21 +1,21 @@
-//! Dynamics of a robot: what its knots of all kinds share.
+//! Dynamics of a robot, of all kinds: its accelerations, costs and limits for a group of knots.
 #![allow(non_snake_case)] // J
 
-use super::batch::{KnotBatch, Law, Pass};
+use super::batch::{DynamicsKind, Group, KnotBatch, Pass};
+use super::impulse::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use super::sensitivities::DynamicsSensitivities;
 use crate::Error;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LqKnot};
+use crate::problem::Evaluation;
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::{Capabilities, Output};
 use crate::robot::contact::{Contact, SHARED, check_contacts, constraint_set, moved_by};
-use crate::robot::continuous::{Derivatives, KnotInput, Wanted};
+use crate::robot::continuous::{Derivatives, KnotInput};
 use crate::robot::costs::Cost;
-use crate::robot::horizon_terms::HorizonTerms;
-use crate::robot::knot::{KnotData, KnotState};
-use crate::robot::on_demand::OnDemand;
+use crate::robot::horizon::HorizonTerms;
+use crate::robot::knot_data::{Capabilities, KnotData, KnotState, OnDemand, Output};
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
@@ -28,7 +28,7 @@ use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// The promise of this crate, by which it names vectors.
+/// Promise of this crate, by which it names vectors.
 struct Gate;
 
 // SAFETY: vectors are used by the kernels of `condyle_dynamics`, and by what enters through their door.
@@ -43,47 +43,47 @@ const POSTURES: usize = 8;
 /// Fewer knots than this are computed one by one.
 const WORTHWHILE: usize = 3;
 
-/// A robot with its drives, the law of its accelerations, and the terms of its knots.
+/// Robot with its drives, the kind of its dynamics, and the costs and limits of its knots.
 #[derive(Clone, Debug)]
-pub(crate) struct RobotDynamics {
-    pub model: Arc<Model>,
-    pub actuation: Actuation,
-    pub terms: HorizonTerms,
-    law: Law,
-    /// The output that the controls drive.
+pub struct RobotDynamics {
+    pub(crate) model: Arc<Model>,
+    pub(crate) actuation: Actuation,
+    pub(crate) terms: HorizonTerms,
+    kind: DynamicsKind,
+    /// Output that the controls drive.
     given: Output,
     capabilities: Capabilities,
-    /// The coordinates of each group of positions that is no vector space.
-    pub groups: Vec<Range<usize>>,
+    /// Coordinates of each group of positions that is no vector space.
+    pub(crate) groups: Vec<Range<usize>>,
     work: OnDemand<Work>,
 }
 
-/// What [`RobotDynamics`] consists of when knots are computed.
-pub(crate) struct Parts<'a> {
-    pub model: &'a Arc<Model>,
-    pub actuation: &'a Actuation,
-    pub terms: &'a mut HorizonTerms,
+/// Parts of [`RobotDynamics`] with the workspace.
+struct Parts<'a> {
+    model: &'a Arc<Model>,
+    actuation: &'a Actuation,
+    terms: &'a mut HorizonTerms,
     capabilities: &'a Capabilities,
     groups: &'a [Range<usize>],
-    pub work: &'a mut Work,
+    work: &'a mut Work,
 }
 
-/// The memory in which the dynamics of knots are computed.
+/// Memory in which the dynamics of knots are computed.
 #[derive(Debug)]
-pub(crate) struct Work {
-    /// The dynamics of one knot.
-    pub single: KnotBatch<f64>,
+struct Work {
+    /// Dynamics of one knot.
+    single: KnotBatch<f64>,
     vectors: Option<VectorBatches>,
-    /// The knots of the group that was prepared, and what was computed of them.
-    pub data: Vec<KnotData>,
-    prepared: Wanted,
+    impact: Option<Impact>,
+    /// Data of each knot of a group.
+    data: Vec<KnotData>,
     elimination: Option<KktElimination>,
     group_hessian: GroupHessian,
     /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
     da_du: Vec<f64>,
 }
 
-/// The dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for
+/// Dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for
 /// derivatives they are not: too rarely used to stay in the caches.
 #[derive(Debug)]
 struct VectorBatches {
@@ -91,10 +91,10 @@ struct VectorBatches {
     long: Option<KnotBatch<Long>>,
 }
 
-/// The number of knots that are computed side by side.
-fn lanes(law: &Law) -> usize {
-    match (law, level()) {
-        (Law::None, _) | (_, Level::Baseline) => 1,
+/// Returns the number of knots that are computed side by side.
+fn lanes(kind: &DynamicsKind) -> usize {
+    match (kind, level()) {
+        (DynamicsKind::None | DynamicsKind::Impact { .. }, _) | (_, Level::Baseline) => 1,
         (_, Level::Simd128 | Level::Neon | Level::Avx2) => Short::LANES,
         (_, Level::Avx512) => Long::LANES,
     }
@@ -102,14 +102,14 @@ fn lanes(law: &Law) -> usize {
 
 impl VectorBatches {
     /// Makes room for the equations of knots in inverse-dynamics form, in the widest lanes: they are for derivatives.
-    fn reserve(&mut self, tableau: Tableau, stages: Vec<Arc<LimbElimination>>) {
+    fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         match &mut self.long {
-            Some(long) => long.reserve(tableau, stages),
-            None => self.short.reserve(tableau, stages),
+            Some(long) => long.reserve(tableau, eliminations),
+            None => self.short.reserve(tableau, eliminations),
         }
     }
 
-    /// The equations of a knot at some posture in which the limbs can be solved.
+    /// Returns the equations of a knot at some posture in which the limbs can be solved.
     fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Vec<f64>> {
         (0..POSTURES).find_map(|posture| {
             let bend: Vec<f64> = (0..model.nv()).map(|k| 0.5 * ((1 + posture + k) as f64).sin()).collect();
@@ -120,7 +120,7 @@ impl VectorBatches {
                 Some(long) => long.run_equations_at(model, &x, to),
                 None => self.short.run_equations_at(model, &x, to),
             }
-            (at.stages > 0).then_some(at.equations)
+            (at.eliminations > 0).then_some(at.equations)
         })
     }
 }
@@ -130,74 +130,75 @@ impl Work {
     fn new(
         model: &Model,
         actuation: &Actuation,
-        law: &Law,
+        kind: &DynamicsKind,
         given: Output,
         capabilities: &Capabilities,
         groups: &[Range<usize>],
     ) -> Self {
-        let (nv, lanes) = (model.nv(), lanes(law));
+        let (nv, lanes) = (model.nv(), lanes(kind));
         let mut vectors = (lanes > 1).then(|| {
-            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, law));
-            VectorBatches { short: KnotBatch::new(model, law), long }
+            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, kind));
+            VectorBatches { short: KnotBatch::new(model, kind), long }
         });
-        let moved_by = match law {
-            Law::Free => Some(Vec::new()),
-            Law::Contact(contacts, _) => Some(moved_by(model, contacts)),
+        let moved_by = match kind {
+            DynamicsKind::Free => Some(Vec::new()),
+            DynamicsKind::Contact(contacts, _) => Some(moved_by(model, contacts)),
             _ => None,
         };
         // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
         let mut data = KnotData::new(nv, capabilities, given);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
-            let damped = matches!(law, Law::Contact(_, damping) if *damping != 0.0);
+            let damped = matches!(kind, DynamicsKind::Contact(_, damping) if *damping != 0.0);
             let tableau = Tableau { nv, rows: capabilities.rows() };
             data.equations.resize(tableau.len(), 0.0);
             let mut elimination = KktElimination::new(nv, passive, &moved_by);
-            let stages = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
+            let eliminations = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
                 elimination.follow(vec![limbs.solved()]);
                 vectors.reserve(tableau, vec![limbs.clone()]);
                 elimination.base_pivots(&mut vectors.some_equations(model, &data)?)
             });
-            elimination.follow(stages.iter().map(|stage| stage.solved()).collect());
-            vectors.reserve(tableau, stages);
+            elimination.follow(eliminations.iter().map(|elimination| elimination.solved()).collect());
+            vectors.reserve(tableau, eliminations);
             elimination
         });
         Self {
-            single: KnotBatch::new(model, law),
+            single: KnotBatch::new(model, kind),
             vectors,
+            impact: Impact::new(model, kind),
             data: vec![data; lanes],
-            prepared: Wanted::Motion,
             elimination,
             group_hessian: GroupHessian::new(nv, groups),
             da_du: actuation.scratch(),
         }
     }
 
-    /// Writes a knot of Δt = `scale` seconds in inverse-dynamics form; says whether there is one.
-    fn write_inverse_dynamics_form(
+    /// Writes a knot of Δt = `scale` seconds as equations of inverse dynamics; returns whether it did so.
+    fn write_equations(
         &mut self,
         terms: &mut HorizonTerms,
-        KnotInput { lane, t, x, u }: KnotInput<'_>,
+        lane: usize,
+        KnotInput { t, x, u }: KnotInput<'_>,
         scale: f64,
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) -> bool {
         let Self { data, elimination: Some(elimination), .. } = self else { return false };
-        let form = &mut node.inverse_dynamics;
-        let KnotData { equations, stages, .. } = &mut data[lane];
-        if !elimination.run(equations, *stages, scale, form) {
+        let form = &mut knot.inverse_dynamics;
+        let KnotData { equations, eliminations, .. } = &mut data[lane];
+        if !elimination.run(equations, *eliminations, scale, form) {
             return false;
         }
-        form.active = true;
+        knot.structure.set_inverse_dynamics();
         let lent = form.lend();
         let state = KnotState { x, u, data: &data[lane] };
-        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, node);
-        node.inverse_dynamics.take_back(lent);
+        terms.calc_diff(t, state, &elimination.sensitivities(&lent, scale), scale, true, knot);
+        knot.inverse_dynamics.take_back(lent);
         true
     }
 }
 
 impl RobotDynamics {
-    /// A robot with some drives whose accelerations obey a law.
+    /// Returns a robot with some drives whose accelerations obey a law.
     ///
     /// # Errors
     /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot,
@@ -207,18 +208,22 @@ impl RobotDynamics {
         model: Arc<Model>,
         actuation: Actuation,
         capabilities: Capabilities,
-        law: Law,
+        kind: DynamicsKind,
         costs: Vec<Cost>,
     ) -> Result<Self, Error> {
-        match &law {
-            Law::Contact(contacts, damping) => check_contacts(&model, contacts, *damping)?,
-            Law::ContactInverse(contacts, _) => check_contacts(&model, contacts, SHARED)?,
+        match &kind {
+            DynamicsKind::Contact(contacts, damping) | DynamicsKind::Impact { contacts, damping, .. } => {
+                check_contacts(&model, contacts, *damping)?;
+            }
+            DynamicsKind::ContactInverse(contacts, _) => check_contacts(&model, contacts, SHARED)?,
             _ => {}
         }
         actuation.check(&model)?;
         let terms = HorizonTerms::new(model.clone(), capabilities.clone(), costs)?;
         let singular = model.singular_joints();
-        if !singular.is_empty() && (capabilities.impulse || matches!(law, Law::Free | Law::Contact(..))) {
+        if !singular.is_empty()
+            && (capabilities.impulse || matches!(kind, DynamicsKind::Free | DynamicsKind::Contact(..)))
+        {
             let why = "nothing with a mass moves with the joints";
             let names: Vec<_> = singular.iter().map(|&i| format!("`{}`", model.bodies()[i].joint_name)).collect();
             let what = format!("{why} {}: their accelerations are undefined", names.join(", "));
@@ -226,61 +231,80 @@ impl RobotDynamics {
         }
         let given = if capabilities.inverse { Output::Acceleration } else { Output::Effort };
         let groups = groups(&model);
-        Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: OnDemand::default() })
+        Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
     }
 
-    /// The contacts of its law, in the order of their forces.
+    /// Returns the contacts of its law, in the order of their forces.
     pub(crate) fn contacts(&self) -> &[Contact] {
-        match &self.law {
-            Law::Contact(contacts, _) | Law::ContactInverse(contacts, _) => contacts,
+        match &self.kind {
+            DynamicsKind::Contact(contacts, _)
+            | DynamicsKind::ContactInverse(contacts, _)
+            | DynamicsKind::Impact { contacts, .. } => contacts,
             _ => &[],
         }
     }
 
-    /// Whether its knots are impacts.
+    /// Returns whether its knots are impacts.
     pub(crate) fn is_impact(&self) -> bool {
         self.capabilities.impulse
     }
 
-    /// The number of controls.
+    /// Returns the number of controls.
     pub(crate) fn nu(&self) -> usize {
         self.capabilities.nu
     }
 
-    /// Makes the memory in which knots are computed, unless it is there.
+    /// Allocates the workspace, unless it exists, and makes room for the residuals of all terms.
     pub(crate) fn reserve(&mut self) {
-        self.parts();
+        let Parts { model, terms, work, .. } = self.parts();
+        work.data.iter_mut().for_each(|data| data.residuals.reserve(model.nv(), terms.layouts()));
     }
 
-    /// The robot, its drives, the terms of its knots, and the memory in which they are computed.
-    pub(crate) fn parts(&mut self) -> Parts<'_> {
-        let Self { model, actuation, terms, law, given, capabilities, groups, work } = self;
+    /// Returns the parts, with a workspace.
+    fn parts(&mut self) -> Parts<'_> {
+        let Self { model, actuation, terms, kind, given, capabilities, groups, work } = self;
         terms.reserve();
-        let work = work.get(|| Work::new(model, actuation, law, *given, capabilities, groups));
+        let work = work.get(|| Work::new(model, actuation, kind, *given, capabilities, groups));
         Parts { model, actuation, terms, capabilities, groups, work }
     }
 
-    /// As [`ActionModel::merge`](crate::ActionModel::merge).
-    pub(crate) fn merge(&mut self, other: &mut Self) -> bool {
+    /// Takes over the costs and limits of a robot with the same dynamics; returns whether the dynamics are the same.
+    pub(crate) fn merge(&mut self, other: &mut Self, place: Option<usize>) -> bool {
         let same = Arc::ptr_eq(&self.model, &other.model)
-            && (&self.law, &self.actuation, &self.capabilities) == (&other.law, &other.actuation, &other.capabilities);
+            && (&self.kind, &self.actuation, &self.capabilities)
+                == (&other.kind, &other.actuation, &other.capabilities);
         if same {
-            self.terms.append(&mut other.terms);
+            self.terms.append(&mut other.terms, place);
         }
         same
     }
 
-    /// As [`ContinuousModel::lanes`](crate::robot::ContinuousModel::lanes).
+    /// Returns the number of knots that are computed side by side.
     pub(crate) fn lanes(&self) -> usize {
-        lanes(&self.law)
+        lanes(&self.kind)
     }
 
-    /// As [`ContinuousModel::prepare`](crate::robot::ContinuousModel::prepare): side by side where that is worthwhile.
-    pub(crate) fn prepare(&mut self, knots: &[usize], xs: &[f64], us: &[f64], wanted: Wanted) {
+    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, side by side if that is faster.
+    /// [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each.
+    pub(crate) fn solve(&mut self, group: Group<'_>) {
+        let Group { knots, xs, us, what, .. } = group;
+        if let Evaluation::Equations(motions) = what {
+            match motions.is_empty() {
+                true => self.solve(Group { what: Evaluation::Values, ..group }),
+                false => self.set_motions(knots.len(), motions),
+            }
+        }
         let Parts { model, actuation, terms, capabilities, work, .. } = self.parts();
-        let Work { single, vectors, data, prepared, .. } = work;
+        let Work { single, vectors, impact, data, .. } = work;
         let (nu, nx, count) = (capabilities.nu, model.nq() + model.nv(), knots.len());
+        let alone = |k: usize| Group { knots: &knots[k..=k], xs: &xs[k * nx..][..nx], ..group };
         let data = &mut data[..count];
+        if let Some(impact) = impact {
+            let terms_at = terms.at(knots[0], group.limited);
+            data[0].residuals.reserve(model.nv(), terms.layouts());
+            impact.run(model, &mut single.data, xs, terms_at, what != Evaluation::Values, &mut data[0]);
+            return single.run_residuals_at(model, group, terms, &mut data[0]);
+        }
         for (k, data) in data.iter_mut().enumerate() {
             let (drives, forces) = us[k * nu..][..nu].split_at(actuation.nu());
             actuation.effort(drives, &mut data.tau); // τ = S u, or q̈
@@ -288,89 +312,93 @@ impl RobotDynamics {
                 data.lambda.copy_from_slice(forces);
             }
         }
-        match vectors.as_mut().filter(|_| count >= WORTHWHILE || wanted == Wanted::Equations) {
-            Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || wanted != Wanted::Motion => {
-                long.run(model, knots, xs, terms, wanted, data);
+        let equations = matches!(what, Evaluation::Equations(_));
+        match vectors.as_mut().filter(|_| count >= WORTHWHILE || equations) {
+            Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || what != Evaluation::Values => {
+                long.run(model, group, terms, data);
             }
-            Some(VectorBatches { short, .. }) => short.run(model, knots, xs, terms, wanted, data),
+            Some(VectorBatches { short, .. }) => short.run(model, group, terms, data),
             None => {
                 for (k, data) in data.chunks_exact_mut(1).enumerate() {
-                    single.run(model, &knots[k..=k], &xs[k * nx..][..nx], terms, wanted, data);
+                    single.run(model, alone(k), terms, data);
                 }
             }
         }
         for (k, data) in data.iter_mut().enumerate().filter(|(_, data)| !data.residuals.is_written) {
-            let slopes = wanted != Wanted::Motion;
-            single.run_residuals_at(model, knots[k], &xs[k * nx..][..nx], terms, slopes, data);
+            single.run_residuals_at(model, alone(k), terms, data);
         }
-        *prepared = wanted;
     }
 
-    /// As [`ContinuousModel::calc`](crate::robot::ContinuousModel::calc).
-    pub(crate) fn calc(&mut self, KnotInput { lane, t, x, u }: KnotInput<'_>) -> (&[f64], f64) {
-        let Parts { terms, work: Work { data, .. }, .. } = self.parts();
+    /// Returns the accelerations, ℓ and the limits' term at a knot of the group that was solved.
+    pub(crate) fn values(&mut self, lane: usize, input: KnotInput<'_>, limited: bool) -> (&[f64], f64, f64) {
+        let (KnotInput { t, x, u }, Parts { terms, work: Work { data, .. }, .. }) = (input, self.parts());
         let data = &data[lane];
-        (&data.a, terms.calc(t, KnotState { x, u, data }))
+        let (cost, term) = terms.calc(t, KnotState { x, u, data }, limited);
+        (&data.a, cost, term)
     }
 
-    /// As [`ContinuousModel::calc_diff`](crate::robot::ContinuousModel::calc_diff).
-    pub(crate) fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, node: &mut LqNode) -> Derivatives<'_> {
-        let given = self.given;
+    /// Returns the derivatives of the accelerations at a knot of the group that was solved, and writes the derivatives of
+    /// `scale` · ℓ and of the limits' term to the LQ knot. If the group was solved for equations, the LQ knot is written
+    /// in inverse-dynamics form where that is possible.
+    pub(crate) fn slopes(
+        &mut self,
+        lane: usize,
+        input: KnotInput<'_>,
+        scale: f64,
+        Group { what, limited, .. }: Group<'_>,
+        knot: &mut LqKnot,
+    ) -> Derivatives<'_> {
+        let (given, KnotInput { t, x, u }) = (self.given, input);
         let Parts { model, actuation, terms, work, .. } = self.parts();
-        let in_equations = work.prepared == Wanted::Equations;
-        let inverse = in_equations && work.write_inverse_dynamics_form(terms, input, scale, node);
+        let equations = matches!(what, Evaluation::Equations(_));
+        let inverse = equations && work.write_equations(terms, lane, input, scale, knot);
         let Work { single, data, da_du, .. } = work;
-        if in_equations && !inverse {
-            let data = &mut data[input.lane..=input.lane];
-            single.run(model, &[input.t], input.x, terms, Wanted::Derivatives, data);
+        if equations && !inverse {
+            let group = Group { knots: &[t], xs: x, us: u, what: Evaluation::Derivatives, limited };
+            single.run(model, group, terms, &mut data[lane..=lane]);
         }
-        let KnotInput { lane, t, x, u } = input;
         let data = &data[lane];
         let [da_dq, da_dv, da_dtau] = &data.da;
         if !inverse {
             let sensitivities = DynamicsSensitivities { given, data, actuation };
-            terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, scale, node);
+            terms.calc_diff(t, KnotState { x, u, data }, &sensitivities, scale, limited, knot);
         }
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
 
-    /// As [`ContinuousModel::inverse_dynamics_form`](crate::robot::ContinuousModel::inverse_dynamics_form).
-    pub(crate) fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        let layout = self.terms.layout(); // Hessians that are no rows stand in Q, S and R, by the controls
+    /// Returns the number of accelerations and forces from which the equations of inverse dynamics start, and the maximum
+    /// numbers of dependent coordinates and of rows of costs; `None` without such equations.
+    pub(crate) fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
+        let layout = self.terms.layout(); // Hessians without rows are in Q, S and R, with respect to the controls
         let elimination = self.work.made()?.elimination.as_ref()?;
-        (!layout.curved).then_some([elimination.most_dependent(), layout.rows[0]])
+        let motion = self.model.nv() + self.capabilities.rows();
+        (!layout.curved).then_some((motion, [elimination.most_dependent(), layout.rows[0]]))
     }
 
-    /// As [`ContinuousModel::motion_size`](crate::robot::ContinuousModel::motion_size).
-    pub(crate) fn motion_size(&self) -> usize {
-        match self.inverse_dynamics_form() {
-            Some(_) => self.model.nv() + self.capabilities.rows(),
-            None => 0,
-        }
-    }
-
-    /// As [`ContinuousModel::motion`](crate::robot::ContinuousModel::motion).
-    pub(crate) fn motion(&self, lane: usize, to: &mut [f64]) {
-        let Some(work) = self.work.made() else { return };
-        let KnotData { a, lambda, .. } = &work.data[lane];
+    /// Copies the accelerations and forces at a knot of the group that was solved.
+    pub(crate) fn copy_motion(&mut self, lane: usize, to: &mut [f64]) {
+        let KnotData { a, lambda, .. } = &self.parts().work.data[lane];
         let (to_a, to_lambda) = to.split_at_mut(a.len());
         to_a.copy_from_slice(a);
         to_lambda[..lambda.len()].copy_from_slice(lambda);
     }
 
-    /// As [`ContinuousModel::set_motion`](crate::robot::ContinuousModel::set_motion).
-    pub(crate) fn set_motion(&mut self, lane: usize, from: &[f64]) {
-        let KnotData { a, lambda, .. } = &mut self.parts().work.data[lane];
-        let (from_a, from_lambda) = from.split_at(a.len());
-        a.copy_from_slice(from_a);
-        let rows = lambda.len();
-        lambda.copy_from_slice(&from_lambda[..rows]);
+    /// Sets the accelerations and forces of `count` knots, which are at the beginning of equal parts of `motions`.
+    fn set_motions(&mut self, count: usize, motions: &[f64]) {
+        let size = motions.len() / count;
+        for (KnotData { a, lambda, .. }, from) in self.parts().work.data.iter_mut().zip(motions.chunks_exact(size)) {
+            let (from_a, from_lambda) = from.split_at(a.len());
+            a.copy_from_slice(from_a);
+            let rows = lambda.len();
+            lambda.copy_from_slice(&from_lambda[..rows]);
+        }
     }
 
-    /// As [`ActionModel::outputs`](crate::ActionModel::outputs), of a knot that was prepared.
-    pub(crate) fn outputs(&mut self, lane: usize, show: &mut dyn FnMut(&str, &[f64])) {
+    /// Passes the outputs at the first knot of the group that was solved to `show`: see
+    /// [`Problem::outputs`](crate::Problem::outputs).
+    pub(crate) fn outputs(&mut self, show: &mut dyn FnMut(&str, &[f64])) {
         let Parts { capabilities, work, .. } = self.parts();
-        let data = &work.data[lane];
+        let data = &work.data[0];
         if capabilities.effort {
             show("acceleration", &data.a);
             show("effort", &data.tau);
@@ -380,20 +408,21 @@ impl RobotDynamics {
         }
     }
 
-    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺
+    /// Returns the smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S
+    /// Jᵀ]⁺
     /// g(q); and where accelerations are controls, none of these.
     #[track_caller]
-    pub(crate) fn hold(&mut self, x: &[f64]) -> Vec<f64> {
+    pub(crate) fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         assert_length("x", x.len(), nq + nv);
         // one state does not need the memory of many knots, which may not be there
-        let Self { model, actuation, law, .. } = &*self;
+        let Self { model, actuation, kind, .. } = &*self;
         let (data, zero, mut J) = (&mut Data::new(model), vec![0.0; nv], DMatrix::zeros(0, nv));
-        let (contacts, drives): (&[Contact], _) = match law {
-            Law::Inverse => return zero, // q̈ = u
-            Law::Contact(contacts, _) => (contacts, actuation),
-            Law::ContactInverse(contacts, drives) => (contacts, drives),
-            Law::None | Law::Free => (&[], actuation),
+        let (contacts, drives): (&[Contact], _) = match kind {
+            DynamicsKind::Inverse => return zero, // q̈ = u
+            DynamicsKind::Contact(contacts, _) => (contacts, actuation),
+            DynamicsKind::ContactInverse(contacts, drives) => (contacts, drives),
+            DynamicsKind::None | DynamicsKind::Free | DynamicsKind::Impact { .. } => (&[], actuation),
         };
         if !contacts.is_empty() {
             let mut set = constraint_set(model, contacts, SHARED).expect("was checked when it was given");
@@ -402,9 +431,9 @@ impl RobotDynamics {
             J = DMatrix::zeros(set.rows(), nv);
             set.jacobian(&mut J);
         }
-        let mut both = drives.hold(gravity(model, data, &x[..nq]), &J);
+        let mut both = drives.quasi_static(gravity(model, data, &x[..nq]), &J);
         let forces = both.split_off(drives.nu());
-        if matches!(law, Law::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ) = u, or τ = S u
+        if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ) = u, or τ = S u
     }
 
     /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
@@ -460,7 +489,7 @@ impl RobotDynamics {
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);
     }
 
-    /// The second derivatives of λᵀ(q ⊕ δq) by q and δq.
+    /// Computes the second derivatives of λᵀ(q ⊕ δq) by q and δq.
     pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
         let Parts { model, groups, work, .. } = self.parts();
         work.group_hessian.run(model, groups, dq, lambda, hessian);

@@ -2,13 +2,13 @@
 #![allow(non_snake_case)] // J
 
 use crate::robot::actuation::Actuation;
-use crate::robot::capabilities::Output;
-use crate::robot::knot::{KnotData, Sensitivities, add_matrix_row};
+use crate::robot::knot_data::Output;
+use crate::robot::knot_data::{KnotData, Sensitivities, add_matrix_row};
 use crate::robot::residuals::rows::Row;
 
-/// The derivatives of the outputs of a knot, from those in its data.
+/// Derivatives of the outputs of a knot, from those in its data.
 pub(crate) struct DynamicsSensitivities<'a> {
-    /// The output that is S u; of accelerations, the first nv controls, behind which forces of contacts follow.
+    /// Output that is S u; of accelerations, the first nv controls, behind which forces of contacts follow.
     pub given: Output,
     pub data: &'a KnotData,
     pub actuation: &'a Actuation,

@@ -2,9 +2,9 @@
 #![allow(non_snake_case)] // B, S, R
 
 use super::Integrator;
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 
-/// The polynomial u(s) that the controls of a knot follow, at the time s of its Δt, from 0 to 1.
+/// Polynomial u(s) that the controls of a knot follow, at the time s of its Δt, from 0 to 1.
 ///
 /// The controls of the knot are then w, the values of u at some nodes of the polynomial, one after the other:
 ///
@@ -28,17 +28,17 @@ use crate::lq::LqNode;
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum ControlPolynomial {
-    /// The same controls all the time.
+    /// Same controls all the time.
     #[default]
     Constant,
-    /// Of first degree.
+    /// First degree.
     Linear,
-    /// Of second degree.
+    /// Second degree.
     Quadratic,
 }
 
 impl ControlPolynomial {
-    /// The number of nodes: a knot has so many times nu controls.
+    /// Returns the number of nodes; a knot has nodes · nu controls.
     pub fn nodes(self) -> usize {
         match self {
             Self::Constant => 1,
@@ -47,7 +47,7 @@ impl ControlPolynomial {
         }
     }
 
-    /// The weights of w₀, w₁, w₂ in u(s), zeros where there is no such node.
+    /// Returns the weights of w₀, w₁, w₂ in u(s), zeros where there is no such node.
     pub fn weights(self, integrator: Integrator, s: f64) -> [f64; 3] {
         match (self, integrator) {
             (Self::Constant, _) => [1.0, 0.0, 0.0],
@@ -59,16 +59,16 @@ impl ControlPolynomial {
         }
     }
 
-    /// Whether the controls stay the same.
+    /// Returns whether the controls stay the same.
     pub(crate) fn is_constant(&self) -> bool {
         *self == Self::Constant
     }
 }
 
 /// Writes the derivatives of a step by u = w₀ as those by all w, the others zero.
-pub(super) fn widen(from: &LqNode, node: &mut LqNode) {
+pub(super) fn widen(from: &LqKnot, knot: &mut LqKnot) {
     let (n, nu) = (from.ndx(), from.nu());
-    let LqNode { A, B, Q, S, R, q, r, .. } = node;
+    let LqKnot { A, B, Q, S, R, q, r, .. } = knot;
     for part in [&mut *B, &mut *S, &mut *R] {
         part.fill(0.0);
     }

@@ -13,10 +13,10 @@
 use super::retraction::Retraction;
 use crate::lq::Hessian;
 use crate::lq::LARGEST_BLOCK;
-use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use core::ops::Range;
 
-/// The rows of a group of a column of a matrix, zeros after them.
+/// Rows of a group of a column of a matrix, zeros after them.
 type Rows = [f64; LARGEST_BLOCK];
 
 /// Scratch of the second derivatives of steps of one model.
@@ -27,7 +27,7 @@ pub(super) struct Curvature {
     mu: Vec<f64>,
     /// ∂²θ, ε in place of controls. Shape: nv and nv; nothing where there are no groups. Written by: `run`.
     theta: Hessian,
-    /// A group's rows of ∂ε/∂(x, u), ∂²θ/∂q∂(x, u), ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns each; nothing where there are
+    /// Group's rows of ∂ε/∂(x, u), ∂²θ/∂q∂(x, u), ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns each; nothing where there are
     /// no groups. Written by: `add_group`.
     columns: [Vec<Rows>; 3],
 }
@@ -40,7 +40,7 @@ impl Curvature {
         Self { groups, mu: vec![0.0; nv], theta: Hessian::zeros(n, n), columns }
     }
 
-    /// Writes ∂²ψ to `hessian`; says whether the model gives it.
+    /// Writes ∂²ψ to `hessian`; returns whether the model gives it.
     pub(super) fn run<M: ContinuousModel>(
         &mut self,
         model: &mut M,
@@ -55,7 +55,6 @@ impl Curvature {
         let (lambda_q, lambda_v) = lambda.split_at(nv);
         mu.copy_from_slice(lambda_q);
         if !groups.is_empty() {
-            model.prepare(&[input.t], input.x, input.u, Wanted::Motion);
             let a = model.calc(input).0;
             step.set_euler(&input.x[input.x.len() - nv..], a, dt);
             if !model.integrate_hessian(&step.delta, lambda_q, theta) {

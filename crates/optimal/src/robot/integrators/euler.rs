@@ -1,14 +1,17 @@
-//! Semi-implicit Euler, as Crocoddyl's: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt; the limits' term as it is.
+//! Semi-implicit Euler, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt. The limits' term is not scaled.
 #![allow(non_snake_case)] // A, B
 
 use super::retraction::Retraction;
-use crate::lq::LqNode;
-use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, limit_term};
+use super::{slopes, values};
+use crate::lq::LqKnot;
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
+use crate::robot::dynamics::batch::Group;
 use condyle_linalg::{Vector, Vectorized, at_level};
 
-/// Writes the next state of a prepared one; returns the cost.
+/// Writes the next state of a knot of the group that was solved; returns the cost.
 pub(super) fn calc<M: ContinuousModel>(
     model: &mut M,
+    lane: usize,
     input: KnotInput<'_>,
     dt: f64,
     step: &mut Retraction,
@@ -16,46 +19,48 @@ pub(super) fn calc<M: ContinuousModel>(
 ) -> f64 {
     let (q, v) = input.x.split_at(model.nq());
     let (q_next, v_next) = next.split_at_mut(q.len());
-    let (a, cost) = model.calc(input);
+    let (a, cost, term) = values(model, lane, input, true);
     for k in 0..v.len() {
         v_next[k] = v[k] + a[k] * dt; // v⁺ = v + a Δt
     }
     step.set_euler(v, a, dt);
     model.integrate(q, &step.delta, q_next);
-    dt * cost + limit_term(model)
+    dt * cost + term
 }
 
 /// Writes the derivatives of a step, with T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ for δ = v Δt + a Δt²:
 ///
 /// A = [T + E ∂a/∂q Δt², E (Δt 1 + ∂a/∂v Δt²); ∂a/∂q Δt, 1 + ∂a/∂v Δt],   B = [E ∂a/∂u Δt²; ∂a/∂u Δt]
 ///
-/// In inverse-dynamics form T and E are all of them.
+/// In inverse-dynamics form, only T and E are written.
 pub(super) fn calc_diff<M: ContinuousModel>(
     model: &mut M,
+    lane: usize,
     input: KnotInput<'_>,
     dt: f64,
+    group: Group<'_>,
     step: &mut Retraction,
-    node: &mut LqNode,
+    knot: &mut LqKnot,
 ) {
     let (nv, v) = (model.nv(), &input.x[model.nq()..]);
-    let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, dt, node);
+    let Derivatives { a, da_dq, da_dv, da_du } = slopes(model, lane, input, dt, group, knot);
     step.set_euler(v, a, dt);
-    let inverse = node.inverse_dynamics.active;
+    let inverse = knot.structure.is_inverse_dynamics();
     if !inverse {
-        let (by_q, by_v) = node.A.as_mut_slice().split_at_mut(2 * nv * nv);
-        let parts = [(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, node.B.as_mut_slice())];
+        let (by_q, by_v) = knot.A.as_mut_slice().split_at_mut(2 * nv * nv);
+        let parts = [(da_dq.as_slice(), by_q), (da_dv.as_slice(), by_v), (da_du, knot.B.as_mut_slice())];
         at_level(Steps(parts, nv, dt));
-        (0..nv).for_each(|k| node.A[(k, nv + k)] += dt);
+        (0..nv).for_each(|k| knot.A[(k, nv + k)] += dt);
     }
     step.differentiate(model);
-    step.write_blocks(model.groups(), node.structure.set_euler(dt, model.groups()));
+    step.write_blocks(model.groups(), knot.structure.set_euler(dt, model.groups()));
     if !inverse {
-        step.chain(model.groups(), &mut node.A);
-        step.multiply(model.groups(), &mut node.B);
+        step.chain(model.groups(), &mut knot.A);
+        step.multiply(model.groups(), &mut knot.B);
     }
 }
 
-/// Derivatives of accelerations, nv numbers a column, become those of steps: [a Δt²; a Δt].
+/// Conversion of derivatives of accelerations, nv numbers in each column, to derivatives of steps: [a Δt²; a Δt].
 struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
 
 impl<const N: usize> Vectorized for Steps<'_, N> {

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// The rule by which a knot steps through its time.
+/// Rule by which a knot steps through its time.
 ///
 /// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
 /// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
@@ -13,13 +13,13 @@ use core::fmt;
 pub enum Integrator {
     /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
     SemiImplicitEuler,
-    /// The midpoint rule, 2 evaluations.
+    /// Midpoint rule, 2 evaluations.
     #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_2"))]
     RungeKutta2,
     /// Heun's rule of third order, 3 evaluations.
     #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_3"))]
     RungeKutta3,
-    /// The classical rule, 4 evaluations.
+    /// Classical rule, 4 evaluations.
     #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_4"))]
     RungeKutta4,
 }

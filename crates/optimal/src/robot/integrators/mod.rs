@@ -1,4 +1,4 @@
-//! Integrators: from accelerations to the next state, and knots of some duration.
+//! Integrators: from accelerations to the next state, and knots with a duration.
 
 mod controls;
 mod curvature;
@@ -7,13 +7,15 @@ mod integrator;
 mod retraction;
 mod runge_kutta;
 
-use super::continuous::{ContinuousModel, KnotInput, Wanted, limit_term};
-use super::on_demand::OnDemand;
-use crate::ActionModel;
-use crate::Error;
+use super::continuous::{ContinuousModel, Derivatives, KnotInput};
+use super::dynamics::batch::Group;
+use super::dynamics::robot::RobotDynamics;
+use super::horizon::{PerKnot, PerModel};
+use super::knot_data::OnDemand;
 use crate::error::assert_length;
-use crate::lq::{Hessian, LqNode};
-use crate::problem::{Visit, hold};
+use crate::lq::{Hessian, LqKnot};
+use crate::problem::{Evaluation, KnotGroup, Results, Visit, quasi_static};
+use crate::{ActionModel, Error, GroupModel};
 pub use controls::ControlPolynomial;
 use controls::widen;
 use curvature::Curvature;
@@ -22,39 +24,82 @@ use retraction::Retraction;
 use runge_kutta::RungeKutta;
 use std::any::Any;
 
-/// A knot of Δt seconds of a [`ContinuousModel`], or the end, where time stands still and the cost is ℓ itself.
+/// Knot of Δt seconds of a [`ContinuousModel`], impact, or terminal knot, whose cost is ℓ itself.
 #[derive(Clone, Debug)]
 pub struct Integrated<M> {
     inner: M,
     method: Method,
+    /// Δt of the knots; not used by impacts and terminal knots.
+    durations: PerModel<PerKnot<f64>>,
     controls: ControlPolynomial,
-    /// The least and the greatest controls.
+    /// Lower and upper bounds of the controls.
     bounds: Option<[Vec<f64>; 2]>,
     work: OnDemand<Work>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Method {
-    /// The end of a horizon, where time stands still.
-    Still,
-    /// A semi-implicit Euler step of Δt.
-    Euler(f64),
-    /// A Runge–Kutta step of Δt, of so many stages.
-    RungeKutta(f64, usize),
+    /// End of a horizon, without a next state.
+    Terminal,
+    /// Jump of the velocity.
+    Impact,
+    /// Step of semi-implicit Euler.
+    Euler,
+    /// Runge–Kutta step with this number of stages.
+    RungeKutta(usize),
 }
 
-/// The memory of a step.
+/// Workspace of a step.
 #[derive(Debug)]
 struct Work {
     retraction: Retraction,
     curvature: Curvature,
     runge_kutta: Option<RungeKutta>,
-    /// A step by its first controls, where there are others.
-    first: Option<Box<LqNode>>,
+    /// Step by the first controls, if there are others.
+    first: Option<Box<LqKnot>>,
+}
+
+/// Message for a violated condition: the model was checked to be a robot.
+const ROBOT: &str = "the model is a robot";
+
+/// Computes the dynamics of a group of a robot's knots; user-defined models compute each knot by itself.
+fn solve<M: ContinuousModel>(model: &mut M, group: Group<'_>) {
+    if let Some(robot) = model.robot_mut() {
+        robot.solve(group);
+    }
+}
+
+/// Returns the accelerations, ℓ and the limits' term at a knot of the group that was solved.
+fn values<'m, M: ContinuousModel>(
+    model: &'m mut M,
+    lane: usize,
+    input: KnotInput<'_>,
+    limited: bool,
+) -> (&'m [f64], f64, f64) {
+    if model.robot().is_some() {
+        return model.robot_mut().expect(ROBOT).values(lane, input, limited);
+    }
+    let (a, cost) = model.calc(input);
+    (a, cost, 0.0)
+}
+
+/// Returns the derivatives at a knot of the group that was solved.
+fn slopes<'m, M: ContinuousModel>(
+    model: &'m mut M,
+    lane: usize,
+    input: KnotInput<'_>,
+    scale: f64,
+    group: Group<'_>,
+    knot: &mut LqKnot,
+) -> Derivatives<'m> {
+    match model.robot().is_some() {
+        true => model.robot_mut().expect(ROBOT).slopes(lane, input, scale, group, knot),
+        false => model.calc_diff(input, scale, knot),
+    }
 }
 
 impl<M: ContinuousModel> Integrated<M> {
-    /// A knot of Δt seconds.
+    /// Creates a knot of Δt seconds.
     ///
     /// # Errors
     /// [`Error::TimeStep`] if Δt is not above 0.
@@ -63,47 +108,55 @@ impl<M: ContinuousModel> Integrated<M> {
             return Err(Error::TimeStep { dt });
         }
         let method = match integrator {
-            Integrator::SemiImplicitEuler => Method::Euler(dt),
-            Integrator::RungeKutta2 => Method::RungeKutta(dt, 2),
-            Integrator::RungeKutta3 => Method::RungeKutta(dt, 3),
-            Integrator::RungeKutta4 => Method::RungeKutta(dt, 4),
+            Integrator::SemiImplicitEuler => Method::Euler,
+            Integrator::RungeKutta2 => Method::RungeKutta(2),
+            Integrator::RungeKutta3 => Method::RungeKutta(3),
+            Integrator::RungeKutta4 => Method::RungeKutta(4),
         };
-        let (controls, work) = (ControlPolynomial::Constant, OnDemand::default());
-        Ok(Self { inner: model, method, controls, bounds: None, work })
+        Ok(Self::of(model, method, dt))
     }
 
-    /// The end of a horizon, for a model without controls.
+    /// Creates the terminal knot of a model without controls.
     ///
     /// # Panics
     /// If the model has controls.
     #[track_caller]
-    pub fn end(model: M) -> Self {
+    pub fn without_time(model: M) -> Self {
         assert!(model.nu() == 0, "`model` has {} controls, expected 0 at the end", model.nu());
-        let (controls, work) = (ControlPolynomial::Constant, OnDemand::default());
-        Self { inner: model, method: Method::Still, controls, bounds: None, work }
+        Self::of(model, Method::Terminal, 0.0)
     }
 
-    /// The model, the rule of a step, and its memory.
-    fn parts(&mut self) -> (&mut M, Method, &mut Work) {
+    /// Creates an impact: the accelerations of the model are v⁺ − v.
+    pub(super) fn impact(model: M) -> Self {
+        Self::of(model, Method::Impact, 0.0)
+    }
+
+    fn of(inner: M, method: Method, dt: f64) -> Self {
+        let (controls, durations) = (ControlPolynomial::Constant, PerModel::new(PerKnot::new(dt)));
+        Self { inner, method, durations, controls, bounds: None, work: OnDemand::default() }
+    }
+
+    /// Returns the model, and the workspace of a step.
+    fn parts(&mut self) -> (&mut M, &mut Work) {
         let Self { inner, method, controls, work, .. } = self;
         let work = work.get(|| {
             let runge_kutta = match *method {
-                Method::RungeKutta(_, stages) => Some(RungeKutta::new(stages, inner, *controls)),
+                Method::RungeKutta(stages) => Some(RungeKutta::new(stages, inner, *controls)),
                 _ => None,
             };
             let (retraction, curvature) = (Retraction::new(inner.nv()), Curvature::new(inner));
             let first = (!controls.is_constant() && runge_kutta.is_none())
-                .then(|| Box::new(LqNode::zeros(2 * inner.nv(), inner.nu())));
+                .then(|| Box::new(LqKnot::zeros(2 * inner.nv(), inner.nu())));
             Work { retraction, curvature, runge_kutta, first }
         });
-        (inner, *method, work)
+        (inner, work)
     }
 
-    /// The same knot with controls that follow a polynomial through its time; the end has no controls and stays as it is.
-    /// Bounds, also those given before, hold at each node of the polynomial.
+    /// Returns the same knot with controls that follow a polynomial in time. A terminal knot has no controls and is
+    /// returned unchanged. Bounds, also those given before, hold at each node of the polynomial.
     #[must_use]
     pub fn with_controls(mut self, controls: ControlPolynomial) -> Self {
-        if self.method != Method::Still {
+        if self.method != Method::Terminal {
             (self.controls, self.work) = (controls, OnDemand::default());
         }
         let (nu, nodes) = (self.inner.nu(), self.controls.nodes());
@@ -111,10 +164,10 @@ impl<M: ContinuousModel> Integrated<M> {
         self
     }
 
-    /// The same knot with bounds on the controls u of its model, infinite where there is none.
+    /// Returns the same knot with bounds on the controls u of its model, infinite where a control is unbounded.
     ///
     /// # Panics
-    /// If there are not as many numbers of each as the model has controls.
+    /// If their lengths differ from the number of controls of the model.
     #[must_use]
     #[track_caller]
     pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
@@ -125,63 +178,22 @@ impl<M: ContinuousModel> Integrated<M> {
         self
     }
 
-    /// The model that is integrated.
+    /// Returns the model that is integrated.
     pub fn inner(&self) -> &M {
         &self.inner
     }
 
-    /// The model that is integrated, to change it.
+    /// Returns the model that is integrated, for changes.
     pub fn inner_mut(&mut self) -> &mut M {
         &mut self.inner
     }
 
-    /// Prepares the states of a group, as many at a time as there are lanes, and calls a function for each of them with its
-    /// number in the group. Runge–Kutta methods prepare each stage.
-    #[track_caller]
-    fn each(
-        &mut self,
-        knots: &[usize],
-        xs: &[f64],
-        us: &[f64],
-        wanted: Wanted,
-        mut visit: impl FnMut(&mut Self, KnotInput<'_>, usize),
-    ) {
-        let (nx, nu, lanes) = (self.nx(), self.nu(), self.lanes());
-        assert_length("xs", xs.len(), knots.len() * nx);
-        assert_length("us", us.len(), knots.len() * nu);
-        for from in (0..knots.len()).step_by(lanes) {
-            let to = (from + lanes).min(knots.len());
-            if !matches!(self.method, Method::RungeKutta(..)) {
-                let controls = &us[from * nu..][..(to - from) * self.inner.nu()]; // one knot, unless they are constant
-                self.inner.prepare(&knots[from..to], &xs[from * nx..to * nx], controls, wanted);
-            }
-            for i in from..to {
-                let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
-                let u = if matches!(self.method, Method::RungeKutta(..)) { u } else { &u[..self.inner.nu()] }; // u(0)
-                visit(self, KnotInput { lane: i - from, t: knots[i], x, u }, i);
-            }
-        }
-    }
-
-    /// Writes the derivatives of a group in inverse-dynamics form, from the motion that the nodes know, or else from its own.
-    fn write_equations(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        let (nx, nu, lanes, size) = (self.nx(), self.nu(), self.lanes(), self.motion_size());
-        for (k, nodes) in nodes.chunks_mut(lanes).enumerate() {
-            let (from, count) = (k * lanes, nodes.len());
-            let (knots, xs, us) =
-                (&knots[from..][..count], &xs[from * nx..][..count * nx], &us[from * nu..][..count * nu]);
-            if nodes.iter().all(|node| node.inverse_dynamics.knows_motion) {
-                for (lane, node) in nodes.iter().enumerate() {
-                    self.inner.set_motion(lane, &node.inverse_dynamics.motion[..size]);
-                }
-            } else {
-                self.inner.prepare(knots, xs, us, Wanted::Motion);
-            }
-            self.inner.prepare(knots, xs, us, Wanted::Equations);
-            for (lane, (node, &t)) in nodes.iter_mut().zip(knots).enumerate() {
-                let (x, u) = (&xs[lane * nx..][..nx], &us[lane * nu..][..nu]);
-                self.differentiate(KnotInput { lane, t, x, u }, node);
-            }
+    /// Passes the vectors that the dynamics of knot t compute to `show`: see
+    /// [`Problem::outputs`](crate::Problem::outputs).
+    pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        if self.method != Method::Terminal {
+            let u = &u[..self.inner.nu()]; // u(0)
+            self.inner.outputs(KnotInput { t, x, u }, show);
         }
     }
 
@@ -192,35 +204,182 @@ impl<M: ContinuousModel> Integrated<M> {
         assert_length("u", u.len(), self.nu());
     }
 
-    /// Whether a step is one of semi-implicit Euler with controls that stay the same.
+    /// Returns whether several states are computed side by side: not by Runge–Kutta methods, which compute stage after
+    /// stage, and not with controls that change within a knot.
     fn is_simple_step(&self) -> bool {
-        matches!(self.method, Method::Euler(_)) && self.controls.is_constant()
+        !matches!(self.method, Method::RungeKutta(_)) && self.controls.is_constant()
     }
 
-    /// Writes the next state of a prepared one; returns the cost.
-    fn step(&mut self, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
-        match self.parts() {
-            (inner, Method::Euler(dt), work) => euler::calc(inner, input, dt, &mut work.retraction, next),
-            (inner, Method::RungeKutta(dt, _), Work { runge_kutta: Some(method), .. }) => {
-                method.calc(inner, input, dt, next)
+    /// Writes the next state of a knot of the group that was solved; returns the cost.
+    fn step(&mut self, lane: usize, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
+        let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
+        let (inner, Work { retraction, runge_kutta, .. }) = self.parts();
+        match (method, runge_kutta) {
+            (Method::Euler, _) => euler::calc(inner, lane, input, dt, retraction, next),
+            (_, Some(method)) => method.calc(inner, input, dt, next),
+            (Method::Impact, _) => {
+                let nq = inner.nq();
+                let (change, cost, term) = values(inner, lane, input, true);
+                next.copy_from_slice(input.x);
+                change.iter().enumerate().for_each(|(k, change)| next[nq + k] += change);
+                cost + term
             }
-            (inner, ..) => inner.calc(input).1 + limit_term(inner),
+            _ => {
+                let (_, cost, term) = values(inner, lane, input, true);
+                cost + term
+            }
         }
     }
 
-    /// Writes the derivatives at a prepared state.
-    fn differentiate(&mut self, input: KnotInput<'_>, node: &mut LqNode) {
-        match self.parts() {
-            (inner, Method::Euler(dt), Work { retraction, first: Some(first), .. }) => {
-                euler::calc_diff(inner, input, dt, retraction, first);
-                widen(first, node);
+    /// Writes the derivatives at a knot of the group that was solved.
+    fn differentiate(&mut self, lane: usize, input: KnotInput<'_>, group: Group<'_>, knot: &mut LqKnot) {
+        let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
+        let (inner, Work { retraction, runge_kutta, first, .. }) = self.parts();
+        match (method, runge_kutta, first) {
+            (Method::Euler, _, Some(first)) => {
+                euler::calc_diff(inner, lane, input, dt, group, retraction, first);
+                widen(first, knot);
             }
-            (inner, Method::Euler(dt), work) => euler::calc_diff(inner, input, dt, &mut work.retraction, node),
-            (inner, Method::RungeKutta(dt, _), Work { runge_kutta: Some(method), retraction, .. }) => {
-                method.calc_diff(inner, input, dt, retraction, node);
+            (Method::Euler, ..) => euler::calc_diff(inner, lane, input, dt, group, retraction, knot),
+            (_, Some(method), _) => method.calc_diff(inner, input, dt, retraction, knot),
+            (Method::Impact, ..) => {
+                let nv = inner.nv();
+                let Derivatives { da_dq, da_dv, .. } = slopes(inner, lane, input, 1.0, group, knot);
+                // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v], as for an Euler step with Δt = 0
+                knot.structure.set_euler(0.0, &[]);
+                knot.A.fill_with_identity();
+                let mut below = knot.A.rows_mut(nv, nv);
+                below.columns_mut(0, nv).copy_from(da_dq);
+                below.columns_mut(nv, nv).zip_apply(da_dv, |a, change| *a += change);
             }
-            (inner, ..) => _ = inner.calc_diff(input, 1.0, node),
+            _ => _ = slopes(inner, lane, input, 1.0, group, knot),
         }
+    }
+}
+
+impl<M: ContinuousModel> KnotGroup for Integrated<M> {
+    fn lanes(&mut self) -> usize {
+        GroupModel::lanes(self)
+    }
+
+    /// Computes dynamics, steps, costs and limits of a group, as many knots at a time as there are lanes.
+    #[track_caller]
+    fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
+        let (nx, nu, inner_nu, count) = (self.nx(), self.nu(), self.inner.nu(), knots.len());
+        assert_length("xs", xs.len(), count * nx);
+        assert_length("us", us.len(), count * nu);
+        match what {
+            Evaluation::Values => {
+                assert_length("next", results.next.len(), count * nx);
+                assert_length("costs", results.costs.len(), count);
+            }
+            _ => assert_length("lq_knots", results.lq_knots.len(), count),
+        }
+        let motion = KnotGroup::inverse_dynamics(self).map_or(0, |(size, _)| size);
+        let what = if motion == 0 && what != Evaluation::Values { Evaluation::Derivatives } else { what };
+        let (lanes, room) = (GroupModel::lanes(self), results.motions.len() / count);
+        for from in (0..count).step_by(lanes) {
+            let to = (from + lanes).min(count);
+            let (knots, xs) = (&knots[from..to], &xs[from * nx..to * nx]);
+            let controls = &us[from * nu..][..(to - from) * inner_nu]; // one knot, unless they are constant
+            let group = Group { knots, xs, us: controls, what: what.part(from..to, count), limited: true };
+            if !matches!(self.method, Method::RungeKutta(_)) {
+                solve(&mut self.inner, group);
+            }
+            for i in from..to {
+                let lane = i - from;
+                let u = &us[i * nu..][..nu];
+                let u = if matches!(self.method, Method::RungeKutta(_)) { u } else { &u[..inner_nu] }; // u(0)
+                let input = KnotInput { t: knots[lane], x: &xs[lane * nx..][..nx], u };
+                if what != Evaluation::Values {
+                    self.differentiate(lane, input, group, &mut results.lq_knots[i]);
+                    continue;
+                }
+                if let Some(robot) = self.inner.robot_mut().filter(|_| motion.min(room) > 0) {
+                    robot.copy_motion(lane, &mut results.motions[i * room..][..motion]);
+                }
+                results.costs[i] = self.step(lane, input, &mut results.next[i * nx..][..nx]);
+            }
+        }
+    }
+
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
+        if let Some(robot) = self.inner.robot_mut() {
+            robot.terms.limits.visit(t, visit);
+        }
+    }
+
+    fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
+        let euler = self.method == Method::Euler && self.controls.is_constant();
+        self.inner.robot().filter(|_| euler)?.inverse_dynamics()
+    }
+
+    fn reserve(&mut self) {
+        if let Some(robot) = self.inner.robot_mut() {
+            robot.reserve();
+        }
+        self.parts();
+    }
+
+    fn merge(&mut self, other: &mut dyn ActionModel, place: Option<usize>) -> bool {
+        let other: &mut dyn Any = other;
+        let Some(other) = other.downcast_mut::<Self>() else { return false };
+        let rule = |one: &Self| (one.method, one.controls);
+        if rule(self) != rule(other) || self.bounds != other.bounds {
+            return false;
+        }
+        let (Some(robot), Some(others)) = (self.inner.robot_mut(), other.inner.robot_mut()) else { return false };
+        let same = robot.merge(others, place);
+        if same {
+            self.durations.append(&mut other.durations, place);
+        }
+        same
+    }
+
+    fn choose(&mut self, model: usize) {
+        self.durations.choose(model);
+        if let Some(robot) = self.inner.robot_mut() {
+            robot.terms.choose(model);
+        }
+    }
+
+    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        self.durations.serve(t, horizon, model);
+        if let Some(robot) = self.inner.robot_mut() {
+            robot.terms.serve(t, horizon, model);
+        }
+    }
+
+    fn set_duration(&mut self, t: usize, dt: f64) -> bool {
+        let has_duration = !matches!(self.method, Method::Terminal | Method::Impact);
+        if has_duration {
+            self.durations.chosen_mut().set(Some(t), dt);
+        }
+        has_duration
+    }
+
+    fn show_outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        self.outputs(t, x, u, show);
+    }
+
+    fn robot(&mut self) -> Option<&mut RobotDynamics> {
+        self.inner.robot_mut()
+    }
+}
+
+impl<M: ContinuousModel> GroupModel for Integrated<M> {
+    fn lanes(&self) -> usize {
+        if self.is_simple_step() { self.inner.robot().map_or(1, RobotDynamics::lanes) } else { 1 }
+    }
+
+    #[track_caller]
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        self.evaluate(knots, xs, us, Evaluation::Values, &mut Results::values(next, costs, &mut []));
+    }
+
+    #[track_caller]
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        self.evaluate(knots, xs, us, Evaluation::Derivatives, &mut Results::derivatives(lq_knots));
     }
 }
 
@@ -241,137 +400,66 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
-    fn is_end(&self) -> bool {
-        self.method == Method::Still
-    }
-
-    fn lanes(&self) -> usize {
-        if self.is_simple_step() { self.inner.lanes() } else { 1 }
+    fn is_terminal(&self) -> bool {
+        self.method == Method::Terminal
     }
 
     fn shift(&mut self) {
+        self.durations.all_mut().iter_mut().for_each(PerKnot::shift);
         self.inner.shift();
     }
 
-    fn reserve(&mut self) {
-        self.inner.reserve();
-        self.parts();
-    }
-
-    fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
-        let other: &mut dyn Any = other;
-        let Some(other) = other.downcast_mut::<Self>() else { return false };
-        let rule = |one: &Self| (one.method, one.controls);
-        rule(self) == rule(other) && self.bounds == other.bounds && self.inner.merge(&mut other.inner)
-    }
-
-    fn choose(&mut self, model: usize) {
-        self.inner.choose(model);
-    }
-
-    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
-        self.inner.serve(t, horizon, model);
-    }
-
-    fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
-        if self.is_simple_step() { self.inner.inverse_dynamics_form() } else { None }
-    }
-
-    fn fork(&self) -> Option<Box<dyn ActionModel>> {
-        let Self { inner, method, controls, bounds, work } = self;
-        let (inner, bounds, work) = (inner.fork()?, bounds.clone(), work.clone());
-        Some(Box::new(Self { inner, method: *method, controls: *controls, bounds, work }))
-    }
-
-    #[track_caller]
-    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        let nx = self.nx();
-        assert_length("next", next.len(), knots.len() * nx);
-        assert_length("costs", costs.len(), knots.len());
-        self.each(knots, xs, us, Wanted::Motion, |knot, input, i| {
-            costs[i] = knot.step(input, &mut next[i * nx..][..nx]);
-        });
-    }
-
-    fn motion_size(&self) -> usize {
-        if self.is_simple_step() { self.inner.motion_size() } else { 0 }
-    }
-
-    #[track_caller]
-    fn calc_group_with_motion(
-        &mut self,
-        knots: &[usize],
-        xs: &[f64],
-        us: &[f64],
-        next: &mut [f64],
-        costs: &mut [f64],
-        motions: &mut [f64],
-    ) {
-        let (nx, room, size) = (self.nx(), motions.len() / knots.len(), self.motion_size());
-        assert_length("next", next.len(), knots.len() * nx);
-        assert_length("costs", costs.len(), knots.len());
-        self.each(knots, xs, us, Wanted::Motion, |knot, input, i| {
-            if size > 0 {
-                knot.inner.motion(input.lane, &mut motions[i * room..][..size]);
-            }
-            costs[i] = knot.step(input, &mut next[i * nx..][..nx]);
-        });
-    }
-
-    #[track_caller]
-    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        assert_length("nodes", nodes.len(), knots.len());
-        if nodes.first().is_some_and(|node| node.inverse_dynamics.wanted) && self.inverse_dynamics_form().is_some() {
-            return self.write_equations(knots, xs, us, nodes);
-        }
-        self.each(knots, xs, us, Wanted::Derivatives, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
+    fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
+        let Self { inner, method, durations, controls, bounds, work } = self;
+        let (inner, durations, bounds, work) = (inner.try_clone()?, durations.clone(), bounds.clone(), work.clone());
+        Some(Box::new(Self { inner, method: *method, durations, controls: *controls, bounds, work }))
     }
 
     #[track_caller]
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.assert_knot(x, u);
-        if self.method != Method::Still {
+        if self.method != Method::Terminal {
             assert_length("next", next.len(), self.nx());
         }
-        let mut cost = 0.0;
-        self.each(&[t], x, u, Wanted::Motion, |knot, input, _| cost = knot.step(input, next));
-        cost
+        let stages = matches!(self.method, Method::RungeKutta(_));
+        let input = KnotInput { t, x, u: if stages { u } else { &u[..self.inner.nu()] } }; // u(0)
+        if !stages {
+            solve(&mut self.inner, Group::one(&input, Evaluation::Values, true));
+        }
+        self.step(0, input, next)
     }
 
     #[track_caller]
-    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.assert_knot(x, u);
-        self.each(&[t], x, u, Wanted::Derivatives, |knot, input, _| knot.differentiate(input, node));
-    }
-
-    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
-        if self.method != Method::Still {
-            let u = &u[..self.inner.nu()]; // u(0)
-            self.inner.prepare(&[t], x, u, Wanted::Motion);
-            self.inner.outputs(KnotInput { lane: 0, t, x, u }, show);
-        }
+        self.calc_diff_group(&[t], x, u, core::slice::from_mut(knot));
     }
 
     #[track_caller]
-    fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
-        match self.inner.hold(x) {
+    fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
+        match self.inner.quasi_static(x) {
             Some(u) => u.repeat(self.controls.nodes()),
-            None => hold::newton(self, t, x),
+            None => quasi_static::newton(self, t, x),
         }
     }
 
-    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
-        if let Some(limits) = self.inner.limits() {
-            limits.visit(t, visit);
-        }
+    fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
+        Some(self)
     }
 
-    /// Second derivatives by semi-implicit Euler, of constant controls: see `curvature.rs`.
+    fn knot_group(&self) -> Option<&dyn KnotGroup> {
+        Some(self)
+    }
+
+    fn knot_group_mut(&mut self) -> Option<&mut dyn KnotGroup> {
+        Some(self)
+    }
+
+    /// Computes second derivatives of semi-implicit Euler, for constant controls: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
-        let (inner, Method::Euler(dt), Work { retraction, curvature, first: None, .. }) = self.parts() else {
-            return false;
-        };
-        curvature.run(inner, dt, KnotInput { lane: 0, t, x, u }, lambda, retraction, hessian)
+        let (euler, dt) = (self.method == Method::Euler, *self.durations.at(t).at(t));
+        let (inner, Work { retraction, curvature, first: None, .. }) = self.parts() else { return false };
+        euler && curvature.run(inner, dt, KnotInput { t, x, u }, lambda, retraction, hessian)
     }
 
     fn check_state(&self, x: &[f64]) -> Result<(), String> {

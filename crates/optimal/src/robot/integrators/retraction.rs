@@ -1,5 +1,5 @@
-//! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the identity
-//! but for a block for each group of positions that is no vector space.
+//! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the identity,
+//! except a block for each group of positions that is not a vector space.
 #![allow(non_snake_case)] // T, E
 
 use crate::EulerBlock;
@@ -9,7 +9,7 @@ use condyle_linalg::{Vector, Vectorized, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// A step of a configuration and its Jacobians.
+/// Step of a configuration and its Jacobians.
 #[derive(Debug)]
 pub(super) struct Retraction {
     /// δ. Shape: nv.
@@ -48,7 +48,7 @@ impl Retraction {
         }
     }
 
-    /// E X in place of X, whose first nv rows are those of δ.
+    /// Replaces X by E X, where the first nv rows of X belong to δ.
     pub(super) fn multiply(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
         for group in groups {
             let rows = X.nrows();
@@ -73,7 +73,7 @@ impl Retraction {
     }
 }
 
-/// The rows of a group times its block of E, in place.
+/// Rows of a group times its block of E, in place.
 struct Multiply<'a> {
     E: &'a DMatrix<f64>,
     group: &'a Range<usize>,

@@ -13,20 +13,23 @@
 use super::Integrator;
 use super::controls::ControlPolynomial;
 use super::retraction::Retraction;
-use crate::lq::LqNode;
-use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted, activate_limits, limit_term};
+use super::{slopes, solve, values};
+use crate::lq::LqKnot;
+use crate::problem::Evaluation;
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
+use crate::robot::dynamics::batch::Group;
 use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
 pub(super) struct RungeKutta {
-    /// The times of the stages in the step, and their weights.
+    /// Times of the stages in the step, and their weights.
     c: &'static [f64],
     b: &'static [f64],
-    /// The weights of the controls w in those of each stage.
+    /// Weights of the controls w in the controls of each stage.
     l: [[f64; 3]; 4],
-    /// The controls of a stage. Shape: nu.
+    /// Controls of a stage. Shape: nu.
     u: Vec<f64>,
-    /// The state y of a stage. Shape: nq + nv.
+    /// State y of a stage. Shape: nq + nv.
     y: Vec<f64>,
     /// k of a stage, the step to the next one, and Σ b k. Shape: 2 nv.
     k: Vec<f64>,
@@ -36,15 +39,15 @@ pub(super) struct RungeKutta {
     dy: DMatrix<f64>,
     dk: DMatrix<f64>,
     dsum: DMatrix<f64>,
-    /// The cost at a stage.
-    stage: LqNode,
+    /// Cost at a stage.
+    stage: LqKnot,
     /// Products with the stage's Hessian. Shape: (2 nv + nw) × (2 nv + nw) and 2 nv × (2 nv + nw).
     H: DMatrix<f64>,
     W: DMatrix<f64>,
 }
 
 impl RungeKutta {
-    /// A method of two, three or four stages.
+    /// Returns a method of two, three or four stages.
     pub(super) fn new<M: ContinuousModel>(stages: usize, model: &M, controls: ControlPolynomial) -> Self {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
         let (c, b): (&[f64], &[f64]) = match stages {
@@ -72,7 +75,7 @@ impl RungeKutta {
             dy: wide.clone(),
             dk: wide.clone(),
             dsum: wide.clone(),
-            stage: LqNode::zeros(n, nu),
+            stage: LqKnot::zeros(n, nu),
             H: DMatrix::zeros(n + nw, n + nw),
             W: wide,
         }
@@ -109,18 +112,15 @@ impl RungeKutta {
         for i in 0..self.b.len() {
             self.advance(model, x, self.c[i] * dt);
             self.set_controls(i, w);
-            model.prepare(&[t], &self.y, &self.u, Wanted::Motion);
-            let (a, rate) = model.calc(KnotInput { lane: 0, t, x: &self.y, u: &self.u });
+            let (input, limited) = (KnotInput { t, x: &self.y, u: &self.u }, i == 0);
+            solve(model, Group::one(&input, Evaluation::Values, limited));
+            let (a, rate, limits) = values(model, 0, input, limited);
+            term += limits; // zero at later stages
             cost += self.b[i] * rate;
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
             (0..2 * nv).for_each(|j| self.sum[j] += dt * self.b[i] * self.k[j]);
-            if i == 0 {
-                term = limit_term(model);
-                activate_limits(model, false);
-            }
         }
-        activate_limits(model, true);
         model.integrate(&x[..nq], &self.sum[..nv], &mut next[..nq]);
         (0..nv).for_each(|j| next[nq + j] = x[nq + j] + self.sum[nv + j]);
         dt * cost + term
@@ -133,15 +133,15 @@ impl RungeKutta {
         KnotInput { t, x, u: w, .. }: KnotInput<'_>,
         dt: f64,
         step: &mut Retraction,
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
         let (n, nw) = (2 * nv, w.len());
-        for field in [&mut node.Q, &mut node.S, &mut node.R] {
+        for field in [&mut knot.Q, &mut knot.S, &mut knot.R] {
             field.fill(0.0);
         }
-        node.q.fill(0.0);
-        node.r.fill(0.0);
+        knot.q.fill(0.0);
+        knot.r.fill(0.0);
         self.sum.fill(0.0);
         self.k.fill(0.0);
         self.dk.fill(0.0);
@@ -155,9 +155,10 @@ impl RungeKutta {
             step.differentiate(model);
             step.chain(model.groups(), &mut self.dy);
             self.set_controls(i, w);
-            model.prepare(&[t], &self.y, &self.u, Wanted::Derivatives);
-            let input = KnotInput { lane: 0, t, x: &self.y, u: &self.u };
-            let Derivatives { a, da_dq, da_dv, da_du } = model.calc_diff(input, weight, &mut self.stage);
+            let (input, limited) = (KnotInput { t, x: &self.y, u: &self.u }, i == 0 && model.robot().is_some());
+            let group = Group::one(&input, Evaluation::Derivatives, i == 0);
+            solve(model, group);
+            let Derivatives { a, da_dq, da_dv, da_du } = slopes(model, 0, input, weight, group, &mut self.stage);
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
             for j in 0..n + nw {
@@ -172,23 +173,21 @@ impl RungeKutta {
                 }
             }
             (0..n).for_each(|j| self.sum[j] += weight * self.k[j]);
-            let limited = i == 0 && activate_limits(model, false);
             if weight != 0.0 || limited {
                 self.dk.iter().zip(self.dsum.iter_mut()).for_each(|(dk, sum)| *sum += weight * dk);
-                self.add_cost(node, i, n, nu);
+                self.add_cost(knot, i, n, nu);
             }
         }
-        activate_limits(model, true);
         step.delta.copy_from_slice(&self.sum[..nv]);
         step.differentiate(model);
         step.chain(model.groups(), &mut self.dsum);
-        node.A.copy_from(&self.dsum.columns(0, n));
-        node.B.copy_from(&self.dsum.columns(n, nw));
+        knot.A.copy_from(&self.dsum.columns(0, n));
+        knot.B.copy_from(&self.dsum.columns(n, nw));
     }
 
     /// Adds the cost of stage i, a function of y and uᵢ, as one of x and w: H += Yᵀ Q Y + …, with Y = ∂y/∂(x, w) and
     /// ∂uᵢ/∂wₖ = lₖ.
-    fn add_cost(&mut self, node: &mut LqNode, i: usize, n: usize, nu: usize) {
+    fn add_cost(&mut self, knot: &mut LqKnot, i: usize, n: usize, nu: usize) {
         let Self { l, dy: Y, stage, H, W, .. } = self;
         let (l, nw) = (l[i], Y.ncols() - n);
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
@@ -212,13 +211,13 @@ impl RungeKutta {
                 }
             }
             if j < n {
-                node.q[j] += dot(q, y);
+                knot.q[j] += dot(q, y);
             } else {
-                node.r[j - n] += dot(q, y) + l[(j - n) / nu] * stage.r[(j - n) % nu];
+                knot.r[j - n] += dot(q, y) + l[(j - n) / nu] * stage.r[(j - n) % nu];
             }
         }
-        node.Q += H.view((0, 0), (n, n));
-        node.S += H.view((0, n), (n, nw));
-        node.R += H.view((n, n), (nw, nw));
+        knot.Q += H.view((0, 0), (n, n));
+        knot.S += H.view((0, n), (n, nw));
+        knot.R += H.view((n, n), (nw, nw));
     }
 }

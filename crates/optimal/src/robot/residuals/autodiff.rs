@@ -8,15 +8,16 @@ use condyle_spatial::Scalar;
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A residual r(t, x, u) of a robot that is written for any [`Scalar`], so that [`OwnResidual::autodiff`] differentiates it.
+/// Residual r(t, x, u) of a robot that is written for any [`Scalar`], so that [`OwnResidual::autodiff`] differentiates
+/// it.
 ///
 /// Mark `calc` with `#[inline(always)]`: it is then compiled for the vector registers in which the Jacobian is computed.
 pub trait GenericResidual: Any + Send + Sync {
-    /// The number of entries of r.
+    /// Returns the number of entries of r.
     fn size(&self) -> usize;
 
-    /// The arguments on which r depends, which must not change: all by default. Columns of the others are zero and are not
-    /// computed, so that fewer arguments take less time.
+    /// Returns the arguments on which r depends, which must not change: all by default. Columns of the others are zero
+    /// and are not computed, so that fewer arguments take less time.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
@@ -25,18 +26,18 @@ pub trait GenericResidual: Any + Send + Sync {
     fn calc<S: Scalar>(&self, state: &mut RobotState<'_, S>, r: &mut [S]);
 }
 
-/// A robot's state and controls at a knot in numbers of any scalar, with the kinematics that follow from them.
+/// Robot's state and controls at a knot in numbers of any scalar, with the kinematics that follow from them.
 #[derive(Debug)]
 pub struct RobotState<'a, S> {
-    /// The robot.
+    /// Robot.
     pub model: &'a Model,
-    /// The number of the knot.
+    /// Number of the knot.
     pub t: usize,
-    /// The position, nq numbers.
+    /// Position, nq numbers.
     pub q: &'a [S],
-    /// The velocity, nv numbers.
+    /// Velocity, nv numbers.
     pub v: &'a [S],
-    /// The controls of the knot, nu numbers; none at the terminal knot and at an impact.
+    /// Controls of the knot, nu numbers; none at the terminal knot and at an impact.
     pub u: &'a [S],
     data: &'a mut Data<S>,
     /// Whether `data` holds the placements at q.
@@ -44,7 +45,7 @@ pub struct RobotState<'a, S> {
 }
 
 impl<'a, S: Scalar> RobotState<'a, S> {
-    /// A knot t at x = (q, v).
+    /// Returns a knot t at x = (q, v).
     fn new(model: &'a Model, data: &'a mut Data<S>, t: usize, x: &'a [S], u: &'a [S]) -> Self {
         let (q, v) = x.split_at(model.nq());
         Self { model, t, q, v, u, data, placed: false }
@@ -78,7 +79,7 @@ impl OwnResidual {
     /// state, by dual numbers: four or eight columns take one evaluation in vector registers (AVX2, NEON, SIMD128 or
     /// AVX-512). The Hessian of its cost is Gauss–Newton's.
     ///
-    /// Copies share the function. A thread takes scratch that no other one uses, and allocates only where there is none yet.
+    /// Copies share the function. A thread takes a workspace that no other thread uses, and allocates one only if all are in use.
     ///
     /// ```
     /// use condyle_dynamics::robots;
@@ -108,7 +109,7 @@ impl OwnResidual {
     }
 }
 
-/// A generic residual with the workspaces in which it is computed.
+/// Generic residual with the workspaces in which it is computed.
 struct Differentiated<F> {
     model: Arc<Model>,
     function: F,
@@ -116,14 +117,14 @@ struct Differentiated<F> {
     idle: Mutex<Vec<Scratch>>,
 }
 
-/// The workspaces of one thread, for knots with nu controls.
+/// Workspaces of one thread, for knots with nu controls.
 struct Scratch {
     nu: usize,
     data: Box<Data<f64>>,
     /// (q, v, u). Written by: `calc_diff`.
     state: Vec<f64>,
     jacobian: LaneJacobian,
-    /// The columns of (δq, δv, δu) that are computed.
+    /// Columns of (δq, δv, δu) that are computed.
     columns: Vec<usize>,
 }
 
@@ -152,7 +153,7 @@ impl<F: GenericResidual> Differentiated<F> {
     }
 }
 
-/// A generic residual at a knot as a function of (q, v, u).
+/// Generic residual at a knot as a function of (q, v, u).
 struct AtKnot<'a, F> {
     model: &'a Model,
     function: &'a F,

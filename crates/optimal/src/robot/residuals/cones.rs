@@ -24,13 +24,13 @@ pub struct FrictionCone {
     pub rotation: Mat3<f64>,
     /// μ.
     pub mu: f64,
-    /// The number of sides of the pyramid; even, 4 to [`MOST_FACETS`](Self::MOST_FACETS).
+    /// Number of sides of the pyramid; even, 4 to [`MOST_FACETS`](Self::MOST_FACETS).
     pub facets: usize,
     /// Whether the pyramid lies inside of the cone, or around it.
     pub inner: bool,
-    /// The least normal force (N).
+    /// Least normal force (N).
     pub least: f64,
-    /// The greatest normal force (N).
+    /// Greatest normal force (N).
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::greatest"))]
     pub greatest: f64,
 }
@@ -50,17 +50,18 @@ pub struct FrictionCone {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct WrenchCone {
-    /// The cone of the force.
+    /// Cone of the force.
     pub friction: FrictionCone,
-    /// The rectangle's sides along the surface's x and y (m).
+    /// Rectangle's sides along the surface's x and y (m).
     pub size: [f64; 2],
 }
 
 impl FrictionCone {
-    /// The most sides of a pyramid: 1000 of them are within 5e-6 of the round cone.
+    /// Most sides of a pyramid: 1000 of them are within 5e-6 of the round cone.
     pub const MOST_FACETS: usize = 1000;
 
-    /// A pyramid of four sides around the cone on a surface whose normal is z, for any normal force that pushes.
+    /// Returns a pyramid of four sides around the cone on a surface whose normal is z, for any normal force that
+    /// pushes.
     pub fn new(mu: f64) -> Self {
         Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
     }
@@ -96,7 +97,7 @@ impl FrictionCone {
         assert!((1..=most).contains(&facets), "`facets` is {facets}, expected from 4 to {most}");
     }
 
-    /// The least and greatest values of A f.
+    /// Returns the least and greatest values of A f.
     ///
     /// # Panics
     /// If there are no sides, or more than 1000.
@@ -112,13 +113,13 @@ impl FrictionCone {
     /// Checks the numbers of the cone, as problems do that it comes into.
     ///
     /// # Errors
-    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation is none,
+    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation is invalid,
     /// or no normal force is between the bounds.
     pub fn check(&self) -> Result<(), Error> {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }
 
-    /// A message for what makes no sense.
+    /// Returns a message for what makes no sense.
     pub(crate) fn wrong(&self) -> Option<String> {
         let Self { least, greatest, .. } = *self;
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
@@ -136,14 +137,15 @@ impl FrictionCone {
     }
 }
 
-/// A message for sides of a rectangle that are none.
+/// Returns the message for invalid sides of a rectangle.
 pub(crate) fn wrong_size([length, width]: [f64; 2]) -> Option<String> {
     let good = |side: f64| side >= 0.0 && side.is_finite();
     (!(good(length) && good(width)))
         .then(|| format!("its sides are {length} and {width} m, expected finite numbers of at least 0"))
 }
 
-/// The four rows that keep the centre of pressure within a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x f_z.
+/// Returns the four rows that keep the centre of pressure within a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x
+/// f_z.
 pub(crate) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6]; 4] {
     let [x, y, z] = R.columns();
     [(width, x), (width, -x), (length, y), (length, -y)].map(|(side, axis)| {
@@ -156,12 +158,12 @@ impl WrenchCone {
     /// Checks the numbers of the cone, as problems do that it comes into.
     ///
     /// # Errors
-    /// [`Error::Cone`] for those of [`FrictionCone::check`], and a side that is negative or not finite.
+    /// [`Error::Cone`] as for [`FrictionCone::check`], and for a side that is negative or not finite.
     pub fn check(&self) -> Result<(), Error> {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }
 
-    /// A message for what makes no sense.
+    /// Returns a message for what makes no sense.
     pub(crate) fn wrong(&self) -> Option<String> {
         self.friction.wrong().or_else(|| wrong_size(self.size))
     }
@@ -188,7 +190,7 @@ impl WrenchCone {
         rows
     }
 
-    /// The least and greatest values of A w.
+    /// Returns the least and greatest values of A w.
     ///
     /// # Panics
     /// If there are no sides, or more than 1000.

@@ -2,7 +2,7 @@
 
 use condyle_dynamics::{Frame, FrameKind, Model};
 
-/// A frame by its name. Its number is looked up in the robot for which an action is made, which refuses a name that is
+/// Frame by its name. Its number is looked up in the robot for which an action is made, which refuses a name that is
 /// unknown there.
 ///
 /// ```
@@ -18,9 +18,9 @@ use condyle_dynamics::{Frame, FrameKind, Model};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FrameName {
-    /// The name.
+    /// Name.
     pub name: String,
-    /// The kind that goes first where several frames have that name; otherwise as in [`Model::frame`].
+    /// Kind that goes first where several frames have that name; otherwise as in [`Model::frame`].
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub kind: Option<FrameKind>,
 }
@@ -38,7 +38,7 @@ impl From<&Frame> for FrameName {
 }
 
 impl FrameName {
-    /// The number that the frame has in a robot.
+    /// Returns the number that the frame has in a robot.
     ///
     /// # Errors
     /// [`condyle_dynamics::Error::UnknownFrame`], with the nearest name.

@@ -5,7 +5,7 @@
 use super::layout::{Plan, ROWS, STRIDE, row_width};
 use super::residual::Residual;
 use super::terms::KnotTerms;
-use crate::robot::knot::{KnotData, WIDEST, unpack, unpack_matrix};
+use crate::robot::knot_data::{KnotData, WIDEST, unpack, unpack_matrix};
 use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities,
@@ -13,11 +13,11 @@ use condyle_dynamics::{
 use condyle_spatial::block::{Block, Strided, gather_rows};
 use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
-/// Some knots whose residuals look at the same.
+/// Some knots whose residuals read the same.
 pub(crate) struct KnotGroup<'a> {
-    /// The terms of each knot.
+    /// Terms of each knot.
     pub terms: &'a [KnotTerms<'a>],
-    /// The data of each knot.
+    /// Data of each knot.
     pub data: &'a mut [KnotData],
     /// Whether Jacobians are asked for.
     pub slopes: bool,
@@ -26,7 +26,7 @@ pub(crate) struct KnotGroup<'a> {
 }
 
 impl KnotGroup<'_> {
-    /// Calls a function for each residual of kinematics that has a weight at some knot, with its list and its number there.
+    /// Calls a function for each kinematic residual that has a weight at some knot, with its list and its number there.
     fn each(&mut self, mut visit: impl FnMut(&mut Self, [usize; 2], &Residual, &Plan)) {
         let (first, terms) = (self.terms[0], self.terms);
         for list in 0..2 {
@@ -59,10 +59,10 @@ impl KnotGroup<'_> {
     }
 }
 
-/// Scratch of residuals of kinematics.
+/// Scratch of kinematic residuals.
 #[derive(Debug)]
 pub(crate) struct ResidualKernel<S> {
-    /// The numbers of targets.
+    /// Numbers of targets.
     t: [S; 12],
     r: [S; STRIDE],
     /// ∂r/∂v and ∂r/∂q. Shape: 6 × nv.
@@ -86,7 +86,7 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
         }
     }
 
-    /// Computes the residuals of kinematics of some knots at (q, v), and the rows of their Jacobians.
+    /// Computes the kinematic residuals of some knots at (q, v), and the rows of their Jacobians.
     pub(crate) fn run(&mut self, model: &Model, data: &mut Data<S>, [q, v]: [&[S]; 2], group: &mut KnotGroup<'_>) {
         let Self { t, r, J, Jcom, zero } = self;
         let requirements = group.terms[0].layout().requirements;
@@ -250,7 +250,7 @@ fn vector<S: Scalar>(t: &[S; 12], k: usize) -> Vec3<S> {
     Vec3::new(t[k], t[k + 1], t[k + 2])
 }
 
-/// The rotation of a target.
+/// Returns the rotation of a target.
 #[inline(always)]
 fn rotation<S: Scalar>(t: &[S; 12]) -> Mat3<S> {
     Mat3 { x: vector(t, 3), y: vector(t, 6), z: vector(t, 9) }

@@ -1,24 +1,24 @@
-//! Layout of the residuals of a knot: how each is computed, what it looks at, and where its numbers stand.
+//! Layout of the residuals of a knot: how each is computed, what it reads, and where its numbers stand.
 #![allow(non_snake_case)] // W
 
 use super::residual::{Part, Residual};
-use crate::robot::capabilities::{Capabilities, Output};
+use crate::robot::knot_data::{Capabilities, Output};
 use condyle_dynamics::Model;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;
 
-/// A residual as it is computed.
+/// Residual as it is computed.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    /// The number of its entries.
+    /// Number of its entries.
     pub n: usize,
-    /// The number of entries of the terms before it.
+    /// Number of entries of the terms before it.
     pub first: usize,
-    /// The place of a residual of kinematics among those of its knot.
+    /// Index of a kinematic residual among the kinematic residuals of its knot.
     pub index: usize,
-    /// The number of its frame in the robot; 0 if it looks at none.
+    /// Number of its frame in the robot; 0 if it reads none.
     pub frame: usize,
-    /// The rows of its contact in λ.
+    /// Rows of its contact in λ.
     pub rows: Range<usize>,
     /// Whether its knot has contacts.
     pub in_contact: bool,
@@ -27,7 +27,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// The plan of a residual, or what does not fit the robot and the capabilities of its dynamics.
+    /// Returns the plan of a residual, or what does not fit the robot and the capabilities of its dynamics.
     pub(crate) fn new(model: &Model, capabilities: &Capabilities, residual: &Residual) -> Result<Self, String> {
         let n = residual.check(model, capabilities)?;
         let frame = residual.frame().map_or(Ok(0), |name| name.number(model)).map_err(|error| error.to_string())?;
@@ -41,21 +41,21 @@ impl Plan {
     }
 }
 
-/// The width of a row of the Jacobian of a residual of kinematics, which is one by q alone or by (v, q).
+/// Returns the width of a row of the Jacobian of a kinematic residual, which is one by q alone or by (v, q).
 pub(crate) fn row_width(nv: usize, residual: &Residual) -> usize {
     if residual.part() == Part::Positions { nv } else { 2 * nv }
 }
 
-/// The memory that the residuals of a knot take, and the quantities that they look at.
+/// Memory that the residuals of a knot take, and the quantities that they read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct KnotLayout {
-    /// The most entries of one residual.
+    /// Most entries of one residual.
     pub longest: usize,
-    /// The most rows of Jacobians by (u, v, q), and by q alone.
+    /// Most rows of Jacobians by (u, v, q), and by q alone.
     pub rows: [usize; 2],
-    /// The number of residuals of kinematics.
+    /// Number of kinematic residuals.
     pub kinematic: usize,
-    /// Whether a residual looks at forces.
+    /// Whether a residual reads forces.
     pub forces: bool,
     /// Whether a residual is a user's own, and whether one has second derivatives.
     pub own: bool,
@@ -64,7 +64,7 @@ pub(crate) struct KnotLayout {
 }
 
 impl KnotLayout {
-    /// The layout of a single residual.
+    /// Returns the layout of a single residual.
     pub(crate) fn of(residual: &Residual, plan: &Plan) -> Self {
         let rows = match residual.part() {
             Part::All => [plan.n, 0],
@@ -79,7 +79,7 @@ impl KnotLayout {
         Self { longest: plan.n, rows, kinematic, forces, own, curved, requirements }
     }
 
-    /// The layout that serves both of two knots.
+    /// Returns the layout that serves both of two knots.
     pub(crate) fn or(self, other: Self) -> Self {
         let most = |a: [usize; 2], b: [usize; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         let kinematic = self.kinematic.max(other.kinematic);
@@ -87,7 +87,7 @@ impl KnotLayout {
     }
 }
 
-/// The layout of the residuals of both together.
+/// Layout of the residuals of both together.
 impl Add for KnotLayout {
     type Output = Self;
     fn add(self, other: Self) -> Self {
@@ -104,19 +104,19 @@ impl Add for KnotLayout {
     }
 }
 
-/// The quantities of the whole robot that the residuals of a knot look at, so that each is computed once.
+/// Quantities of the whole robot that the residuals of a knot read, so that each is computed once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Requirements {
     pub placements: bool,
     pub velocities: bool,
-    /// The Jacobian of the centre of mass.
+    /// Jacobian of the centre of mass.
     pub com: bool,
     pub momentum: bool,
     /// g, the efforts that hold the robot still.
     pub gravity: bool,
     /// M q̈ + h, the efforts of joints and contacts.
     pub inertia: bool,
-    /// The change of the velocity of the centre of mass at an impact.
+    /// Change of the velocity of the centre of mass at an impact.
     pub impulse_com: bool,
 }
 
@@ -150,23 +150,23 @@ impl BitOr for Requirements {
     }
 }
 
-/// The numbers of each residual of kinematics stand so far from those of the next one.
+/// Distance between the numbers of consecutive kinematic residuals.
 pub(crate) const STRIDE: usize = 8;
-/// The rows of each have so many numbers per coordinate: six rows by v and q.
+/// Number of entries of each residual's rows per coordinate: six rows with respect to v and q.
 pub(crate) const ROWS: usize = 12;
 
-/// The quantities that the residuals of a knot read; those that its terms do not require are not written.
+/// Quantities that the residuals of a knot read; those that its terms do not require are not written.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ResidualData {
-    /// The residuals of kinematics: those of costs, and those of limits.
+    /// Kinematic residuals: of costs, and of limits.
     pub kinematic: [KinematicData; 2],
     /// M q̈ + h − g at a knot with contacts, else −g. Shape: nv.
-    pub surplus: Vec<f64>,
-    /// The derivatives of the surplus by q, v, q̈; of −g that by q. Shape: nv × nv.
+    pub gravity_residual: Vec<f64>,
+    /// Derivatives of the surplus by q, v, q̈; of −g that by q. Shape: nv × nv.
     pub dsurplus: [DMatrix<f64>; 3],
     /// J_c (v⁺ − v) at an impact: the change of the velocity of the centre of mass.
     pub com_change: [f64; 3],
-    /// The derivatives of that by q, where v⁺ − v stays, and by v⁺ − v. Shape: 3 × nv.
+    /// Derivatives of that by q, where v⁺ − v stays, and by v⁺ − v. Shape: 3 × nv.
     pub dcom_change: [DMatrix<f64>; 2],
     /// Whether it was written for the terms of the knot.
     pub is_written: bool,
@@ -189,8 +189,8 @@ impl ResidualData {
             }
         }
         let requirements = layouts[0].requirements | layouts[1].requirements;
-        if requirements.gravity && self.surplus.is_empty() {
-            self.surplus.resize(nv, 0.0);
+        if requirements.gravity && self.gravity_residual.is_empty() {
+            self.gravity_residual.resize(nv, 0.0);
             self.dsurplus.fill(DMatrix::zeros(nv, nv));
         }
         if requirements.impulse_com && self.dcom_change[0].is_empty() {
@@ -205,7 +205,7 @@ impl KinematicData {
         &self.r[plan.index * STRIDE..][..plan.n]
     }
 
-    /// The rows of the Jacobian of a residual.
+    /// Returns the rows of the Jacobian of a residual.
     pub(crate) fn rows(&self, nv: usize, residual: &Residual, plan: &Plan) -> core::slice::ChunksExact<'_, f64> {
         let width = row_width(nv, residual);
         self.rows[plan.index * ROWS * nv..][..plan.n * width].chunks_exact(width)

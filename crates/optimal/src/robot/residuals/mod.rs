@@ -1,14 +1,14 @@
-//! Residuals: what costs and limits look at, and how it is computed.
+//! Residuals: what costs and limits read, and how it is computed.
 
 pub(super) mod autodiff;
 pub(super) mod cones;
 pub(super) mod frame_name;
+pub(super) mod gravity_residual;
 pub(super) mod kernel;
 pub(super) mod layout;
 pub(super) mod own;
 pub(super) mod residual;
 pub(super) mod rows;
-pub(super) mod surplus;
 pub(super) mod target;
 pub(super) mod terms;
 pub(super) mod view;

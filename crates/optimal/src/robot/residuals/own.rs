@@ -7,35 +7,35 @@ use core::ops::Deref;
 use std::any::Any;
 use std::sync::Arc;
 
-/// The arguments of which a residual r(q, v, u) is a function.
+/// Arguments of which a residual r(q, v, u) is a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inputs {
-    /// The position q.
+    /// Position q.
     pub positions: bool,
-    /// The velocity v.
+    /// Velocity v.
     pub velocities: bool,
-    /// The controls u.
+    /// Controls u.
     pub controls: bool,
 }
 
 impl Inputs {
     /// All of q, v and u.
     pub const ALL: Self = Self { positions: true, velocities: true, controls: true };
-    /// The state x = (q, v).
+    /// State x = (q, v).
     pub const STATE: Self = Self { controls: false, ..Self::ALL };
-    /// The position q alone.
+    /// Position q alone.
     pub const POSITIONS: Self = Self { velocities: false, ..Self::STATE };
 }
 
-/// A residual that is written by a user, r(t, x, u), with its Jacobian. Several threads may call it at a time.
+/// Residual that is written by a user, r(t, x, u), with its Jacobian. Several threads may call it at a time.
 ///
 /// [`GenericResidual`](crate::robot::GenericResidual) needs no Jacobian: dual numbers compute it.
 pub trait ResidualFunction: Any + Send + Sync {
-    /// The number of entries of r.
+    /// Returns the number of entries of r.
     fn size(&self) -> usize;
 
-    /// The arguments on which r depends, which must not change: all by default. Of the others, the columns of the Jacobian
-    /// are not read.
+    /// Returns the arguments on which r depends, which must not change: all by default. Of the others, the columns of
+    /// the Jacobian are not read.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
@@ -56,8 +56,8 @@ pub trait ResidualFunction: Any + Send + Sync {
     /// ∂r/∂x in the tangent space of the state, size × ndx, and ∂r/∂u, size × nu, row after row. Both hold zeros before.
     fn calc_diff(&self, t: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]);
 
-    /// Whether [`calc_hessian`](Self::calc_hessian) gives second derivatives. Not by default: the Hessian of the cost is then
-    /// Gauss–Newton's, (∂r)ᵀ a″ ∂r.
+    /// Returns whether [`calc_hessian`](Self::calc_hessian) gives second derivatives. Not by default: the Hessian of
+    /// the cost is then Gauss–Newton's, (∂r)ᵀ a″ ∂r.
     fn has_hessian(&self) -> bool {
         false
     }
@@ -107,7 +107,7 @@ pub trait ResidualFunction: Any + Send + Sync {
 pub struct OwnResidual(Arc<dyn ResidualFunction>);
 
 impl OwnResidual {
-    /// A residual of a function.
+    /// Returns a residual of a function.
     pub fn new(function: impl ResidualFunction) -> Self {
         Self(Arc::new(function))
     }

@@ -1,13 +1,13 @@
-//! Residuals: what a cost looks at.
+//! Residuals: what a cost reads.
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
 use super::own::{Inputs, OwnResidual};
 use super::target::check_rotation;
-use crate::robot::capabilities::{Capabilities, Output};
+use crate::robot::knot_data::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
-/// A residual: a vector r(x, u) that should be small.
+/// Residual: a vector r(x, u) that should be small.
 ///
 /// Frames are called by their names in the robot, contacts and impulses by those that the action gives them.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +38,7 @@ pub enum Residual {
     /// J q̈ + γ of a contact, along the axes of its rows, where accelerations are controls: 1, 2, 3 or 6 numbers that must
     /// vanish while the contact holds.
     ContactAcceleration {
-        /// The contact's name.
+        /// Contact's name.
         contact: String,
     },
     /// q̈ − a_ref, nv numbers.
@@ -48,84 +48,84 @@ pub enum Residual {
     },
     /// c − c_ref, 3 numbers in the world.
     CenterOfMass {
-        /// The wanted centre of mass (m).
+        /// Wanted centre of mass (m).
         target: Vec3<f64>,
     },
     /// h_G − h_ref, 6 numbers along the world's axes, linear first: the momentum about the centre of mass.
     CentroidalMomentum {
-        /// The wanted momentum (kg m/s, kg m²/s).
+        /// Wanted momentum (kg m/s, kg m²/s).
         target: Force<f64>,
     },
     /// log(refXo oXf), the twist from the target to the frame, in the target's frame: 6 numbers, linear first.
     FramePlacement {
-        /// The frame.
+        /// Frame.
         frame: FrameName,
-        /// The frame's wanted pose in the world.
+        /// Frame's wanted pose in the world.
         target: Se3<f64>,
     },
     /// p − p_ref, 3 numbers, in the world.
     FrameTranslation {
-        /// The frame.
+        /// Frame.
         frame: FrameName,
-        /// The wanted position of its origin in the world (m).
+        /// Wanted position of its origin in the world (m).
         target: Vec3<f64>,
     },
     /// log(R_refᵀ R), 3 numbers, in the target's axes.
     FrameRotation {
-        /// The frame.
+        /// Frame.
         frame: FrameName,
-        /// The frame's wanted axes in the world.
+        /// Frame's wanted axes in the world.
         target: Mat3<f64>,
     },
     /// v − v_ref, 6 numbers, linear first.
     FrameVelocity {
-        /// The frame.
+        /// Frame.
         frame: FrameName,
-        /// The wanted velocity (m/s, rad/s).
+        /// Wanted velocity (m/s, rad/s).
         target: Motion<f64>,
-        /// The frame in which both are expressed.
+        /// Frame in which both are expressed.
         reference: ReferenceFrame,
     },
     /// λ − λ_ref, the force or impulse of a contact along the axes of its rows: 1, 2, 3 or 6 numbers, linear first.
     ContactForce {
-        /// The contact's name.
+        /// Contact's name.
         contact: String,
-        /// The wanted force along the contact's axes; only what its rows hold is read, of a point no moment, of a line z, of
-        /// a plane x and z.
+        /// Wanted force along the contact's axes; only what its rows hold is read, of a point no moment, of a line z,
+        /// of a plane x and z.
         target: Force<f64>,
     },
-    /// A f, for a contact's force f along its axes (of a line (0, 0, λ), of a plane (λ₁, 0, λ₂)): a number for each side of
-    /// the cone, and the normal force. See [`FrictionCone::bounds`].
+    /// F, for a contact's force f along its axes (of a line (0, 0, λ), of a plane (λ₁, 0, λ₂)): a number for each side
+    /// of the cone, and the normal force. See [`FrictionCone::bounds`].
     FrictionCone {
-        /// The contact's name.
+        /// Contact's name.
         contact: String,
-        /// The cone.
+        /// Cone.
         cone: FrictionCone,
     },
-    /// A w, for a rigid contact's wrench w. See [`WrenchCone::bounds`].
+    /// W, for a rigid contact's wrench w. See [`WrenchCone::bounds`].
     WrenchCone {
-        /// The contact's name.
+        /// Contact's name.
         contact: String,
-        /// The cone.
+        /// Cone.
         cone: WrenchCone,
     },
     /// ±τ_x − ½ size_y f_z, ±τ_y − ½ size_x f_z of a rigid contact: not above 0 while the centre of pressure is inside.
     CenterOfPressure {
-        /// The contact's name.
+        /// Contact's name.
         contact: String,
-        /// The surface's axes along the contact's.
+        /// Surface's axes along the contact's.
         rotation: Mat3<f64>,
-        /// The rectangle's sides along the surface's x and y (m).
+        /// Rectangle's sides along the surface's x and y (m).
         size: [f64; 2],
     },
     /// J_c (v⁺ − v), 3 numbers in the world: by how much an impact changes the velocity of the centre of mass (m/s).
     ImpulseCenterOfMass,
-    /// A function of one's own. It cannot be put into a file.
+    /// Function of one's own. It cannot be put into a file.
     #[cfg_attr(feature = "serde", serde(skip))]
     Own(OwnResidual),
 }
 
-/// Which numbers of a wrench along a contact's axes are those of its rows, for so many rows: a line has z, a plane x and z.
+/// Returns the entries of a wrench along a contact's axes that are its rows, by their number: a line has z, a plane x and z.
 pub(super) fn held(rows: usize) -> &'static [usize] {
     match rows {
         1 => &[2],
@@ -135,19 +135,19 @@ pub(super) fn held(rows: usize) -> &'static [usize] {
     }
 }
 
-/// The part of the Hessian of a residual that has entries.
+/// Part of the Hessian of a residual that has entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// The diagonal of Q or R, and the blocks of groups.
+    /// Diagonal of Q or R, and the blocks of groups.
     Diagonal,
-    /// The block of positions with positions.
+    /// Block of positions with positions.
     Positions,
-    /// The whole Hessian.
+    /// Whole Hessian.
     All,
 }
 
 impl Residual {
-    /// The part of the Hessian that has entries.
+    /// Returns the part of the Hessian that has entries.
     pub(crate) fn part(&self) -> Part {
         match self {
             Self::State { .. } | Self::Control { .. } => Part::Diagonal,
@@ -160,7 +160,7 @@ impl Residual {
         }
     }
 
-    /// The output of the dynamics that it looks at, beside x and u.
+    /// Returns the output of the dynamics that it depends on, besides x and u.
     pub(crate) fn output(&self) -> Option<Output> {
         match self {
             Self::JointEffort { .. } | Self::UndrivenEffort => Some(Output::Effort),
@@ -176,17 +176,18 @@ impl Residual {
         }
     }
 
-    /// Whether it looks at kinematics alone.
+    /// Returns whether it reads kinematics alone.
     pub(crate) fn is_kinematic(&self) -> bool {
         self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
     }
 
-    /// Whether another residual, of the same frame if it has one, looks at the same, with a target of its own.
+    /// Returns whether another residual, of the same frame if it has one, reads the same, with a target of its own.
     pub(crate) fn differs_in_target(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other) && self.reference() == other.reference()
     }
 
-    /// The numbers of its target: a position, a twist or a wrench, then a rotation by columns; zeros where there is none.
+    /// Returns the numbers of its target: a position, a twist or a wrench, then a rotation by columns, padded with
+    /// zeros.
     pub(crate) fn target_numbers(&self) -> [f64; 12] {
         let mut to = [0.0; 12];
         let mut write = |from: usize, numbers: &[f64]| to[from..][..numbers.len()].copy_from_slice(numbers);
@@ -204,7 +205,7 @@ impl Residual {
         to
     }
 
-    /// The frame that it looks at.
+    /// Returns the frame that it reads.
     pub(crate) fn frame(&self) -> Option<&FrameName> {
         match self {
             Self::FramePlacement { frame, .. }
@@ -215,7 +216,7 @@ impl Residual {
         }
     }
 
-    /// The frame in which it is expressed, of those that leave a choice.
+    /// Returns the frame in which it is expressed, of those that leave a choice.
     pub(crate) fn reference(&self) -> Option<ReferenceFrame> {
         match self {
             Self::FrameVelocity { reference, .. } => Some(*reference),
@@ -223,7 +224,7 @@ impl Residual {
         }
     }
 
-    /// The contact that it looks at.
+    /// Returns the contact that it reads.
     pub(crate) fn contact(&self) -> Option<&str> {
         match self {
             Self::ContactForce { contact, .. }
@@ -235,7 +236,7 @@ impl Residual {
         }
     }
 
-    /// The number of its entries, or what does not fit the robot and the capabilities of its dynamics.
+    /// Returns the number of its entries, or what does not fit the robot and the capabilities of its dynamics.
     pub(crate) fn check(&self, model: &Model, capabilities: &Capabilities) -> Result<usize, String> {
         let (nv, nu) = (model.nv(), capabilities.nu);
         let rows = self.contact().map_or(Ok(0), |name| capabilities.contact(name).map(|rows| rows.len()))?;

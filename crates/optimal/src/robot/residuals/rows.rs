@@ -1,20 +1,20 @@
-//! Rows of the Jacobians of residuals. They are collected, and gradients and Gauss–Newton Hessians of a node are then
+//! Rows of the Jacobians of residuals. They are collected, and gradients and Gauss–Newton Hessians of a knot are then
 //! written once, each entry of Q, S and R as a sum of outer products.
 #![allow(non_snake_case)] // the names of the literature
 
-use crate::lq::LqNode;
+use crate::lq::LqKnot;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product_without_slack};
 use core::ops::Range;
 
 /// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
-pub(crate) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[f64], dd: &[f64]) {
-    let (n, form) = (node.ndx(), &mut node.inverse_dynamics);
+pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[f64], dd: &[f64]) {
+    let (n, inverse, form) = (knot.ndx(), knot.structure.is_inverse_dynamics(), &mut knot.inverse_dynamics);
     for i in entries.clone() {
-        node.q[i] += d[i];
+        knot.q[i] += d[i];
     }
-    let explicit = if form.active { n / 2 } else { n };
+    let explicit = if inverse { n / 2 } else { n };
     for i in entries.start..entries.end.min(explicit) {
-        node.Q.as_mut_slice()[i * (n + 1)] += dd[i];
+        knot.Q.as_mut_slice()[i * (n + 1)] += dd[i];
     }
     for i in entries.start.max(explicit)..entries.end {
         form.diagonal[i - n / 2] += dd[i];
@@ -22,46 +22,47 @@ pub(crate) fn add_state_diagonal(node: &mut LqNode, entries: Range<usize>, d: &[
 }
 
 /// r += d and R += diag(dd).
-pub(crate) fn add_control_diagonal(node: &mut LqNode, d: &[f64], dd: &[f64]) {
-    let (n, m, form) = (node.ndx(), node.nu(), &mut node.inverse_dynamics);
+pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
+    let (n, m, inverse) = (knot.ndx(), knot.nu(), knot.structure.is_inverse_dynamics());
+    let form = &mut knot.inverse_dynamics;
     for i in 0..m {
-        node.r[i] += d[i];
-        match form.active {
+        knot.r[i] += d[i];
+        match inverse {
             true => form.diagonal[n / 2 + i] += dd[i],
-            false => node.R.as_mut_slice()[i * (m + 1)] += dd[i],
+            false => knot.R.as_mut_slice()[i * (m + 1)] += dd[i],
         }
     }
 }
 
-/// A row of a Jacobian with respect to (u, v, q), to be added to.
+/// Row of a Jacobian with respect to (u, v, q), to be added to.
 pub(crate) struct Row<'a> {
     pub u: &'a mut [f64],
     pub v: &'a mut [f64],
     pub q: &'a mut [f64],
 }
 
-/// The rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In
-/// a knot in inverse-dynamics form u stands for the unknowns that replace the controls.
+/// Rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In a
+/// knot in inverse-dynamics form u stands for the unknowns that replace the controls.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     nu: usize,
     nv: usize,
-    /// The distance from one row to the next.
+    /// Distance from one row to the next.
     stride: usize,
-    /// The rows of residuals that depend on more than q, and from the end of the memory backwards those of the others.
+    /// Rows of residuals that depend on more than q; from the end of the memory backwards, rows of the other residuals.
     rows: Vec<f64>,
     /// a′ and a″.
     slopes: Vec<[f64; 2]>,
-    /// The number of rows of both kinds.
+    /// Number of rows of both kinds.
     whole: usize,
     positions: usize,
-    /// The rows times √|a″|, and the same with the sign of a″.
+    /// Rows times √|a″|, and the same with the sign of a″.
     left: Vec<f64>,
     right: Vec<f64>,
 }
 
 impl Rows {
-    /// Memory for so many rows with respect to (u, v, q), and to q alone, of a robot with nv coordinates and nu controls.
+    /// Allocates `whole` rows with respect to (u, v, q) and `positions` rows with respect to q alone.
     pub(crate) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
         let (most, stride) = (whole + positions, nu + 2 * nv + SLACK);
         let rows = vec![0.0; most.max(1) * stride];
@@ -74,7 +75,7 @@ impl Rows {
         (self.whole, self.positions) = (0, 0);
     }
 
-    /// A row of zeros, to be written, for the a′ and a″ that it is worth.
+    /// Returns a row of zeros, to be written, for the a′ and a″ that it is worth.
     pub(crate) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
         let k = self.whole;
         self.slopes[k] = worth;
@@ -86,7 +87,7 @@ impl Rows {
         Row { u, v, q }
     }
 
-    /// A row of a Jacobian with respect to q alone.
+    /// Computes a row of a Jacobian with respect to q alone.
     pub(crate) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
         self.positions += 1;
         let k = self.slopes.len() - self.positions;
@@ -96,27 +97,27 @@ impl Rows {
 
     /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q and
     /// the part of Q for q alone, and leaves the rows that depend on more to the sweep.
-    pub(crate) fn write(&mut self, node: &mut LqNode) {
-        node.q.as_mut_slice().fill(0.0);
-        node.r.as_mut_slice().fill(0.0);
-        if node.inverse_dynamics.active {
-            node.inverse_dynamics.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
+    pub(crate) fn write(&mut self, knot: &mut LqKnot) {
+        knot.q.as_mut_slice().fill(0.0);
+        knot.r.as_mut_slice().fill(0.0);
+        if knot.structure.is_inverse_dynamics() {
+            knot.inverse_dynamics.set_costs(&self.rows[..self.whole * self.stride], &self.slopes[..self.whole]);
         }
-        at_level(Write { rows: self, node });
+        at_level(Write { rows: self, knot });
     }
 }
 
 struct Write<'a> {
     rows: &'a mut Rows,
-    node: &'a mut LqNode,
+    knot: &'a mut LqKnot,
 }
 
 impl Vectorized for Write<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, node } = self;
+        let Self { rows: Rows { nu, nv, stride, rows, slopes, whole, positions, left, right }, knot } = self;
         let (m, nv, n, stride) = (*nu, *nv, 2 * *nv, *stride);
-        let inverse = node.inverse_dynamics.active;
+        let inverse = knot.structure.is_inverse_dynamics();
         let (some, all) = if inverse { (0, *positions) } else { (*whole, *whole + *positions) };
         let first = slopes.len() - *positions;
         for k in 0..all {
@@ -124,10 +125,10 @@ impl Vectorized for Write<'_> {
             let ([d, dd], row) = (slopes[from], &rows[from * stride..][..stride]);
             let start = if k < some { 0 } else { m + nv };
             if k < some {
-                add_multiple(node.r.as_mut_slice(), row, d);
-                add_multiple(&mut node.q.as_mut_slice()[nv..], &row[m..], d);
+                add_multiple(knot.r.as_mut_slice(), row, d);
+                add_multiple(&mut knot.q.as_mut_slice()[nv..], &row[m..], d);
             }
-            add_multiple(&mut node.q.as_mut_slice()[..nv], &row[m + nv..], d);
+            add_multiple(&mut knot.q.as_mut_slice()[..nv], &row[m + nv..], d);
             let scale = dd.abs().sqrt();
             let (left, right) = (&mut left[k * stride..][..stride], &mut right[k * stride..][..stride]);
             for i in start..stride {
@@ -136,25 +137,25 @@ impl Vectorized for Write<'_> {
             }
         }
         let (u, v, q) = (0, m, m + nv); // where they stand in a row
-        let Q = node.Q.as_mut_slice();
+        let Q = knot.Q.as_mut_slice();
         let both = [left.as_slice(), right.as_slice()];
         if inverse {
-            node.inverse_dynamics.diagonal.fill(0.0);
+            knot.inverse_dynamics.diagonal.fill(0.0);
             for k in 0..if all == 0 { nv } else { 0 } {
                 Q[k * n..][..nv].fill(0.0);
             }
         } else if some == 0 {
             Q.fill(0.0);
-            node.S.as_mut_slice().fill(0.0);
-            node.R.as_mut_slice().fill(0.0);
+            knot.S.as_mut_slice().fill(0.0);
+            knot.R.as_mut_slice().fill(0.0);
         } else {
             outer(&mut Q[nv..], n, [nv, nv], [v, q], both, stride, some);
             outer(&mut Q[nv * n..], n, [nv, nv], [q, v], both, stride, some);
             outer(&mut Q[nv * n + nv..], n, [nv, nv], [v, v], both, stride, some);
             if m > 0 {
-                outer(node.S.as_mut_slice(), n, [nv, m], [q, u], both, stride, some);
-                outer(&mut node.S.as_mut_slice()[nv..], n, [nv, m], [v, u], both, stride, some);
-                outer(node.R.as_mut_slice(), m, [m, m], [u, u], both, stride, some);
+                outer(knot.S.as_mut_slice(), n, [nv, m], [q, u], both, stride, some);
+                outer(&mut knot.S.as_mut_slice()[nv..], n, [nv, m], [v, u], both, stride, some);
+                outer(knot.R.as_mut_slice(), m, [m, m], [u, u], both, stride, some);
             }
         }
         if all > 0 {

@@ -3,7 +3,7 @@
 use super::residual::Residual;
 use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
 
-/// The target of a [`Residual`]: the value with which it compares the robot's.
+/// Target of a [`Residual`]: the value with which it compares the robot's.
 ///
 /// ```
 /// use condyle_dynamics::Vec3;
@@ -14,18 +14,18 @@ use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Target<'a> {
-    /// The reference of a state (nq + nv numbers), of controls (nu), or of efforts or accelerations of joints (nv).
+    /// Reference of a state (nq + nv numbers), of controls (nu), or of efforts or accelerations of joints (nv).
     Numbers(&'a [f64]),
-    /// The position of a frame's origin or of the centre of mass in the world (m).
+    /// Position of a frame's origin or of the centre of mass in the world (m).
     Position(Vec3<f64>),
-    /// The axes of a frame in the world.
+    /// Axes of a frame in the world.
     Rotation(Mat3<f64>),
-    /// The pose of a frame in the world.
+    /// Pose of a frame in the world.
     Placement(Se3<f64>),
-    /// The velocity of a frame, in the reference frame of its residual (m/s, rad/s).
+    /// Velocity of a frame, in the reference frame of its residual (m/s, rad/s).
     Velocity(Motion<f64>),
-    /// The force of a contact along the axes of its rows (N, N m; of an impact N s, N m s), or a centroidal momentum
-    /// (kg m/s, kg m²/s).
+    /// Force of a contact along the axes of its rows (N, N m; of an impact N s, N m s), or a centroidal momentum (kg
+    /// m/s, kg m²/s).
     Force(Force<f64>),
 }
 
@@ -60,7 +60,7 @@ impl<'a, const N: usize> From<&'a [f64; N]> for Target<'a> {
 }
 
 impl Target<'_> {
-    /// The kind, as messages call it.
+    /// Returns the kind, as messages call it.
     fn kind(&self) -> String {
         match self {
             Self::Numbers(numbers) => format!("{} numbers", numbers.len()),

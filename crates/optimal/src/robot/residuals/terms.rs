@@ -3,34 +3,34 @@
 use super::layout::{KnotLayout, Plan};
 use super::residual::{Part, Residual};
 use super::view::ResidualView;
-use crate::lq::LqNode;
-use crate::robot::knot::Sensitivities;
+use crate::lq::LqKnot;
+use crate::robot::knot_data::Sensitivities;
 
-/// A residual that is worth something.
+/// Residual that is worth something.
 pub(crate) trait Term {
     fn residual(&self) -> &Residual;
 
-    /// The weight; a term whose weight is 0 is not computed.
+    /// Returns the weight; a term whose weight is 0 is not computed.
     fn weight(&self) -> f64 {
         1.0
     }
 }
 
-/// What terms of a kind are worth, by their residuals.
+/// Function of the residuals of terms: a cost, or a term of the augmented Lagrangian.
 pub(crate) trait Objective<T> {
-    /// The worth of a term.
+    /// Returns the worth of a term.
     fn value(&self, term: &T, plan: &Plan, r: &[f64]) -> f64;
 
     /// Writes its gradient and the diagonal of its Hessian by r.
     fn slopes(&mut self, term: &T, plan: &Plan, r: &[f64], d: &mut [f64], dd: &mut [f64]);
 }
 
-/// The terms of one kind of a knot, as they are computed.
+/// Terms of one kind of a knot, as they are computed.
 #[derive(Clone, Debug)]
 pub(crate) struct Terms<T> {
     all: Vec<T>,
     plans: Vec<Plan>,
-    /// The terms that look at kinematics.
+    /// Terms that read kinematics.
     kinematic: Vec<usize>,
     layout: KnotLayout,
 }
@@ -53,7 +53,7 @@ impl<T: Term> Terms<T> {
         self.plans.push(plan);
     }
 
-    /// Puts a term with the plan of its residual in the place of term k; says whether it takes the same memory.
+    /// Puts a term with the plan of its residual in the place of term k; returns whether it takes the same memory.
     pub(crate) fn replace(&mut self, k: usize, term: T, plan: Plan) -> bool {
         let (old, before) = (&mut self.all[k], &mut self.plans[k]);
         let same = KnotLayout::of(term.residual(), &plan) == KnotLayout::of(old.residual(), before);
@@ -63,7 +63,7 @@ impl<T: Term> Terms<T> {
         same
     }
 
-    /// All terms.
+    /// Returns all terms.
     pub(crate) fn all(&self) -> &[T] {
         &self.all
     }
@@ -73,17 +73,17 @@ impl<T: Term> Terms<T> {
         (&mut self.all[k], self.plans[k].n)
     }
 
-    /// All terms, to change what they are worth.
+    /// Returns all terms, to change what they are worth.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all
     }
 
-    /// The number of entries of all residuals.
+    /// Returns the number of entries of all residuals.
     pub(crate) fn len(&self) -> usize {
         self.plans.last().map_or(0, |plan| plan.first + plan.n)
     }
 
-    /// The terms that have a weight.
+    /// Returns the terms that have a weight.
     fn weighty(&self) -> impl Iterator<Item = (&T, &Plan)> {
         self.all.iter().zip(&self.plans).filter(|(term, _)| term.weight() != 0.0)
     }
@@ -99,14 +99,14 @@ impl<T: Term> Terms<T> {
     }
 
     /// Adds to the gradient and the Hessian of what the terms are worth: first the rows of Jacobians to those that are
-    /// collected in the scratch, then (`diagonal`) what has no rows to q, r, Q, R of the node.
+    /// collected in the scratch, then (`diagonal`) what has no rows to q, r, Q, R of the knot.
     pub(crate) fn differentiate(
         &self,
         view: &mut ResidualView<'_>,
         sensitivities: &dyn Sensitivities,
         objective: &mut impl Objective<T>,
         diagonal: bool,
-        node: &mut LqNode,
+        knot: &mut LqKnot,
     ) {
         for (term, plan) in self.weighty() {
             let residual = term.residual();
@@ -118,7 +118,7 @@ impl<T: Term> Terms<T> {
             objective.slopes(term, plan, &s.r[..plan.n], &mut s.d[..plan.n], &mut s.dd[..plan.n]);
             match diagonal {
                 false => view.push_rows(residual, plan, sensitivities),
-                true => view.add_diagonal(residual, node),
+                true => view.add_diagonal(residual, knot),
             }
         }
     }
@@ -126,10 +126,10 @@ impl<T: Term> Terms<T> {
 
 /// Terms of either kind, for those who compute kinematics.
 pub(crate) trait KinematicTerms {
-    /// The memory that the terms take, and what they look at.
+    /// Returns the memory that the terms take, and what they read.
     fn layout(&self) -> KnotLayout;
 
-    /// The i-th residual of kinematics, with its weight and its place.
+    /// Returns the i-th kinematic residual, with its weight and its place.
     fn kinematic(&self, i: usize) -> Option<(&Residual, f64, &Plan)>;
 }
 
@@ -144,17 +144,17 @@ impl<T: Term> KinematicTerms for Terms<T> {
     }
 }
 
-/// The terms of a knot: its costs and its limits.
+/// Terms of a knot: its costs and its limits.
 #[derive(Clone, Copy)]
 pub(crate) struct KnotTerms<'a>(pub [&'a dyn KinematicTerms; 2]);
 
 impl KnotTerms<'_> {
-    /// The layout of all terms.
+    /// Returns the layout of all terms.
     pub(crate) fn layout(&self) -> KnotLayout {
         self.0[0].layout() + self.0[1].layout()
     }
 
-    /// Whether another knot looks at the same with its own targets.
+    /// Returns whether another knot reads the same with its own targets.
     pub(crate) fn is_alike(self, other: Self) -> bool {
         let same = |k: usize| core::ptr::addr_eq(self.0[k], other.0[k]);
         let alike = |a: &dyn KinematicTerms, b: &dyn KinematicTerms| {

@@ -1,13 +1,13 @@
-//! Values of residuals, and how their Jacobians come into a node; costs and limits say what they are worth.
+//! Values of residuals, and how their Jacobians come into a knot; costs and limits say what they are worth.
 #![allow(non_snake_case)] // D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
-use crate::lq::{Hessian, LARGEST_BLOCK, LqNode};
-use crate::robot::capabilities::Output;
-use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
+use crate::lq::{Hessian, LARGEST_BLOCK, LqKnot};
+use crate::robot::knot_data::Output;
+use crate::robot::knot_data::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::state::{groups, state_difference};
 use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian_groups};
 use core::ops::Range;
@@ -16,19 +16,19 @@ use nalgebra::DMatrix;
 /// Scratch of the residuals of a knot.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// The residual, its worth's gradient and the diagonal of its worth's Hessian.
+    /// Residual, its worth's gradient and the diagonal of its worth's Hessian.
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
-    /// The rows of all Jacobians.
+    /// Rows of all Jacobians.
     pub rows: Rows,
-    /// The Jacobian of the difference of configurations, of which the blocks of groups are read. Shape: nv × nv.
+    /// Jacobian of the difference of configurations, of which the blocks of groups are read. Shape: nv × nv.
     D: DMatrix<f64>,
-    /// The coordinates of each group of positions that is no vector space.
+    /// Coordinates of each group of positions that is no vector space.
     groups: Vec<Range<usize>>,
-    /// ∂r/∂x and ∂r/∂u of a user's own residual, row after row.
+    /// ∂r/∂x and ∂r/∂u of a user-defined residual, row after row.
     own: [Vec<f64>; 2],
-    /// Second derivatives of a user's own residual, and the sum of those of all, where there are any.
+    /// Second derivatives of a user-defined residual, and the sum over all such residuals, if they have any.
     hessians: Option<Box<[Hessian; 2]>>,
 }
 
@@ -51,13 +51,13 @@ impl Scratch {
     }
 
     /// Writes q, r, Q, S and R from all rows and second derivatives.
-    pub(crate) fn write(&mut self, node: &mut LqNode) {
-        self.rows.write(node);
+    pub(crate) fn write(&mut self, knot: &mut LqKnot) {
+        self.rows.write(knot);
         if let Some(hessians) = &self.hessians {
             let [_, Hessian { xx, xu, uu }] = &**hessians;
-            node.Q += xx;
-            node.S += xu;
-            node.R += uu;
+            knot.Q += xx;
+            knot.S += xu;
+            knot.R += uu;
         }
     }
 }
@@ -69,10 +69,10 @@ fn product(r: &mut [f64], W: &[f64], x: &[f64]) {
     }
 }
 
-/// The residuals of a knot: those of its costs, or those of its limits.
+/// Residuals of a knot: of its costs, or of its limits.
 pub(crate) struct ResidualView<'a> {
     pub model: &'a Model,
-    /// The knot.
+    /// Knot.
     pub t: usize,
     pub state: KnotState<'a>,
     pub kinematics: &'a KinematicData,
@@ -89,7 +89,7 @@ impl ResidualView<'_> {
             Residual::State { reference } => state_difference(model, reference, x, r), // x ⊖ x_ref
             Residual::Control { reference } => minus(r, u, reference),
             Residual::ControlGravity => {
-                r.copy_from_slice(&data.residuals.surplus);
+                r.copy_from_slice(&data.residuals.gravity_residual);
                 if !plan.in_contact {
                     r.iter_mut().zip(&data.tau).for_each(|(r, tau)| *r += tau); // τ − g
                 }
@@ -144,7 +144,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes the rows of a user's own residual of n numbers.
+    /// Pushes the rows of a user-defined residual of n numbers.
     fn push_own_rows(&mut self, own: &OwnResidual, n: usize, sensitivities: &dyn Sensitivities) {
         let Scratch { rows, d, dd, own: [by_x, by_u], hessians, .. } = &mut *self.scratch;
         let (KnotState { x, u, .. }, nv) = (self.state, self.model.nv());
@@ -184,7 +184,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes row i of ∂r/∂(u, v, q) of a residual that looks at outputs of the dynamics.
+    /// Pushes row i of ∂r/∂(u, v, q) of a residual that reads outputs of the dynamics.
     fn push_row(&mut self, residual: &Residual, plan: &Plan, i: usize, sensitivities: &dyn Sensitivities) {
         let (Scratch { rows, d, dd, .. }, data) = (&mut *self.scratch, &self.state.data.residuals);
         let (g, nv) = (&mut rows.push([d[i], dd[i]]), self.model.nv());
@@ -224,20 +224,20 @@ impl ResidualView<'_> {
     }
 
     /// Adds gradient and Hessian of a state's or a control's residual that was just computed.
-    pub(crate) fn add_diagonal(&mut self, residual: &Residual, node: &mut LqNode) {
+    pub(crate) fn add_diagonal(&mut self, residual: &Residual, knot: &mut LqKnot) {
         match residual {
-            Residual::State { .. } => self.add_state(node),
-            _ => add_control_diagonal(node, &self.scratch.d, &self.scratch.dd),
+            Residual::State { .. } => self.add_state(knot),
+            _ => add_control_diagonal(knot, &self.scratch.d, &self.scratch.dd),
         }
     }
 
-    /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity but for the groups' blocks of q.
-    fn add_state(&mut self, node: &mut LqNode) {
+    /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity, except the groups' blocks of q.
+    fn add_state(&mut self, knot: &mut LqKnot) {
         let Self { model, scratch: s, .. } = self;
         let nv = model.nv();
         let mut from = 0;
         for group in s.groups.iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
-            add_state_diagonal(node, from..group.start, &s.d, &s.dd);
+            add_state_diagonal(knot, from..group.start, &s.d, &s.dd);
             from = group.end;
         }
         if s.groups.is_empty() {
@@ -264,8 +264,8 @@ impl ResidualView<'_> {
                 }
             }
             for a in 0..size {
-                node.q[start + a] += g[a];
-                let column = &mut node.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
+                knot.q[start + a] += g[a];
+                let column = &mut knot.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
                 column.iter_mut().zip(&H[a]).for_each(|(Q, H)| *Q += H);
             }
         }

@@ -1,0 +1,132 @@
+//! Results of a sweep at one knot, and the computation of gains from the elimination of other unknowns than controls.
+#![allow(non_snake_case)] // the names of the literature: K, Vxx, and Y, U
+
+use super::knot::LqKnot;
+use condyle_linalg::{SLACK, View, add_product_vector, copy_matrix, eliminate_rows, transpose};
+use nalgebra::{DMatrix, DVector};
+
+/// Result of a sweep at one knot: the feedback δu = k + K δx, and the value function V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx +
+/// const of the rest of the horizon.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KnotFeedback {
+    /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
+    pub K: DMatrix<f64>,
+    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
+    pub k: DVector<f64>,
+    /// Gradient of the value function at δx = 0, ndx.
+    pub Vx: DVector<f64>,
+    /// Hessian of the value function, with the regularisation on its diagonal; ndx × ndx, symmetric.
+    pub Vxx: DMatrix<f64>,
+    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu; zero for a control at its bound.
+    pub Qu: DVector<f64>,
+    /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
+    pub Quu: DMatrix<f64>,
+    /// Quᵀk and kᵀQuu k: the change of the cost that a full step is expected to make, to first order and (twice) to
+    /// second order.
+    pub expected: [f64; 2],
+    /// Whether K, Qu and Quu store the factors from which [`Gains::finish`] computes K and k.
+    pub(super) gains_deferred: bool,
+}
+
+impl KnotFeedback {
+    /// Creates a knot of zeros with ndx states and nu controls.
+    pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
+        Self {
+            K: DMatrix::zeros(nu, ndx),
+            k: DVector::zeros(nu),
+            Vx: DVector::zeros(ndx),
+            Vxx: DMatrix::zeros(ndx, ndx),
+            Qu: DVector::zeros(nu),
+            Quu: DMatrix::zeros(nu, nu),
+            expected: [0.0; 2],
+            gains_deferred: false,
+        }
+    }
+}
+
+/// Computation of gains, with its scratch. Its input is [L; X; yᵀ], the eliminated columns of the unknowns w, and the
+/// controls δu = U (w, δx):
+///
+/// ```text
+/// Y = U_w L⁻ᵀ,     K = U_x − Y Xᵀ,     k = −Y y
+/// ```
+///
+/// No other knot needs the gains, so a sweep on several threads leaves them to idle threads.
+#[derive(Debug, Clone)]
+pub(crate) struct Gains {
+    /// U over (w, δv, δq), and later [Y K], with padding rows.
+    rows: Vec<f64>,
+    /// [L; X; yᵀ] of a knot whose gains were deferred, with padding rows.
+    left: Vec<f64>,
+    /// Scratch of [`take_gains`].
+    y: Vec<f64>,
+}
+
+impl Gains {
+    /// Allocates the scratch for knots of n states and at most m controls.
+    pub(super) fn new(n: usize, m: usize) -> Self {
+        Self { rows: vec![0.0; (m + SLACK) * (m + n)], left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
+    }
+
+    /// Allocates the same scratch, with storage for deferred gains.
+    pub(super) fn to_finish(n: usize, m: usize) -> Self {
+        Self { left: vec![0.0; (m + n + 1 + SLACK) * m], ..Self::new(n, m) }
+    }
+
+    /// Writes the gains of a knot, from [L; X; yᵀ].
+    pub(super) fn write(&mut self, left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
+        let (n, m, efforts) = (knot.ndx(), knot.nu(), &knot.inverse_dynamics.efforts.numbers);
+        let (Self { rows, y, .. }, ld, all) = (self, m + SLACK, m + n);
+        transpose(rows, ld, View::new(efforts, knot.inverse_dynamics.stride), [all, m]);
+        eliminate_rows(rows, ld, [m, all, m], left);
+        take_gains(View::new(rows, ld), left.at(all, 0), knot, feedback, y);
+    }
+
+    /// Stores [L; X; yᵀ] in the feedback, for [`finish`](Self::finish).
+    pub(super) fn defer(left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
+        let (n, m) = (knot.ndx(), knot.nu());
+        copy_matrix(feedback.Quu.as_mut_slice(), m, left, [m, m]);
+        copy_matrix(feedback.K.as_mut_slice(), n, left.at(m, 0), [n, m]);
+        copy_matrix(feedback.Qu.as_mut_slice(), 1, left.at(m + n, 0), [1, m]);
+        feedback.gains_deferred = true;
+    }
+
+    /// Writes the gains of all knots whose gains were deferred.
+    pub(crate) fn finish(&mut self, knots: &[LqKnot], feedback: &mut [KnotFeedback]) {
+        let mut left = core::mem::take(&mut self.left);
+        for (knot, feedback) in knots.iter().zip(feedback).filter(|(_, feedback)| feedback.gains_deferred) {
+            let (n, m) = (knot.ndx(), knot.nu());
+            let ld = m + n + 1 + SLACK;
+            copy_matrix(&mut left, ld, View::new(feedback.Quu.as_slice(), m), [m, m]);
+            copy_matrix(&mut left[m..], ld, View::new(feedback.K.as_slice(), n), [n, m]);
+            copy_matrix(&mut left[m + n..], ld, View::new(feedback.Qu.as_slice(), 1), [1, m]);
+            self.write(View::new(&left, ld), knot, feedback);
+            feedback.gains_deferred = false;
+        }
+        self.left = left;
+    }
+}
+
+/// Computes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from rows [Y K] over (w, δv, δq) and yᵀ. The length of `scratch`
+/// is twice the number of controls, plus padding.
+pub(super) fn take_gains(
+    rows: View<'_>,
+    yt: View<'_>,
+    knot: &LqKnot,
+    feedback: &mut KnotFeedback,
+    scratch: &mut [f64],
+) {
+    let (n, m) = (knot.ndx(), knot.nu());
+    let (nv, K) = (n / 2, feedback.K.as_mut_slice());
+    copy_matrix(K, m, rows.at(0, m + nv), [m, nv]);
+    copy_matrix(&mut K[nv * m..], m, rows.at(0, m), [m, nv]);
+    let ((k, y), mut square) = (scratch.split_at_mut(m + SLACK), 0.0);
+    k.fill(0.0);
+    for j in 0..m {
+        y[j] = -yt.data[j * yt.stride];
+        square += y[j] * y[j];
+    }
+    add_product_vector(k, m, rows, &y[..m]);
+    feedback.k.as_mut_slice().copy_from_slice(&k[..m]);
+    feedback.expected = [-square, square];
+}

@@ -1,0 +1,160 @@
+//! Knots of a linear-quadratic problem.
+#![allow(non_snake_case)] // the names of the literature: A, B, Q, …
+
+use super::rows::ConstraintRows;
+use super::structure::{DynamicsStructure, EulerBlock, InverseDynamicsForm, LARGEST_BLOCK};
+use crate::error::assert_length;
+use core::fmt;
+use nalgebra::{DMatrix, DVector};
+
+/// Absolute value beyond which a number has diverged; the sweep or trial is then abandoned.
+pub(crate) const DIVERGED: f64 = 1e30;
+
+/// Knot of a linear-quadratic problem in the changes δx (ndx), δu (nu):
+///
+/// ```text
+/// minimise   Σₜ ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu    subject to   δx⁺ = A δx + B δu + f
+/// ```
+///
+/// with lower ≤ δu ≤ upper, and with the constraints `rows`. Q and R are symmetric, with both triangles filled. At the
+/// terminal knot (nu = 0) only Q, q and `rows` are read.
+#[derive(Clone, PartialEq)]
+pub struct LqKnot {
+    /// ∂x⁺/∂x, ndx × ndx.
+    pub A: DMatrix<f64>,
+    /// ∂x⁺/∂u, ndx × nu.
+    pub B: DMatrix<f64>,
+    /// Gap: the predicted next state ⊖ the next state of the trajectory, ndx. Written by the solver.
+    pub f: DVector<f64>,
+    /// ∂²ℓ/∂x², ndx × ndx.
+    pub Q: DMatrix<f64>,
+    /// ∂²ℓ/∂x∂u, ndx × nu.
+    pub S: DMatrix<f64>,
+    /// ∂²ℓ/∂u², nu × nu.
+    pub R: DMatrix<f64>,
+    /// ∂ℓ/∂x, ndx.
+    pub q: DVector<f64>,
+    /// ∂ℓ/∂u, nu.
+    pub r: DVector<f64>,
+    /// Lower bound of δu, nu; −∞ for none. Written by the solver.
+    pub lower: DVector<f64>,
+    /// Upper bound of δu, nu; ∞ for none. Written by the solver.
+    pub upper: DVector<f64>,
+    /// General constraints on δx and δu; empty unless the action writes them. A [`Sweep`](crate::Sweep) returns
+    /// [`SweepError::ConstraintRows`](crate::SweepError::ConstraintRows) for a knot with rows, and a solver panics:
+    /// neither ignores them.
+    pub rows: ConstraintRows,
+    /// Structure of A and B, as far as it is known.
+    pub structure: DynamicsStructure,
+    /// Equations of inverse dynamics, which replace A, B, S, R and part of Q if solver and action support them.
+    pub(crate) inverse_dynamics: InverseDynamicsForm,
+}
+
+/// Formats the fields that a user writes, without the scratch of the sweep.
+impl fmt::Debug for LqKnot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, rows, structure, .. } = self;
+        let mut shown = f.debug_struct("LqKnot");
+        shown.field("A", A).field("B", B).field("f", gap).field("Q", Q).field("S", S).field("R", R);
+        shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper).field("rows", rows);
+        shown.field("structure", structure);
+        shown.finish_non_exhaustive()
+    }
+}
+
+impl LqKnot {
+    /// Maximum number of states, and of controls: it bounds the size of a knot's matrices.
+    pub const MOST_SIZE: usize = 4096;
+
+    /// Creates a knot of zeros with ndx states and nu controls without bounds.
+    ///
+    /// # Panics
+    /// If ndx or nu is above [`MOST_SIZE`](Self::MOST_SIZE).
+    #[track_caller]
+    pub fn zeros(ndx: usize, nu: usize) -> Self {
+        let most = Self::MOST_SIZE;
+        assert!(ndx <= most && nu <= most, "expected at most {most} states and controls, found {ndx} and {nu}");
+        Self {
+            A: DMatrix::zeros(ndx, ndx),
+            B: DMatrix::zeros(ndx, nu),
+            f: DVector::zeros(ndx),
+            Q: DMatrix::zeros(ndx, ndx),
+            S: DMatrix::zeros(ndx, nu),
+            R: DMatrix::zeros(nu, nu),
+            q: DVector::zeros(ndx),
+            r: DVector::zeros(nu),
+            lower: DVector::from_element(nu, f64::NEG_INFINITY),
+            upper: DVector::from_element(nu, f64::INFINITY),
+            rows: ConstraintRows::default(),
+            structure: DynamicsStructure::default(),
+            inverse_dynamics: InverseDynamicsForm::default(),
+        }
+    }
+
+    /// Returns the number of states, ndx.
+    pub fn ndx(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Returns the number of controls, nu.
+    pub fn nu(&self) -> usize {
+        self.r.len()
+    }
+
+    /// Returns whether a control has a bound.
+    pub(crate) fn is_bounded(&self) -> bool {
+        self.lower.iter().chain(&self.upper).any(|bound| bound.is_finite())
+    }
+
+    /// Panics with the name of the first field whose shape does not fit q and r.
+    #[track_caller]
+    pub(crate) fn assert_shapes(&self, ndx: usize, nu: usize) {
+        assert_length("q", self.q.len(), ndx);
+        assert_length("r", self.r.len(), nu);
+        assert_length("f", self.f.len(), ndx);
+        assert_length("lower", self.lower.len(), nu);
+        assert_length("upper", self.upper.len(), nu);
+        self.rows.assert_columns(ndx + nu);
+        if let Some((_, blocks)) = self.structure.euler() {
+            assert!(ndx.is_multiple_of(2), "`structure` is that of x = (q, v), but ndx is {ndx}");
+            let inside = |block: &EulerBlock| block.range().end <= ndx / 2 && block.range().len() <= LARGEST_BLOCK;
+            assert!(blocks.iter().all(inside), "a block of `structure` has more than 6 rows or leaves those of q");
+        }
+        assert_shape("A", &self.A, (ndx, ndx));
+        assert_shape("B", &self.B, (ndx, nu));
+        assert_shape("Q", &self.Q, (ndx, ndx));
+        assert_shape("S", &self.S, (ndx, nu));
+        assert_shape("R", &self.R, (nu, nu));
+    }
+}
+
+#[inline]
+#[track_caller]
+fn assert_shape(name: &str, matrix: &DMatrix<f64>, shape: (usize, usize)) {
+    assert!(matrix.shape() == shape, "`{name}` has shape {:?}, expected {shape:?}", matrix.shape());
+}
+
+/// Second derivatives of a function ψ(δx, δu) of one knot; see
+/// [`dynamics_hessian`](crate::ActionModel::dynamics_hessian).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hessian {
+    /// ∂²ψ/∂x², ndx × ndx, symmetric.
+    pub xx: DMatrix<f64>,
+    /// ∂²ψ/∂x∂u, ndx × nu.
+    pub xu: DMatrix<f64>,
+    /// ∂²ψ/∂u², nu × nu, symmetric.
+    pub uu: DMatrix<f64>,
+}
+
+impl Hessian {
+    /// Creates zeros for ndx states and nu controls.
+    #[track_caller]
+    pub fn zeros(ndx: usize, nu: usize) -> Self {
+        Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }
+    }
+
+    /// Sets all entries to x.
+    pub fn fill(&mut self, x: f64) {
+        [&mut self.xx, &mut self.xu, &mut self.uu].into_iter().for_each(|part| part.fill(x));
+    }
+}

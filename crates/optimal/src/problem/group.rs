@@ -1,0 +1,236 @@
+//! Groups of knots, each of which is evaluated in one call.
+
+use super::action::ActionModel;
+use super::multipliers::Visit;
+use crate::error::assert_length;
+use crate::lq::LqKnot;
+use crate::robot::RobotDynamics;
+use core::ops::Range;
+
+/// Action that computes several knots in one call: in the lanes of a vector register, or in one call to another
+/// language.
+///
+/// An action that implements this trait returns itself from [`ActionModel::group_model`]. The default methods loop over
+/// the knots.
+///
+/// A **group** consists of consecutive knots of the horizon, or of the trials of a line search at one knot. Each knot of
+/// a group is given by its index t in the horizon. States and controls are stored one after the other, and so are the
+/// states that are written.
+pub trait GroupModel: ActionModel {
+    /// Returns the number of states that a group call computes at the cost of one; 1 unless it uses vector lanes.
+    ///
+    /// A line search tries this number of step lengths side by side.
+    fn lanes(&self) -> usize {
+        1
+    }
+
+    /// Returns whether `other` computes the same as this action, so that the knots of both form one group. Only `self` is
+    /// then used. By default false.
+    fn is_same(&self, other: &dyn ActionModel) -> bool {
+        let _ = other;
+        false
+    }
+
+    /// Computes [`calc`](ActionModel::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control
+    /// of `us`.
+    ///
+    /// # Panics
+    /// If the lengths differ from knots.len() times nx, nu, nx and 1.
+    #[track_caller]
+    fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        calc_each(self, knots, [xs, us], next, costs);
+    }
+
+    /// Computes [`calc_diff`](ActionModel::calc_diff) for a group.
+    ///
+    /// # Panics
+    /// If the lengths differ from knots.len() times nx, nu and 1.
+    #[track_caller]
+    fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        calc_diff_each(self, knots, [xs, us], lq_knots);
+    }
+}
+
+/// Quantities that a group computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Evaluation<'m> {
+    /// Next states and costs, and the motions that lead there if the results keep them.
+    Values,
+    /// Derivatives of dynamics and costs.
+    Derivatives,
+    /// Derivatives, with the dynamics as equations of inverse dynamics where a knot supports that. They are taken at the
+    /// motions (accelerations and forces) of the group, in equal parts. If no motions are given, they are computed.
+    Equations(&'m [f64]),
+}
+
+impl Evaluation<'_> {
+    /// Returns the evaluation of some of `count` knots.
+    pub(crate) fn part(self, knots: Range<usize>, count: usize) -> Self {
+        match self {
+            Self::Equations(motions) => {
+                let size = motions.len() / count;
+                Self::Equations(&motions[knots.start * size..knots.end * size])
+            }
+            other => other,
+        }
+    }
+}
+
+/// Results of a group. An evaluation writes either the first three, or the last one.
+#[derive(Debug)]
+pub struct Results<'a> {
+    /// Next states, one after the other.
+    pub(crate) next: &'a mut [f64],
+    /// Costs.
+    pub(crate) costs: &'a mut [f64],
+    /// Accelerations and forces, at the beginning of one equal part per knot; empty if they are not kept.
+    pub(crate) motions: &'a mut [f64],
+    /// LQ knots with the derivatives.
+    pub(crate) lq_knots: &'a mut [LqKnot],
+}
+
+impl<'a> Results<'a> {
+    /// Returns results that receive values.
+    pub(crate) fn values(next: &'a mut [f64], costs: &'a mut [f64], motions: &'a mut [f64]) -> Self {
+        Self { next, costs, motions, lq_knots: &mut [] }
+    }
+
+    /// Returns results that receive derivatives.
+    pub(crate) fn derivatives(lq_knots: &'a mut [LqKnot]) -> Self {
+        Self { next: &mut [], costs: &mut [], motions: &mut [], lq_knots }
+    }
+}
+
+/// Knots that are evaluated in one call: knots of a robot, knots of user-defined accelerations, or knots with
+/// constraints. All other actions are evaluated by [`evaluate`].
+///
+/// One group may represent several models of a robot that differ only in costs, limits and durations.
+pub trait KnotGroup {
+    /// Returns the number of states that are computed at the cost of one.
+    fn lanes(&mut self) -> usize;
+
+    /// Evaluates knot `knots[i]` at the i-th state of `xs` and the i-th control of `us`, for all i.
+    #[track_caller]
+    fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>);
+
+    /// Passes the constraints of knot t that contribute augmented Lagrangian terms to its cost to `visit`, in their
+    /// order.
+    fn constraints(&mut self, t: usize, visit: &mut Visit<'_>);
+
+    /// Returns the number of accelerations and forces of a knot from which its equations of inverse dynamics start, and
+    /// the maximum numbers of dependent coordinates and of rows of costs. `None` without such equations.
+    fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
+        None
+    }
+
+    /// Allocates the workspace, unless it exists.
+    fn reserve(&mut self) {}
+
+    /// Takes over the model of another action of the same kind, as model `place` or as a new model. Returns whether it
+    /// did so; the other action is then unused.
+    fn merge(&mut self, other: &mut dyn ActionModel, place: Option<usize>) -> bool {
+        let _ = (other, place);
+        false
+    }
+
+    /// Selects, among the models that this action represents, the one that is to be changed.
+    fn choose(&mut self, model: usize) {
+        let _ = model;
+    }
+
+    /// Assigns knot t, of `horizon` knots, to one of the models that this action represents.
+    fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        let _ = (t, horizon, model);
+    }
+
+    /// Sets the duration (s) of knot t of the chosen model; returns whether the knot has one.
+    fn set_duration(&mut self, t: usize, dt: f64) -> bool {
+        let _ = (t, dt);
+        false
+    }
+
+    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute besides the next state.
+    fn show_outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        let _ = (t, x, u, show);
+    }
+
+    /// Returns the robot of the knots.
+    fn robot(&mut self) -> Option<&mut RobotDynamics> {
+        None
+    }
+}
+
+/// Evaluates a group of knots of any action.
+#[track_caller]
+pub(crate) fn evaluate(
+    action: &mut dyn ActionModel,
+    knots: &[usize],
+    xs: &[f64],
+    us: &[f64],
+    what: Evaluation<'_>,
+    results: &mut Results<'_>,
+) {
+    if let Some(group) = action.knot_group_mut() {
+        return group.evaluate(knots, xs, us, what, results);
+    }
+    let Results { next, costs, lq_knots, .. } = results;
+    match (action.group_model(), what) {
+        (Some(group), Evaluation::Values) => group.calc_group(knots, xs, us, next, costs),
+        (Some(group), _) => group.calc_diff_group(knots, xs, us, lq_knots),
+        (None, Evaluation::Values) => calc_each(action, knots, [xs, us], next, costs),
+        (None, _) => calc_diff_each(action, knots, [xs, us], lq_knots),
+    }
+}
+
+/// Returns the number of states that an action computes at the cost of one.
+pub(crate) fn lanes(action: &mut dyn ActionModel) -> usize {
+    let lanes = match action.knot_group_mut() {
+        Some(group) => group.lanes(),
+        None => action.group_model().map_or(1, |group| group.lanes()),
+    };
+    lanes.max(1)
+}
+
+/// Returns the group that an action is, or the group of the innermost action that it wraps.
+pub(crate) fn innermost(action: &mut dyn ActionModel) -> Option<&mut dyn KnotGroup> {
+    if action.inner_mut().is_some() {
+        return innermost(action.inner_mut()?);
+    }
+    action.knot_group_mut()
+}
+
+/// Computes the values of a group, knot by knot.
+#[track_caller]
+fn calc_each<A: ActionModel + ?Sized>(
+    action: &mut A,
+    knots: &[usize],
+    [xs, us]: [&[f64]; 2],
+    next: &mut [f64],
+    costs: &mut [f64],
+) {
+    let (nx, nu) = (action.nx(), action.nu());
+    assert_length("xs", xs.len(), knots.len() * nx);
+    assert_length("us", us.len(), knots.len() * nu);
+    assert_length("next", next.len(), knots.len() * nx);
+    assert_length("costs", costs.len(), knots.len());
+    for (i, &t) in knots.iter().enumerate() {
+        costs[i] = action.calc(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut next[i * nx..][..nx]);
+    }
+}
+
+/// Computes the derivatives of a group, knot by knot.
+#[track_caller]
+fn calc_diff_each<A: ActionModel + ?Sized>(
+    action: &mut A,
+    knots: &[usize],
+    [xs, us]: [&[f64]; 2],
+    lq_knots: &mut [LqKnot],
+) {
+    let (nx, nu) = (action.nx(), action.nu());
+    assert_length("xs", xs.len(), knots.len() * nx);
+    assert_length("us", us.len(), knots.len() * nu);
+    assert_length("lq_knots", lq_knots.len(), knots.len());
+    for (i, &t) in knots.iter().enumerate() {
+        action.calc_diff(t, &xs[i * nx..][..nx], &us[i * nu..][..nu], &mut lq_knots[i]);
+    }
+}

@@ -1,0 +1,323 @@
+//! Horizon: which costs and limits belong to which knot, for all models that one action represents.
+
+use super::costs::{Cost, Costs, WeightedActivations, check_weight};
+use super::knot_data::{Capabilities, KnotState, Sensitivities};
+use super::limits::{Limit, Limits};
+use super::residuals::layout::KnotLayout;
+use super::residuals::terms::{KinematicTerms, KnotTerms};
+use super::residuals::view::{ResidualView, Scratch};
+use crate::Error;
+use crate::lq::LqKnot;
+use crate::problem::MOST_KNOTS;
+use condyle_dynamics::Model;
+use std::sync::Arc;
+
+/// Value for each model that an action stands for, and which of them serves which knot.
+#[derive(Clone, Debug)]
+pub(crate) struct PerModel<T> {
+    /// Value of each model.
+    all: Vec<T>,
+    /// Index of the model that serves each knot; 0 beyond its end.
+    of: Vec<usize>,
+    /// Model that is to be changed.
+    chosen: usize,
+}
+
+impl<T> PerModel<T> {
+    /// Returns the value of a single model.
+    pub(crate) fn new(only: T) -> Self {
+        Self { all: vec![only], of: Vec::new(), chosen: 0 }
+    }
+
+    /// Returns all values.
+    pub(crate) fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// Returns all values, to be changed.
+    pub(crate) fn all_mut(&mut self) -> &mut [T] {
+        &mut self.all
+    }
+
+    /// Returns the value at knot t.
+    pub(crate) fn at(&self, t: usize) -> &T {
+        self.of.get(t).and_then(|&model| self.all.get(model)).unwrap_or(&self.all[0])
+    }
+
+    /// Returns the value of the model that is to be changed.
+    pub(crate) fn chosen_mut(&mut self) -> &mut T {
+        &mut self.all[self.chosen]
+    }
+
+    /// Chooses the model that is to be changed.
+    pub(crate) fn choose(&mut self, model: usize) {
+        self.chosen = model.min(self.all.len() - 1);
+    }
+
+    /// Takes over the value of another action's model, as model `place` or as a new one.
+    pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
+        match (place, other.all.pop()) {
+            (Some(place), Some(value)) => self.all[place] = value,
+            (_, value) => self.all.extend(value),
+        }
+    }
+
+    /// Assigns knot t, of `horizon` knots, to a model. Allocates at the first call only.
+    pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        if self.all.len() > 1 {
+            self.of.resize(horizon, 0);
+            self.of[t] = model;
+        }
+    }
+}
+
+/// One value for all knots of a horizon, and others for some of them.
+#[derive(Clone, Debug)]
+pub(crate) struct PerKnot<T> {
+    /// Value that knots share, followed by the values of single knots.
+    all: Vec<T>,
+    /// Index of the value of each knot; 0 beyond its end.
+    of: Vec<usize>,
+    /// Indices of values whose knots have left the horizon.
+    free: Vec<usize>,
+}
+
+impl<T> PerKnot<T> {
+    /// Returns a value for all knots.
+    pub(crate) fn new(common: T) -> Self {
+        Self { all: vec![common], of: Vec::new(), free: Vec::new() }
+    }
+
+    fn index(&self, t: Option<usize>) -> usize {
+        t.and_then(|t| self.of.get(t)).copied().unwrap_or(0)
+    }
+
+    /// Returns all values.
+    pub(crate) fn all(&self) -> &[T] {
+        &self.all
+    }
+
+    /// Returns all values, to be changed.
+    pub(crate) fn all_mut(&mut self) -> &mut [T] {
+        &mut self.all
+    }
+
+    /// Returns the value of knot t.
+    pub(crate) fn at(&self, t: usize) -> &T {
+        &self.all[self.index(Some(t))]
+    }
+
+    /// Returns the value of knot t, or the value that knots without their own share.
+    pub(crate) fn at_mut(&mut self, t: Option<usize>) -> &mut T {
+        let k = self.index(t);
+        &mut self.all[k]
+    }
+
+    /// Sets the value of knot t, or the value that knots without their own share.
+    pub(crate) fn set(&mut self, t: Option<usize>, value: T) {
+        let Some(t) = t else {
+            self.all[0] = value;
+            return;
+        };
+        if t >= self.of.len() {
+            self.of.resize(t + 1, 0);
+        }
+        if self.of[t] == 0 {
+            self.of[t] = self.free.pop().unwrap_or(self.all.len());
+        }
+        match self.all.get_mut(self.of[t]) {
+            Some(old) => *old = value,
+            None => {
+                self.all.push(value);
+                self.free.reserve(self.all.len()); // so that a shift need not
+            }
+        }
+    }
+
+    /// Moves the horizon on: knot t becomes knot t − 1.
+    pub(crate) fn shift(&mut self) {
+        if !self.of.is_empty() {
+            let first = self.of.remove(0);
+            self.free.extend((first > 0).then_some(first));
+        }
+    }
+}
+
+/// Costs and limits of all knots that an action serves.
+#[derive(Clone, Debug)]
+pub(crate) struct HorizonTerms {
+    model: Arc<Model>,
+    capabilities: Arc<Capabilities>,
+    costs: PerModel<PerKnot<Costs>>,
+    pub limits: Limits,
+    /// Memory that costs of any knot take, and that limits do.
+    layouts: [KnotLayout; 2],
+    /// Made when it is first needed, and forgotten when the layouts grow.
+    scratch: Option<Box<Scratch>>,
+}
+
+impl HorizonTerms {
+    /// Terms of a horizon with the same costs at all knots, and no limits.
+    pub(crate) fn new(model: Arc<Model>, capabilities: Capabilities, costs: Vec<Cost>) -> Result<Self, Error> {
+        let capabilities = Arc::new(capabilities);
+        let costs = Costs::new(model.clone(), capabilities.clone(), costs)?;
+        let layouts = [costs.terms.layout(), KnotLayout::default()];
+        let costs = PerModel::new(PerKnot::new(costs));
+        Ok(Self { costs, limits: Limits::none(), layouts, scratch: None, capabilities, model })
+    }
+
+    /// Adds limits that hold at every knot, in addition to the given limits.
+    pub(crate) fn require(&mut self, limits: Vec<Limit>) -> Result<(), Error> {
+        self.limits = Limits::asked_for(limits);
+        self.set_limits(None, Vec::new())
+    }
+
+    /// Returns the costs of knot t, or the costs that knots without their own share.
+    pub(crate) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
+        self.costs.chosen_mut().at_mut(t)
+    }
+
+    /// Returns the costs that knots share, and the costs of single knots.
+    pub(crate) fn all_costs_mut(&mut self) -> impl Iterator<Item = &mut Costs> {
+        self.costs.chosen_mut().all_mut().iter_mut()
+    }
+
+    /// Changes the weights of the terms called `name`, of all knots; returns whether it exists.
+    pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
+        check_weight(name, weight)?;
+        let mut found = false;
+        for costs in self.costs.chosen_mut().all_mut() {
+            found |= costs.set_weight(name, weight)?;
+        }
+        Ok(found)
+    }
+
+    /// Gives knot t costs of its own.
+    pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
+        Error::check_size("knot", t, MOST_KNOTS)?;
+        let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs).map_err(|error| match error {
+            Error::Cost { name, what } => Error::Cost { name, what: format!("{what} (knot {t})") },
+            other => other,
+        })?;
+        self.costs.chosen_mut().set(Some(t), costs);
+        self.update_layouts();
+        Ok(())
+    }
+
+    /// Gives knot t limits of its own, or all knots that have none of their own.
+    pub(crate) fn set_limits(&mut self, t: Option<usize>, limits: Vec<Limit>) -> Result<(), Error> {
+        Error::check_size("knot", t.unwrap_or(0), MOST_KNOTS)?;
+        self.limits.set(&self.model, &self.capabilities, t, limits)?;
+        self.update_layouts();
+        Ok(())
+    }
+
+    fn update_layouts(&mut self) {
+        let all = self.costs.all().iter().flat_map(PerKnot::all);
+        let costs = all.fold(KnotLayout::default(), |most, costs| most.or(costs.terms.layout()));
+        self.set_layouts([costs, self.limits.layout()]);
+    }
+
+    /// Sets the layouts; the scratch is renewed where there was one.
+    fn set_layouts(&mut self, layouts: [KnotLayout; 2]) {
+        if self.layouts != layouts {
+            self.layouts = layouts;
+            if self.scratch.take().is_some() {
+                self.reserve();
+            }
+        }
+    }
+
+    /// Makes the scratch, unless it is there.
+    pub(crate) fn reserve(&mut self) {
+        let Self { model, capabilities, layouts, scratch, .. } = self;
+        scratch.get_or_insert_with(|| Box::new(Scratch::new(model, capabilities.nu, layouts[0] + layouts[1])));
+    }
+
+    /// Takes over the costs and limits of another action with the same dynamics, as model `place` or as a new model.
+    pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
+        self.costs.append(&mut other.costs, place);
+        self.limits.append(&mut other.limits, place);
+        self.set_layouts([0, 1].map(|k| self.layouts[k].or(other.layouts[k])));
+    }
+
+    /// Selects the model that is to be changed.
+    pub(crate) fn choose(&mut self, model: usize) {
+        self.costs.choose(model);
+        self.limits.choose(model);
+    }
+
+    /// Assigns knot t, of `horizon` knots, to one of the models that the action represents.
+    pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
+        self.costs.serve(t, horizon, model);
+        self.limits.serve(t, horizon, model);
+    }
+
+    /// Moves the horizon on: knot t becomes knot t − 1.
+    pub(crate) fn shift(&mut self) {
+        self.costs.all_mut().iter_mut().for_each(PerKnot::shift);
+        self.limits.shift();
+    }
+
+    /// Returns the memory that costs of any knot take, and that limits do.
+    pub(crate) fn layouts(&self) -> [KnotLayout; 2] {
+        self.layouts
+    }
+
+    /// Returns the memory that costs and limits of any knot take together.
+    pub(crate) fn layout(&self) -> KnotLayout {
+        self.layouts[0] + self.layouts[1]
+    }
+
+    /// Returns the costs of knot t, and its limits if it is `limited`.
+    pub(crate) fn at(&self, t: usize, limited: bool) -> KnotTerms<'_> {
+        KnotTerms([&self.costs.at(t).at(t).terms, self.limits.at(t, limited)])
+    }
+
+    /// Computes ℓ at knot t, and the term of its limits if it is `limited`.
+    pub(crate) fn calc(&mut self, t: usize, state: KnotState<'_>, limited: bool) -> (f64, f64) {
+        self.reserve();
+        let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
+        let [kinematics, others] = &state.data.residuals.kinematic;
+        let mut view = ResidualView { model, t, state, kinematics, scratch };
+        let cost = costs.at(t).at(t).terms.value(&mut view, &WeightedActivations(1.0));
+        view.kinematics = others;
+        let mut term = 0.0;
+        if limited {
+            let (terms, objective) = limits.objective(t, limited);
+            term = terms.value(&mut view, &objective);
+        }
+        (cost, term)
+    }
+
+    /// Computes the derivatives of `scale` · ℓ at knot t, and of the term of its limits if it is `limited`.
+    pub(crate) fn calc_diff(
+        &mut self,
+        t: usize,
+        state: KnotState<'_>,
+        sensitivities: &dyn Sensitivities,
+        scale: f64,
+        limited: bool,
+        knot: &mut LqKnot,
+    ) {
+        self.reserve();
+        let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
+        let [first, second] = &state.data.residuals.kinematic;
+        let (limits, mut objective) = limits.objective(t, limited);
+        if limited {
+            objective.multipliers.begin(t);
+        }
+        scratch.clear();
+        let mut view = ResidualView { model, t, state, kinematics: first, scratch };
+        for diagonal in [false, true] {
+            view.kinematics = first;
+            let costs = &costs.at(t).at(t).terms;
+            costs.differentiate(&mut view, sensitivities, &mut WeightedActivations(scale), diagonal, knot);
+            view.kinematics = second;
+            limits.differentiate(&mut view, sensitivities, &mut objective, diagonal, knot);
+            if !diagonal {
+                view.scratch.write(knot);
+            }
+        }
+    }
+}

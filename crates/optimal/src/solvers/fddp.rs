@@ -1,0 +1,162 @@
+//! Differential dynamic programming, feasibility-driven or not.
+
+use super::settings::Settings;
+use super::solution::{Iteration, Solution};
+use super::solver_loop::{Pass, SolverLoop};
+use super::watch::{Observer, Watch};
+use crate::error::Error;
+use crate::problem::Problem;
+
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of
+/// Crocoddyl 3.2: both produce the same iterates. Bounds on controls ([`bounds`](crate::ActionModel::bounds)) are
+/// handled as in Crocoddyl's box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022). While gaps
+/// exist, the bounds only clamp the controls of trials. Afterwards, each knot's step minimises its quadratic model
+/// within the bounds.
+///
+/// The warm start may have gaps f, where the trajectory does not satisfy the dynamics. One iteration is
+///
+/// ```text
+/// derivatives   at the iterate, if it is new
+/// sweep         k, K, Vx, Vxx; repeated with a larger regularisation while Quu is not positive definite
+/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap; accepted if it lowers the cost
+///               by more than `accept` times the expected α (d₁ + ½ α d₂), or, while gaps exist, raises it by less
+///               than `accept_ascent` times that
+/// ```
+///
+/// Iterates count as feasible after the first full step (α = 1 closes all gaps at once). The feedback is u = ū + α k +
+/// K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
+///
+/// The first step length is tried alone. If it fails, the next four are tried side by side, and then the others. The
+/// number tried at once is limited by the [`lanes`](crate::GroupModel::lanes) of the actions. The longest good step is
+/// taken, as in a search of one length after the other.
+///
+/// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace, and workspaces for
+/// [`segments`](Settings::segments). Copies of actions for [`threads`](Settings::threads) are allocated by the first
+/// solve that needs them. Nothing else is allocated, except by rayon itself.
+///
+/// # Examples
+/// ```
+/// use condyle_optimal::{ActionModel, Fddp, LqKnot, Problem, Status};
+/// # struct Integrator { nu: usize }
+/// # impl ActionModel for Integrator {
+/// #     fn nx(&self) -> usize { 1 }
+/// #     fn nu(&self) -> usize { self.nu }
+/// #     fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+/// #         let u: f64 = u.iter().sum();
+/// #         next[0] = x[0] + u;
+/// #         0.5 * (x[0] * x[0] + u * u)
+/// #     }
+/// #     fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
+/// #         (knot.A[0], knot.Q[0], knot.q[0]) = (1.0, 1.0, x[0]);
+/// #         knot.B.fill(1.0);
+/// #         knot.S.fill(0.0);
+/// #         knot.R.fill(1.0);
+/// #         knot.r.copy_from_slice(u);
+/// #     }
+/// # }
+/// // x⁺ = x + u, ℓ = ½ (x² + u²): linear and quadratic, so the first step is the last.
+/// let (knot, end) = (Integrator { nu: 1 }, Integrator { nu: 0 });
+/// let mut problem = Problem::new(vec![1.0], vec![Box::new(knot)], vec![0; 30], Box::new(end))?;
+/// let mut solver = Fddp::new(&problem);
+/// let solution = solver.solve(&mut problem, &[0.0; 31], &[0.0; 30])?;
+///
+/// assert_eq!(solution.status, Status::Converged);
+/// let golden = (1.0 + 5.0_f64.sqrt()) / 2.0;
+/// assert!((solution.u(0)[0] + 1.0 / golden).abs() < 1e-8);
+/// assert!((solution.cost - golden / 2.0).abs() < 1e-8);
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Fddp {
+    /// Settings; may be changed between solves.
+    pub settings: Settings,
+    solver: SolverLoop,
+}
+
+impl Fddp {
+    /// Creates a solver with the default settings and the workspace for problems with the dimensions of `problem`.
+    pub fn new(problem: &Problem) -> Self {
+        Self { settings: Settings::default(), solver: SolverLoop::new(problem) }
+    }
+
+    /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat.
+    ///
+    /// # Errors
+    /// [`Error`] if the dimensions of `problem` differ from the problem given to [`new`](Self::new), the warm start has
+    /// a wrong length, is not finite or contains an invalid state, or a setting is invalid. A solve that does not
+    /// converge is not an error: see [`Solution::status`].
+    pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
+        self.run(problem, Some([xs, us]), &mut |_: &Iteration| {})
+    }
+
+    /// Solves as [`solve`](Self::solve) does, and passes each iteration to `observer` when it ends. The observer may
+    /// end the solve.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn solve_with(
+        &mut self,
+        problem: &mut Problem,
+        xs: &[f64],
+        us: &[f64],
+        mut observer: impl Observer,
+    ) -> Result<&Solution, Error> {
+        self.run(problem, Some([xs, us]), &mut observer)
+    }
+
+    /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
+    /// [`shift`](Self::shift), for the next horizon.
+    ///
+    /// A lost trajectory is replaced by x̂₀ held still at all knots, if that costs less. A trajectory is lost if it is
+    /// not finite, or costs more than ten times as much as the last solution, with 1 added to both. If the last solve
+    /// ran out of time or iterations with a rejected step, the regularisation starts at its last value.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
+        self.run(problem, None, &mut |_: &Iteration| {})
+    }
+
+    /// Solves as [`resume`](Self::resume) does, and passes each iteration to `observer` when it ends. The observer may
+    /// end the solve.
+    ///
+    /// # Errors
+    /// As [`solve`](Self::solve).
+    pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
+        self.run(problem, None, &mut observer)
+    }
+
+    /// Turns the solution into a warm start for a problem that has been [shifted](Problem::shift) by one knot since.
+    /// States, controls and gains move one knot to the front, and the last control is repeated (it is zero where the
+    /// number of controls changes). Allocates only if the number of controls differs along the horizon.
+    ///
+    /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory comes from a warm
+    /// start or from a solve that took a step. At each further shift without such a solve, the last state is repeated,
+    /// x_N = x_{N−1}, and the next solve closes the gap. Nothing stabilises a rollout with repeated controls: without
+    /// this rule, the end of the horizon would diverge exponentially while solves run out of time.
+    ///
+    /// # Errors
+    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
+    pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        self.solver.shift(problem, &self.settings)
+    }
+
+    /// Returns the result of the last solve.
+    pub fn solution(&self) -> &Solution {
+        &self.solver.iterate.solution
+    }
+
+    fn run(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        observer: &mut dyn Observer,
+    ) -> Result<&Solution, Error> {
+        let (Self { settings, solver }, mut watch) = (self, Watch::new(observer));
+        solver.begin(problem, settings, warm_start)?;
+        solver.start_clock(settings, &watch);
+        let pass = Pass { resumes: warm_start.is_none(), ..Pass::default() };
+        solver.pass(problem, settings, pass, &mut watch);
+        Ok(solver.end(settings, &watch))
+    }
+}

@@ -1,0 +1,94 @@
+//! Iterate of a solver: a trajectory with its dynamics, cost and gaps.
+
+use super::solution::Solution;
+use crate::problem::Problem;
+use crate::time::Instant;
+use condyle_linalg::max_abs;
+
+/// Sum that is rounded only once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Sum {
+    sum: f64,
+    /// Sum of the rounding errors.
+    lost: f64,
+}
+
+impl Sum {
+    pub(super) fn add(&mut self, x: f64) {
+        let sum = self.sum + x;
+        let (large, small) = if self.sum.abs() >= x.abs() { (self.sum, x) } else { (x, self.sum) };
+        self.lost += (large - sum) + small;
+        self.sum = sum;
+    }
+
+    pub(super) fn value(self) -> f64 {
+        self.sum + self.lost
+    }
+}
+
+/// Iterate, and the storage in which its cost and gaps are computed.
+#[derive(Debug, Clone)]
+pub(super) struct Iterate {
+    /// Solution, whose trajectory and cost are the trajectory and cost of the iterate.
+    pub(super) solution: Solution,
+    /// φₜ(xₜ, uₜ), N·nx.
+    pub(super) next: Vec<f64>,
+    /// Accelerations and forces, N equal parts, for knots in inverse-dynamics form.
+    pub(super) motions: Vec<f64>,
+    /// Whether `motions` belongs to the trajectory.
+    pub(super) knows_motions: bool,
+    costs: Vec<f64>,
+    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
+    pub(super) gaps: Vec<f64>,
+}
+
+impl Iterate {
+    /// Allocates an iterate of zeros for `problem`.
+    pub(super) fn new(problem: &Problem) -> Self {
+        let (shape, horizon) = (problem.shape(), problem.horizon());
+        Self {
+            solution: Solution::new(problem),
+            next: vec![0.0; horizon * shape.nx],
+            motions: vec![0.0; horizon * problem.motion_size()],
+            knows_motions: false,
+            costs: vec![0.0; horizon + 1],
+            gaps: vec![0.0; (horizon + 1) * shape.ndx],
+        }
+    }
+
+    /// Computes dynamics, cost and gaps of the trajectory; returns ‖f‖∞.
+    pub(super) fn evaluate(&mut self, problem: &mut Problem) -> f64 {
+        let clock = Instant::now();
+        let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
+        problem.calc_with_motions(xs, us, next, costs, motions);
+        self.knows_motions = true;
+        let mut sum = Sum::default();
+        self.costs.iter().for_each(|cost| sum.add(*cost));
+        self.solution.cost = sum.value();
+        self.solution.timings.calc += clock.elapsed();
+        self.update_gaps(problem)
+    }
+
+    /// Computes f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns ‖f‖∞.
+    pub(super) fn update_gaps(&mut self, problem: &Problem) -> f64 {
+        let (shape, xs) = (self.solution.shape(), &self.solution.xs);
+        for t in 0..=shape.horizon() {
+            let predicted = if t == 0 { problem.x0() } else { &self.next[shape.x(t - 1)] };
+            let (x, gap) = (&xs[shape.x(t)], &mut self.gaps[shape.dx(t)]);
+            if x == predicted {
+                gap.fill(0.0);
+            } else {
+                problem.action(t).difference(x, predicted, gap);
+            }
+        }
+        max_abs(&self.gaps)
+    }
+
+    /// Returns the knot, the entry of the tangent space, and the size of the largest gap.
+    pub(super) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
+        let ndx = self.solution.shape().ndx;
+        let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });
+        let (i, size) = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (size > 0.0).then_some((i / ndx, i % ndx, size))
+    }
+}

@@ -1,0 +1,22 @@
+//! Solvers: one loop of derivatives, sweeps and searches, and the methods that use it.
+
+mod augmented_lagrangian;
+mod best;
+mod fddp;
+mod iterate;
+mod multipliers;
+mod outcome;
+mod rollout;
+mod search;
+mod settings;
+mod solution;
+mod solver_loop;
+mod start;
+mod watch;
+
+pub use augmented_lagrangian::AugmentedLagrangian;
+pub use fddp::Fddp;
+pub use outcome::{Outcome, Violation, ViolationKind};
+pub use settings::{ConstraintSettings, DdpMethod, Settings};
+pub use solution::{Iteration, Solution, Status, Timings};
+pub use watch::{Observer, Verdict};

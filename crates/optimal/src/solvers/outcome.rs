@@ -1,0 +1,97 @@
+//! Outcome of a solve with constraints, and the evidence of a constraint that does not hold.
+
+use core::fmt;
+use std::sync::Arc;
+
+/// State of the constraints after a solve; the trajectory is in the [`Solution`](crate::Solution).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Outcome {
+    /// Cost Σ ℓ without the terms of the constraints.
+    pub cost: f64,
+    /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
+    pub primal: f64,
+    /// Row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]. `None` if all constraints hold
+    /// exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on x̂₀ with the
+    /// largest violation.
+    ///
+    /// [`Status::ConstraintsViolated`]: crate::Status::ConstraintsViolated
+    /// [`Status::Infeasible`]: crate::Status::Infeasible
+    pub worst: Option<Violation>,
+    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on their bounds.
+    pub dual: f64,
+    /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
+    /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in their
+    /// order. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
+    pub multipliers: Vec<Vec<f64>>,
+    /// Penalty 1/μ at the end of the solve.
+    pub penalty: f64,
+    /// Number of inner solves.
+    pub solves: usize,
+    /// Number of iterations of all inner solves.
+    pub iterations: usize,
+}
+
+/// Kind of a [`Violation`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ViolationKind {
+    /// Constraint of a knot: a robot's [`Limit`](crate::robot::Limit) or a [`PathConstraint`](crate::PathConstraint).
+    Constraint,
+    /// Gap of the dynamics: f₀ = x̂₀ ⊖ x₀ at knot 0, else fₜ = φ(xₜ₋₁, uₜ₋₁) ⊖ xₜ.
+    Gap,
+}
+
+/// Row of a constraint or of the dynamics that does not hold at the end of a solve.
+///
+/// ```
+/// # use condyle_dynamics::robots;
+/// # use condyle_optimal::robot::{FreeDynamics, Limit, Residual};
+/// # use condyle_optimal::{AugmentedLagrangian, Problem, Status};
+/// # use std::sync::Arc;
+/// # let arm = Arc::new(robots::arm7());
+/// # let x0 = vec![0.0; 14];
+/// // the arm begins at rest, but a limit requires at least 0.5 rad of its third joint
+/// let mut lower = vec![f64::NEG_INFINITY; 14];
+/// lower[2] = 0.5;
+/// let bent = Limit::new("bent", Residual::State { reference: x0.clone() }, lower, vec![f64::INFINITY; 14]);
+/// let knot = FreeDynamics::running(arm.clone(), 0.05, vec![])?.with_limits(vec![bent])?;
+/// let end = FreeDynamics::terminal(arm, vec![])?;
+/// # let mut knot = knot;
+/// # let us = knot.quasi_static(&x0).repeat(5);
+/// let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 5], Box::new(end))?;
+/// let mut solver = AugmentedLagrangian::new(&problem);
+/// # solver.settings.max_solves = 2;
+/// let status = solver.solve(&mut problem, &x0.repeat(6), &us)?.status;
+/// assert_eq!(status, Status::Infeasible);
+/// let worst = solver.outcome().worst.as_ref().unwrap();
+/// assert_eq!(worst.to_string(), "knot 0: entry 2 of `bent` is 5.000e-1 beyond its bound");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Violation {
+    /// Kind of the row.
+    pub kind: ViolationKind,
+    /// Index of the knot, 0 … N.
+    pub knot: usize,
+    /// Index of the row: for a constraint the index in [`Outcome::multipliers`](crate::Outcome::multipliers) of the
+    /// knot, for a gap the entry of the tangent vector.
+    pub row: usize,
+    /// Name of the [`Limit`](crate::robot::Limit), if the row belongs to one.
+    pub name: Option<Arc<str>>,
+    /// Index of the row within the named limit; equals `row` without a name.
+    pub entry: usize,
+    /// Distance from the bound, or size of the gap, in the units of the row; infinite if it is NaN.
+    pub amount: f64,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, knot, row, name, entry, amount } = self;
+        match (kind, name) {
+            (ViolationKind::Gap, _) => write!(f, "knot {knot}: entry {row} of the gap is {amount:.3e}"),
+            (_, Some(name)) => write!(f, "knot {knot}: entry {entry} of `{name}` is {amount:.3e} beyond its bound"),
+            (_, None) => write!(f, "knot {knot}: constraint {row} is {amount:.3e} beyond its bound"),
+        }
+    }
+}

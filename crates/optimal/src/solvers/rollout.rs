@@ -1,0 +1,196 @@
+//! Rollouts of several step lengths side by side.
+
+use super::iterate::{Iterate, Sum};
+use super::solution::Solution;
+use crate::lq::{DIVERGED, KnotFeedback};
+use crate::problem::{ActionView, Evaluation, Problem, Results, Shape, evaluate};
+use condyle_linalg::{View, add_scaled_product, dot};
+use core::ops::RangeInclusive;
+
+/// Trial trajectories, one per step length, that are rolled out together: at each knot the trials form one group. They
+/// are stored knot after knot and, within a knot, trial after trial.
+#[derive(Debug, Clone)]
+pub(super) struct Trials {
+    shape: Shape,
+    /// Number of trials of the last run; at most `width`.
+    count: usize,
+    width: usize,
+    xs: Vec<f64>,
+    us: Vec<f64>,
+    /// φₜ(xₜ, uₜ), N knots. It differs from the next x by the remaining gap.
+    next: Vec<f64>,
+    /// Motion of each knot (accelerations and forces), in equal parts.
+    motions: Vec<f64>,
+    motion_size: usize,
+    /// Sum of the costs of each trial; meaningless if the trial `failed`.
+    costs: Vec<Sum>,
+    /// Whether each trial has diverged.
+    failed: Vec<bool>,
+    knot_costs: Vec<f64>,
+    knot: Vec<usize>,
+    dx: Vec<f64>,
+    /// Output buffer for the next state of a terminal action, which is never read.
+    unread: Vec<f64>,
+}
+
+/// Trajectory from which trials start, and the direction.
+#[derive(Clone, Copy)]
+pub(super) struct Nominal<'a> {
+    pub(super) xs: &'a [f64],
+    pub(super) us: &'a [f64],
+    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
+    pub(super) gaps: Option<&'a [f64]>,
+    pub(super) feedback: &'a [KnotFeedback],
+}
+
+impl Trials {
+    /// Allocates the storage for `width` trials of `problem`.
+    pub(super) fn new(problem: &Problem, width: usize) -> Self {
+        let shape = problem.shape().clone();
+        let horizon = shape.horizon();
+        Self {
+            count: 0,
+            width,
+            xs: vec![0.0; (horizon + 1) * shape.nx * width],
+            us: vec![0.0; shape.offsets[horizon] * width],
+            next: vec![0.0; horizon * shape.nx * width],
+            motions: Vec::new(),
+            motion_size: 0,
+            costs: vec![Sum::default(); width],
+            failed: vec![false; width],
+            knot_costs: vec![0.0; width],
+            knot: vec![0; width],
+            dx: vec![0.0; shape.ndx],
+            unread: vec![0.0; shape.nx * width],
+            shape,
+        }
+    }
+
+    /// Adapts the storage to a problem whose numbers of controls have changed.
+    pub(super) fn reshape(&mut self, problem: &Problem) {
+        self.shape.clone_from(problem.shape());
+        self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
+    }
+
+    /// Sets the number of entries of each knot's motion that the next runs keep.
+    pub(super) fn keep_motions(&mut self, size: usize) {
+        self.motion_size = size;
+        self.motions.resize(self.shape.horizon() * self.width * size, 0.0);
+    }
+
+    /// Returns the maximum number of trials.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rolls out one trial per step length α:
+    ///
+    /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
+    ///
+    /// with uₜ moved into its bounds. The knots begin the horizon or follow the knots of the last call.
+    pub(super) fn run(
+        &mut self,
+        view: &mut ActionView<'_>,
+        nominal: &Nominal<'_>,
+        steps: &[f64],
+        knots: RangeInclusive<usize>,
+    ) {
+        let Self { shape, xs, us, next, motions, costs, failed, knot_costs, knot, dx, unread, .. } = self;
+        let size = self.motion_size;
+        let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
+        if *knots.start() == 0 {
+            self.count = count;
+            costs[..count].fill(Sum::default());
+            failed[..count].fill(false);
+        }
+        for t in knots {
+            let nu = shape.nu(t);
+            let (done, ahead) = next.split_at_mut(t * nx * count);
+            let x_all = &mut xs[t * nx * count..][..nx * count];
+            let u_all = &mut us[shape.offsets[t] * count..][..nu * count];
+            for (i, &step) in steps.iter().enumerate() {
+                let (x, u) = (&mut x_all[i * nx..][..nx], &mut u_all[i * nu..][..nu]);
+                let (x_nominal, u_nominal) = (&nominal.xs[shape.x(t)], &nominal.us[shape.u(t)]);
+                u.copy_from_slice(u_nominal);
+                if failed[i] {
+                    x.copy_from_slice(x_nominal); // a valid state: the group call evaluates the action there
+                    continue;
+                }
+                let action = view.action(t);
+                let predicted = if t == 0 { view.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
+                match nominal.gaps {
+                    Some(gaps) if step != 1.0 => {
+                        for (dx, f) in dx.iter_mut().zip(&gaps[shape.dx(t)]) {
+                            *dx = (step - 1.0) * f;
+                        }
+                        action.integrate(predicted, dx, x);
+                    }
+                    _ => x.copy_from_slice(predicted),
+                }
+                action.difference(x_nominal, x, dx);
+                let gains = &nominal.feedback[t];
+                add_scaled_product(u, step, View::new(gains.k.as_slice(), nu), &[1.0]); // u += α k + K δx
+                add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
+                if let Some((lower, upper)) = action.bounds(t) {
+                    for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
+                        *u = if *u < *lower { *lower } else { *u }; // a NaN remains
+                        *u = if *u > *upper { *upper } else { *u };
+                    }
+                }
+            }
+            knot[..count].fill(t);
+            let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
+            let action = view.action_mut(t);
+            let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
+            let motions = if t < horizon { &mut motions[t * size * count..][..size * count] } else { &mut [] };
+            let mut results = Results::values(next_all, costs_all, motions);
+            evaluate(action, knot, x_all, u_all, Evaluation::Values, &mut results);
+            for i in 0..count {
+                costs[i].add(knot_costs[i]);
+                let bounded = |x: f64| x.abs() < DIVERGED; // false for NaN
+                let finite = |x: &[f64]| x.iter().all(|x| bounded(*x));
+                failed[i] |= !(bounded(costs[i].value()) && (t == horizon || finite(&next_all[i * nx..][..nx])));
+            }
+        }
+    }
+
+    /// Returns the cost of trial `i`, or `None` if the trial diverged.
+    pub(super) fn cost(&self, i: usize) -> Option<f64> {
+        (!self.failed[i]).then_some(self.costs[i].value())
+    }
+
+    /// Computes −Σ bᵀ (x ⊖ x_trial) for trial `i`, summed over the states x and the vectors b of all knots, both flat.
+    pub(super) fn distance(&mut self, view: &ActionView<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
+        let mut dx = std::mem::take(&mut self.dx);
+        let mut sum = 0.0;
+        for t in 0..=self.shape.horizon() {
+            view.action(t).difference(self.x(i, t), &xs[self.shape.x(t)], &mut dx);
+            sum -= dot(&b[self.shape.dx(t)], &dx);
+        }
+        self.dx = dx;
+        sum
+    }
+
+    /// Returns the state xₜ of trial `i`.
+    fn x(&self, i: usize, t: usize) -> &[f64] {
+        &self.xs[(t * self.count + i) * self.shape.nx..][..self.shape.nx]
+    }
+
+    /// Copies trial `i`, except its cost, to the iterate.
+    pub(super) fn copy_to(&self, i: usize, to: &mut Iterate) {
+        let Iterate { solution: Solution { xs, us, .. }, next, motions, .. } = to;
+        for t in 0..=self.shape.horizon() {
+            xs[self.shape.x(t)].copy_from_slice(self.x(i, t));
+        }
+        for t in 0..self.shape.horizon() {
+            let (nx, nu) = (self.shape.nx, self.shape.nu(t));
+            let u = self.shape.offsets[t] * self.count + i * nu;
+            us[self.shape.u(t)].copy_from_slice(&self.us[u..u + nu]);
+            next[self.shape.x(t)].copy_from_slice(&self.next[(t * self.count + i) * nx..][..nx]);
+        }
+        let size = self.motion_size;
+        for (t, motion) in motions.chunks_exact_mut(size.max(1)).enumerate() {
+            motion.copy_from_slice(&self.motions[(t * self.count + i) * size..][..size]);
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! Line search of differential dynamic programming: the expected improvement of a step, and the test of whether it is
+//! reached.
+
+use super::best::{Best, Merit};
+use super::iterate::Iterate;
+use super::rollout::{Nominal, Trials};
+use super::settings::{DdpMethod, Settings};
+use super::solution::{Solution, Status};
+use super::watch::{Clock, Phase, Watch};
+use crate::lq::KnotFeedback;
+use crate::problem::{ActionView, Problem};
+use crate::time::Instant;
+use condyle_linalg::threads::join;
+use condyle_linalg::{View, add_scaled_product, dot};
+use core::sync::atomic::{AtomicBool, Ordering};
+
+/// Number of step lengths that are tried side by side when 1 fails, unless ½ is likely to succeed. One of four usually
+/// succeeds. Four take two to three times as long as one, in which branches of the robot are computed in parallel
+/// lanes.
+const SECOND: usize = 4;
+
+/// Number of searches after a shortened step in which shorter steps are tried concurrently; every second or third needs
+/// one.
+const WARY: usize = 3;
+
+/// Outcome of a line search, for the accepted trial or else the last trial that stayed finite.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Search {
+    pub(super) step: f64,
+    pub(super) d1: f64,
+    pub(super) d2: f64,
+    pub(super) decrease: f64,
+    pub(super) expected_decrease: f64,
+    pub(super) accepted: bool,
+    /// Reason why no further trial was made, if the solve must stop.
+    pub(super) stopped: Option<Status>,
+    /// Whether the iterate before the accepted step is now the best one.
+    pub(super) left_best: bool,
+}
+
+/// Iterate with its feedback, and the parts of a solver that a search around it uses.
+pub(super) struct Surroundings<'a, 'o> {
+    /// Iterate, which the accepted trial replaces.
+    pub(super) iterate: &'a mut Iterate,
+    pub(super) merit: Merit,
+    /// Best iterate before this one.
+    pub(super) best: &'a mut Best,
+    /// Feedback and value functions.
+    pub(super) feedback: &'a [KnotFeedback],
+    pub(super) settings: &'a Settings,
+    pub(super) clock: &'a mut Clock,
+    pub(super) watch: &'a mut Watch<'o>,
+}
+
+/// Line search, with its workspace.
+#[derive(Debug, Clone)]
+pub(super) struct LineSearch {
+    trials: Trials,
+    /// Trial that another thread rolls out while this thread tries the first step.
+    ahead: Option<Trials>,
+    /// Number of following searches that try several lengths concurrently, if that is allowed.
+    wary: usize,
+    /// Step lengths, 1, ½, ¼, ….
+    steps: Vec<f64>,
+    /// Vxx f, (N + 1)·ndx.
+    curved_gaps: Vec<f64>,
+    /// dg and dq, the expected improvement without the part that depends on the trial.
+    expected: [f64; 2],
+}
+
+impl LineSearch {
+    /// Allocates the workspace for problems with the dimensions of `problem`.
+    pub(super) fn new(problem: &Problem) -> Self {
+        let (horizon, ndx) = (problem.horizon(), problem.ndx());
+        Self {
+            trials: Trials::new(problem, problem.lanes()),
+            ahead: None,
+            wary: 0,
+            steps: Vec::new(),
+            curved_gaps: vec![0.0; (horizon + 1) * ndx],
+            expected: [0.0; 2],
+        }
+    }
+
+    /// Adapts the storage to a problem whose numbers of controls have changed.
+    pub(super) fn reshape(&mut self, problem: &Problem) {
+        self.trials.reshape(problem);
+        self.ahead.iter_mut().for_each(|ahead| ahead.reshape(problem));
+    }
+
+    /// Begins a solve with `count` step lengths. `motion_size` is the number of entries kept of each knot's motion,
+    /// `threads` the number of threads.
+    pub(super) fn start(&mut self, problem: &Problem, count: usize, motion_size: usize, threads: usize) {
+        if threads > 1 && self.ahead.is_none() {
+            self.ahead = Some(Trials::new(problem, self.trials.width()));
+        }
+        self.wary = 0;
+        self.trials.keep_motions(motion_size);
+        self.ahead.iter_mut().for_each(|ahead| ahead.keep_motions(motion_size));
+        self.steps.clear();
+        self.steps.extend((0..count).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
+    }
+
+    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate. With several threads, if a recent
+    /// search needed a shorter step than 1, another thread tries the next length at the same time as the first.
+    ///
+    /// A trial that diverges keeps the expected improvement of the trial before it. If the first trial diverges, it
+    /// keeps the expected improvement of the previous line search, `last`. In DDP the expected improvement does not
+    /// depend on the trial, so the value of this search is kept.
+    #[inline(never)] // `benches/instructions.py` counts this function by name
+    pub(super) fn run(&mut self, problem: &mut Problem, around: Surroundings<'_, '_>, last: Search) -> Search {
+        self.expect(&around);
+        let Self { trials, ahead, wary, steps, curved_gaps, expected } = self;
+        let Surroundings { iterate, merit, best, feedback, settings, clock, watch } = around;
+        let feasible = merit.feasible;
+        let mut search = Search { accepted: false, left_best: false, ..last };
+        if settings.method == DdpMethod::Ddp {
+            [search.d1, search.d2] = *expected;
+        }
+        let counts_gaps = settings.counts_gaps(feasible);
+        let curved_gaps = counts_gaps.then_some(&curved_gaps[..]);
+        let (horizon, lanes, count) = (problem.horizon(), trials.width(), steps.len());
+        let some_from = |tried: usize| {
+            let most = match tried {
+                0 => 1,
+                1 if last.step >= 0.5 => 1, // ½ is likely to succeed: the last search took ½ or 1
+                1 | 2 => SECOND,
+                _ => count,
+            };
+            tried..tried + most.min(lanes).min(count - tried)
+        };
+        let beside = *wary > 0 && settings.threads > 1 && count > 1;
+        let (mut tried, mut ready) = (0, false); // `ready`: `ahead` holds the next trials, except their terminal knot
+        while tried < count {
+            if !ready && let Err(status) = clock.allows(&[Phase::Rollout], watch) {
+                search.stopped = Some(status);
+                return search;
+            }
+            let start = Instant::now();
+            let Iterate { solution: Solution { xs, us, .. }, gaps, .. } = &*iterate;
+            let nominal = Nominal { xs, us, gaps: counts_gaps.then_some(&gaps[..]), feedback };
+            let rule = Rule { settings, feasible, expected: *expected, curved_gaps, xs, cost: merit.cost };
+            let trying = some_from(tried);
+            let lengths = &steps[trying.clone()];
+            match (ahead.as_mut(), problem.two()) {
+                (Some(ahead), _) if ready => {
+                    std::mem::swap(trials, ahead);
+                    trials.run(&mut problem.action_view(), &nominal, lengths, horizon..=horizon);
+                    ready = false;
+                }
+                (Some(ahead), Some([mut own, mut copies])) if beside && tried == 0 => {
+                    let (next, enough) = (&steps[some_from(1)], AtomicBool::new(false));
+                    join(
+                        || {
+                            trials.run(&mut own, &nominal, lengths, 0..=horizon);
+                            let good = rule.judge(&mut search.clone(), trials, 0, lengths[0], &own).is_some();
+                            enough.store(good, Ordering::Relaxed);
+                        },
+                        || {
+                            ready = (0..horizon).all(|t| {
+                                ahead.run(&mut copies, &nominal, next, t..=t);
+                                !enough.load(Ordering::Relaxed)
+                            });
+                        },
+                    );
+                }
+                _ => trials.run(&mut problem.action_view(), &nominal, lengths, 0..=horizon),
+            }
+            let view = problem.action_view();
+            let good = lengths
+                .iter()
+                .enumerate()
+                .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &view).map(|cost| (i, cost)));
+            iterate.solution.timings.rollout += clock.ran(Phase::Rollout, start);
+            if let Some((i, cost)) = good {
+                search.left_best = best.leave(iterate, merit);
+                trials.copy_to(i, iterate);
+                iterate.solution.cost = cost;
+                search.accepted = true;
+                break;
+            }
+            tried = trying.end;
+        }
+        *wary = if search.step < 1.0 { WARY } else { wary.saturating_sub(1) };
+        search
+    }
+
+    /// Computes dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP omits the gaps f.
+    fn expect(&mut self, around: &Surroundings<'_, '_>) {
+        let Surroundings { iterate, merit, feedback, settings, .. } = around;
+        let ((mut dg, mut dq), counts_gaps) = ((0.0, 0.0), settings.counts_gaps(merit.feasible));
+        for (t, feedback) in feedback.iter().enumerate() {
+            dg -= feedback.expected[0];
+            dq -= feedback.expected[1];
+            if counts_gaps {
+                let range = iterate.solution.shape().dx(t);
+                let (f, curved) = (&iterate.gaps[range.clone()], &mut self.curved_gaps[range]);
+                curved.fill(0.0);
+                add_scaled_product(curved, 1.0, View::new(feedback.Vxx.as_slice(), f.len()), f); // Vxx f
+                let curvature = dot(f, curved);
+                dg -= dot(feedback.Vx.as_slice(), f) + curvature;
+                dq += curvature;
+            }
+        }
+        self.expected = [dg, dq];
+    }
+}
+
+/// Rule by which a trial is accepted, for one iterate.
+struct Rule<'a> {
+    settings: &'a Settings,
+    feasible: bool,
+    /// dg and dq.
+    expected: [f64; 2],
+    /// Vxx f, if gaps count.
+    curved_gaps: Option<&'a [f64]>,
+    /// States and cost of the iterate.
+    xs: &'a [f64],
+    cost: f64,
+}
+
+impl Rule<'_> {
+    /// Writes the expected and the actual decrease of trial i, with step length α, to `search`. Returns its cost if it
+    /// is good.
+    ///
+    /// ```text
+    /// d₁ = dg + dv,   d₂ = dq − 2 dv,   dv = −Σ fᵀVxx (x ⊖ x_trial),   expected decrease α (d₁ + ½ α d₂)
+    /// ```
+    fn judge(
+        &self,
+        search: &mut Search,
+        trials: &mut Trials,
+        i: usize,
+        step: f64,
+        view: &ActionView<'_>,
+    ) -> Option<f64> {
+        search.step = step;
+        let cost = trials.cost(i)?;
+        let dv = self.curved_gaps.map_or(0.0, |curved| trials.distance(view, i, self.xs, curved));
+        search.d1 = self.expected[0] + dv;
+        search.d2 = self.expected[1] - 2.0 * dv;
+        search.expected_decrease = step * (search.d1 + 0.5 * step * search.d2);
+        search.decrease = self.cost - cost;
+        search.is_good(self.settings, self.feasible).then_some(cost)
+    }
+}
+
+impl Search {
+    /// Returns whether the step lowers the cost enough. While gaps exist, a step is also good if it raises the cost
+    /// little enough (FDDP), or is expected to lower the cost of the rollout that closes the gaps (DDP).
+    fn is_good(&self, settings: &Settings, feasible: bool) -> bool {
+        let Self { d1, decrease, expected_decrease, .. } = *self;
+        let closes_gaps = !feasible && settings.method == DdpMethod::Ddp;
+        if expected_decrease >= 0.0 {
+            d1.abs() < settings.flat || closes_gaps || decrease > settings.accept * expected_decrease
+        } else {
+            !feasible && !closes_gaps && decrease > settings.accept_ascent * expected_decrease
+        }
+    }
+}

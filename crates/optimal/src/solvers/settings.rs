@@ -1,0 +1,276 @@
+//! Settings of the solvers.
+
+use crate::error::Error;
+use core::fmt;
+use std::time::Duration;
+
+/// Method by which a solve searches for an optimum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum DdpMethod {
+    /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`. Every trial is a plain rollout from
+    /// x̂₀, so the first accepted step closes the gaps of a warm start at once, at any cost.
+    Ddp,
+    /// Feasibility-driven differential dynamic programming (Mastalli et al., ICRA 2020), Crocoddyl's `SolverFDDP`: a
+    /// trial of length α keeps the fraction 1 − α of each gap.
+    #[default]
+    Fddp,
+}
+
+impl DdpMethod {
+    /// Returns the name used in files and in Python: `"ddp"` or `"fddp"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ddp => "ddp",
+            Self::Fddp => "fddp",
+        }
+    }
+}
+
+/// Writes the method by its usual abbreviation.
+impl fmt::Display for DdpMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Ddp => "DDP",
+            Self::Fddp => "FDDP",
+        })
+    }
+}
+
+/// Settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct Settings {
+    /// Method, which decides how gaps are closed and which steps are accepted.
+    pub method: DdpMethod,
+    /// Whether the curvature of the dynamics is included: Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action computes
+    /// it. This is full DDP, which converges quadratically; Quu may need more regularisation. Among a robot's knots,
+    /// the knots without contacts that use semi-implicit Euler compute it, exactly. All others count as linear.
+    pub second_order: bool,
+    /// Whether the sweep receives a robot's knots as equations of inverse dynamics, with accelerations and contact
+    /// forces as unknowns instead of the controls. This is possible without bounds on controls and without
+    /// `second_order`. Steps and gains are the same, up to rounding, in about half the time.
+    pub inverse_dynamics_form: bool,
+    /// Maximum number of iterations, at most 1 000 000. With a tolerance of 0, exactly this number of iterations is
+    /// made.
+    pub max_iterations: usize,
+    /// Tolerance of the expected decrease |d₁ + ½ d₂| of the cost. A solve has converged when the iterate was feasible
+    /// and the expected decrease is below it.
+    pub tolerance: f64,
+    /// Tolerance of problems with bounds on controls: the expected decrease does not include the bounds' multipliers.
+    pub tolerance_bounded: f64,
+    /// Whether a warm start outside the bounds on controls is moved into them, entry by entry, before a solve. This
+    /// applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl keeps such a
+    /// start, so reproducing its iterates needs `false`. With either value, a solution that violates a bound is never
+    /// [`Converged`].
+    ///
+    /// [`solve`]: crate::Fddp::solve
+    /// [`resume`]: crate::Fddp::resume
+    /// [`Converged`]: crate::Status::Converged
+    pub project_warm_start: bool,
+    /// Time limit of a solve; `None` for no limit. The first iteration always runs, unless the budget is zero. A later
+    /// phase (derivatives, a sweep, a trial; with several threads, derivatives and sweep together) starts only if it is
+    /// predicted to end in time. The prediction is the median of the last five durations of that phase, over all
+    /// solves, so one or two delays do not shorten later solves. A solve that takes longer reports
+    /// [`Timings::overrun`](crate::Timings::overrun): the budget is shorter than an iteration, or something delayed it.
+    /// A solve that restores a better iterate may need one more sweep.
+    pub time_budget: Option<Duration>,
+    /// Number of segments of the horizon that a sweep processes at the same time: see [`Sweep::set_segments`]. It is
+    /// independent of the number of threads, which belong to rayon's pool; any number of threads gives the same result.
+    /// At most 1024.
+    ///
+    /// [`Sweep::set_segments`]: crate::Sweep::set_segments
+    pub segments: usize,
+    /// Number of threads that share an iteration, at most 1024. They belong to the rayon pool in which a solve is
+    /// called, otherwise to the global one. They compute derivatives and gains while the calling thread sweeps, and try
+    /// a second step length when the first is often too long. The result is the same to the last bit for any number.
+    /// More than 1 needs copies of the actions ([`try_clone`]), which are made when they are missing or a model has
+    /// changed.
+    ///
+    /// [`try_clone`]: crate::ActionModel::try_clone
+    pub threads: usize,
+    /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
+    pub step_lengths: usize,
+    /// Fraction of the expected decrease by which the cost must fall for a step to be accepted.
+    pub accept: f64,
+    /// Factor for steps that are expected to raise the cost, while gaps exist: such a step is accepted if the cost
+    /// rises by less than this times the expected rise.
+    pub accept_ascent: f64,
+    /// Bound on |d₁| below which any step that is expected to lower the cost is accepted.
+    pub flat: f64,
+    /// Regularisation of the first iteration.
+    pub regularisation_start: f64,
+    /// Smallest regularisation.
+    pub regularisation_min: f64,
+    /// Largest regularisation; a solve that reaches it stops.
+    pub regularisation_max: f64,
+    /// Factor by which the regularisation rises and falls.
+    pub regularisation_factor: f64,
+    /// Step length above which the regularisation falls.
+    pub regularisation_decrease_above: f64,
+    /// Step length at or below which the regularisation rises.
+    pub regularisation_increase_below: f64,
+}
+
+/// Maximum number of segments and of threads: each has its own memory.
+const MOST_AT_ONCE: usize = 1024;
+
+/// `MOST_AT_ONCE` in words.
+const AT_ONCE: &str = "at least 1 and at most 1024";
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            method: DdpMethod::Fddp,
+            second_order: false,
+            inverse_dynamics_form: true,
+            max_iterations: 100,
+            tolerance: 1e-9,
+            tolerance_bounded: 5e-5,
+            project_warm_start: true,
+            time_budget: None,
+            segments: 1,
+            threads: 1,
+            step_lengths: 10,
+            accept: 0.1,
+            accept_ascent: 2.0,
+            flat: 1e-12,
+            regularisation_start: 1e-9,
+            regularisation_min: 1e-9,
+            regularisation_max: 1e9,
+            regularisation_factor: 10.0,
+            regularisation_decrease_above: 0.5,
+            regularisation_increase_below: 0.01,
+        }
+    }
+}
+
+impl Settings {
+    /// Returns whether gaps count in the expected improvement of a step.
+    pub(super) fn counts_gaps(&self, feasible: bool) -> bool {
+        !feasible && self.method == DdpMethod::Fddp
+    }
+
+    /// Returns a larger regularisation, up to the largest.
+    pub(super) fn increased(&self, regularisation: f64) -> f64 {
+        (regularisation * self.regularisation_factor).min(self.regularisation_max)
+    }
+
+    /// Returns a smaller regularisation, down to the smallest.
+    pub(super) fn decreased(&self, regularisation: f64) -> f64 {
+        (regularisation / self.regularisation_factor).max(self.regularisation_min)
+    }
+
+    /// Checks the settings, as each solve does.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for the first invalid field.
+    pub fn check(&self) -> Result<(), Error> {
+        let [steps, segments, threads] = [self.step_lengths, self.segments, self.threads].map(|count| count as f64);
+        let (above, below) = (self.regularisation_decrease_above, self.regularisation_increase_below);
+        let [start, min, max, factor] =
+            [self.regularisation_start, self.regularisation_min, self.regularisation_max, self.regularisation_factor];
+        check_all([
+            ("regularisation_decrease_above", above, above.is_finite(), "a finite number"),
+            ("regularisation_increase_below", below, below.is_finite(), "a finite number"),
+            ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
+            ("tolerance_bounded", self.tolerance_bounded, from_zero(self.tolerance_bounded), "at least 0"),
+            ("segments", segments, (1..=MOST_AT_ONCE).contains(&self.segments), AT_ONCE),
+            ("threads", threads, (1..=MOST_AT_ONCE).contains(&self.threads), AT_ONCE),
+            ("step_lengths", steps, (1..=60).contains(&self.step_lengths), "from 1 to 60"),
+            ("accept", self.accept, from_zero(self.accept), "at least 0"),
+            ("accept_ascent", self.accept_ascent, from_zero(self.accept_ascent), "at least 0"),
+            ("flat", self.flat, from_zero(self.flat), "at least 0"),
+            ("regularisation_min", min, exceeds(0.0, min), "above 0"),
+            ("regularisation_max", max, exceeds(min, max), "above regularisation_min"),
+            (
+                "regularisation_start",
+                start,
+                (min..max).contains(&start),
+                "at least regularisation_min and below regularisation_max",
+            ),
+            ("regularisation_factor", factor, exceeds(1.0, factor), "above 1"),
+        ])
+    }
+}
+
+/// Setting: name, value, whether it is valid, and the valid range in words.
+type Checked = (&'static str, f64, bool, &'static str);
+
+/// Returns the error of the first invalid setting, if one is invalid.
+fn check_all<const N: usize>(settings: [Checked; N]) -> Result<(), Error> {
+    match settings.into_iter().find(|(_, _, good, _)| !good) {
+        Some((name, value, _, allowed)) => Err(Error::Setting { name, value, allowed }),
+        None => Ok(()),
+    }
+}
+
+/// Returns whether x is finite and at least 0.
+fn from_zero(x: f64) -> bool {
+    x >= 0.0 && x.is_finite()
+}
+
+/// Returns whether x is finite and above the limit.
+fn exceeds(limit: f64, x: f64) -> bool {
+    x > limit && x.is_finite()
+}
+
+/// Settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct ConstraintSettings {
+    /// Maximum distance of a constraint from its bounds, and maximum gap of the dynamics.
+    pub tolerance: f64,
+    /// Maximum entry of the gradient of the Lagrangian.
+    pub tolerance_dual: f64,
+    /// Maximum number of inner solves.
+    pub max_solves: usize,
+    /// Penalty 1/μ of the first inner solve.
+    pub penalty_start: f64,
+    /// Largest penalty 1/μ.
+    pub penalty_max: f64,
+    /// Factor by which the penalty 1/μ rises.
+    pub penalty_factor: f64,
+    /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold it still
+    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if it ends as not finite, or with violated
+    /// constraints at the largest penalty. The better result is kept. Typical causes are warm starts that diverge or
+    /// saturate the controls. The repetition allocates. `resume` never repeats, nor does a problem without constraints
+    /// and bounds.
+    pub restart: bool,
+}
+
+impl Default for ConstraintSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-6,
+            tolerance_dual: 1e-5,
+            max_solves: 50,
+            penalty_start: 10.0,
+            penalty_max: 1e8,
+            penalty_factor: 10.0,
+            restart: true,
+        }
+    }
+}
+
+impl ConstraintSettings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// [`Error::Setting`] for the first invalid field.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        let (start, max, factor) = (self.penalty_start, self.penalty_max, self.penalty_factor);
+        check_all([
+            ("max_solves", self.max_solves as f64, self.max_solves > 0, "at least 1"),
+            ("tolerance", self.tolerance, exceeds(0.0, self.tolerance), "above 0"),
+            ("tolerance_dual", self.tolerance_dual, exceeds(0.0, self.tolerance_dual), "above 0"),
+            ("penalty_start", start, exceeds(1.0, start), "above 1"),
+            ("penalty_max", max, max >= start && max.is_finite(), "at least penalty_start"),
+            ("penalty_factor", factor, exceeds(1.0, factor), "above 1"),
+        ])
+    }
+}

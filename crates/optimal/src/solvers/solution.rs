@@ -1,0 +1,327 @@
+//! Solutions: the trajectory, its feedback, the outcome of the solve and a record of its iterations.
+#![allow(non_snake_case)] // K besides k: names of the literature
+
+use crate::problem::{Problem, Shape};
+use core::fmt;
+use core::ops::Range;
+use nalgebra::{DMatrix, DVector};
+#[cfg(feature = "serde")]
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::time::Duration;
+
+/// Outcome of a solve. Whatever the status, the [`Solution`] holds the best iterate found. A converged iterate is the
+/// best. Otherwise the candidates are the last iterate and all iterates from which a step could be computed. Among them
+/// the iterate with the smallest gap is the best, and among equal gaps the one with the lowest cost. An iterate within
+/// the bounds on controls precedes a warm start outside. An iterate has diverged, and is not a candidate, if its cost
+/// exceeds the lowest of the solve by more than 1e8·(1 + |lowest|).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Status {
+    /// The iterate has no gaps, and the expected decrease of its cost is below the tolerance.
+    Converged,
+    /// The maximum number of iterations is reached.
+    MaxIterations,
+    /// The time limit is reached, or the remaining time is too short to continue.
+    TimeLimit,
+    /// An [`Observer`](crate::Observer) has ended the solve.
+    Interrupted,
+    /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
+    RegularisationLimit,
+    /// The penalty reached its limit, and constraints are still violated. This is not a proof of infeasibility: another
+    /// warm start, or a larger penalty, may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the
+    /// largest violation.
+    ConstraintsViolated,
+    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself
+    /// violates a constraint of knot 0 that no control can change, such as a built-in residual of the state alone. The
+    /// solution satisfies the other constraints, as far as the solve progressed.
+    Infeasible,
+    /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so no direction can be computed. The
+    /// solution is the best iterate before it. If that is the warm start itself, its cost may be infinite. States and
+    /// controls are finite. Another warm start may help, such as x̂₀ held still
+    /// ([`Problem::quasi_static`](crate::Problem::quasi_static)).
+    NotFinite,
+}
+
+impl Status {
+    /// Returns the name used in files and in Python: `"converged"`, `"max_iterations"` and so on.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::MaxIterations => "max_iterations",
+            Self::TimeLimit => "time_limit",
+            Self::Interrupted => "interrupted",
+            Self::RegularisationLimit => "regularisation_limit",
+            Self::ConstraintsViolated => "constraints_violated",
+            Self::Infeasible => "infeasible",
+            Self::NotFinite => "not_finite",
+        }
+    }
+}
+
+/// Writes the status as a short phrase.
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Converged => "converged",
+            Self::MaxIterations => "reached the limit of iterations",
+            Self::TimeLimit => "ran out of time",
+            Self::Interrupted => "was interrupted",
+            Self::RegularisationLimit => "found no step that lowers the cost",
+            Self::ConstraintsViolated => "constraints are violated",
+            Self::Infeasible => "no trajectory satisfies the constraints",
+            Self::NotFinite => "cost or derivatives are not finite",
+        })
+    }
+}
+
+/// Record of one iteration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Iteration {
+    /// Index of the iteration, from 0.
+    pub iteration: usize,
+    /// Cost of the iterate after the step.
+    pub cost: f64,
+    /// Largest gap, ‖f‖∞, of the iterate before the step.
+    pub gap: f64,
+    /// |d₁ + ½ d₂|, the expected decrease of the cost by the full step, which is compared with the tolerance.
+    pub stop: f64,
+    /// Step length α tried last; if a step was accepted, its length.
+    pub step: f64,
+    /// Regularisation after the iteration.
+    pub regularisation: f64,
+    /// Slope of the expected change: the expected decrease of the cost is α (d₁ + ½ α d₂).
+    pub d1: f64,
+    /// Curvature of the expected change.
+    pub d2: f64,
+    /// Actual decrease of the cost by the step tried last.
+    pub decrease: f64,
+    /// Expected decrease of the cost by the step tried last.
+    pub expected_decrease: f64,
+    /// Whether the iterate after the step satisfies the dynamics.
+    pub feasible: bool,
+    /// Whether a step was accepted; otherwise the iterate is unchanged.
+    pub accepted: bool,
+}
+
+/// Durations of the phases of a solve. For an [`AugmentedLagrangian`](crate::AugmentedLagrangian) they cover all inner
+/// solves together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Timings {
+    /// Dynamics and cost of the warm start.
+    pub calc: Duration,
+    /// Derivatives. With several threads, the time in which the sweep waited for derivatives or computed some itself.
+    pub calc_diff: Duration,
+    /// Backward sweeps, repeated ones included.
+    pub sweep: Duration,
+    /// Trial rollouts of the line searches, accepted or not.
+    pub rollout: Duration,
+    /// Whole solve, observer included.
+    pub total: Duration,
+    /// Time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time. It is
+    /// positive if the budget is shorter than the first iteration, or a phase took longer than predicted. A budget of
+    /// zero requests no iteration, and is never overrun.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub overrun: Duration,
+}
+
+impl Timings {
+    /// Sets the duration of the whole solve, and the time beyond the budget.
+    pub(crate) fn end(&mut self, total: Duration, budget: Option<Duration>) {
+        self.total = total;
+        let budget = budget.filter(|budget| !budget.is_zero());
+        self.overrun = budget.map_or(Duration::ZERO, |budget| total.saturating_sub(budget));
+    }
+}
+
+/// Result of a solve. Reading one from a file checks that the lengths of its parts fit one horizon.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(remote = "Self"))] // serde reads the fields; the implementations below check them
+pub struct Solution {
+    /// States x₀ … x_N, flat: (N + 1)·nx.
+    pub xs: Vec<f64>,
+    /// Controls u₀ … u_{N−1}, flat.
+    pub us: Vec<f64>,
+    /// Feedback gains of the last sweep, per knot nu × ndx: near the trajectory the control is uₜ + Kₜ (x ⊖ xₜ).
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::matrices"))]
+    pub K: Vec<DMatrix<f64>>,
+    /// Feed-forward terms of the last sweep, per knot nu: the full step of the controls.
+    pub k: Vec<DVector<f64>>,
+    /// Cost of the trajectory; infinite if it is NaN.
+    pub cost: f64,
+    /// Largest gap of the trajectory, ‖f‖∞; infinite if it is NaN.
+    pub gap: f64,
+    /// Whether the trajectory satisfies the dynamics: it is a plain rollout from x̂₀.
+    pub feasible: bool,
+    /// Regularisation at the end.
+    pub regularisation: f64,
+    /// Outcome of the solve.
+    pub status: Status,
+    /// Record of each iteration.
+    pub trace: Vec<Iteration>,
+    /// Durations of the phases.
+    pub timings: Timings,
+    shape: Shape,
+}
+
+impl Solution {
+    /// Creates a solution of zeros for a problem that is not yet solved.
+    pub(crate) fn new(problem: &Problem) -> Self {
+        let shape = problem.shape().clone();
+        let horizon = shape.horizon();
+        Self {
+            xs: vec![0.0; (horizon + 1) * shape.nx],
+            us: vec![0.0; shape.offsets[horizon]],
+            K: (0..horizon).map(|t| DMatrix::zeros(shape.nu(t), shape.ndx)).collect(),
+            k: (0..horizon).map(|t| DVector::zeros(shape.nu(t))).collect(),
+            cost: f64::INFINITY,
+            gap: f64::INFINITY,
+            feasible: false,
+            regularisation: 0.0,
+            status: Status::MaxIterations,
+            trace: Vec::new(),
+            timings: Timings::default(),
+            shape,
+        }
+    }
+
+    /// Returns the state xₜ, t = 0 … N.
+    ///
+    /// # Panics
+    /// If t > N.
+    #[track_caller]
+    pub fn x(&self, t: usize) -> &[f64] {
+        let horizon = self.shape.horizon();
+        assert!(t <= horizon, "`t` is {t}, expected at most {horizon}");
+        &self.xs[self.shape.x(t)]
+    }
+
+    /// Returns the control uₜ, t = 0 … N − 1.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn u(&self, t: usize) -> &[f64] {
+        let horizon = self.shape.horizon();
+        assert!(t < horizon, "`t` is {t}, expected less than {horizon}: knot {horizon} has no controls");
+        &self.us[self.shape.u(t)]
+    }
+
+    /// Returns the regularisation with which a resumed solve begins: `start`, unless the last solve ran out of time or
+    /// iterations after a rejected step. It is then the regularisation of its end, as with a smaller one the same step
+    /// would be rejected again.
+    pub(super) fn resumed_regularisation(&self, start: f64) -> f64 {
+        let stopped = matches!(self.status, Status::TimeLimit | Status::MaxIterations | Status::Interrupted);
+        match self.trace.last() {
+            Some(last) if stopped && !last.accepted => last.regularisation.max(start),
+            _ => start,
+        }
+    }
+
+    /// Drops the first knot and appends one at the end, with its dimensions in `shape`. The new knot copies the last
+    /// state and, if its size fits, the last control; its gains are zero.
+    pub(crate) fn shift(&mut self, shape: &Shape) {
+        let (nx, last, ndx) = (shape.nx, shape.horizon() - 1, shape.ndx);
+        self.xs.copy_within(nx.., 0);
+        let (first, nu) = (self.shape.nu(0), shape.nu(last));
+        let fits = self.shape.nu(last) == nu;
+        self.us.copy_within(first.., 0);
+        let kept = self.us.len() - first;
+        self.us.resize(kept + nu, 0.0);
+        match fits && nu <= kept {
+            true => self.us.copy_within(kept - nu..kept, kept),
+            false => self.us[kept..].fill(0.0),
+        }
+        self.K.rotate_left(1);
+        self.k.rotate_left(1);
+        if self.k[last].len() != nu {
+            (self.K[last], self.k[last]) = (DMatrix::zeros(nu, ndx), DVector::zeros(nu));
+        }
+        self.K[last].fill(0.0);
+        self.k[last].fill(0.0);
+        self.shape.clone_from(shape);
+    }
+
+    pub(crate) fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// Moves the controls of some knots into their bounds.
+    pub(crate) fn project(&mut self, problem: &Problem, knots: Range<usize>) {
+        for t in knots {
+            let Some((lower, upper)) = problem.action(t).bounds(t) else { continue };
+            for (u, (lower, upper)) in self.us[self.shape.u(t)].iter_mut().zip(lower.iter().zip(upper)) {
+                *u = u.max(*lower).min(*upper);
+            }
+        }
+    }
+
+    /// Returns whether a control lies on a bound.
+    pub(crate) fn touches_bounds(&self, problem: &Problem) -> bool {
+        (0..self.shape.horizon()).any(|t| {
+            problem.action(t).bounds(t).is_some_and(|(lower, upper)| {
+                let mut bounds = lower.iter().zip(upper);
+                self.us[self.shape.u(t)].iter().any(|u| bounds.next().is_some_and(|(l, h)| u <= l || u >= h))
+            })
+        })
+    }
+
+    /// Returns whether all controls are within their bounds.
+    pub(crate) fn is_bounded(&self, problem: &Problem) -> bool {
+        (0..self.shape.horizon()).all(|t| {
+            problem.action(t).bounds(t).is_none_or(|(lower, upper)| {
+                let mut bounds = lower.iter().zip(upper);
+                self.us[self.shape.u(t)].iter().all(|u| bounds.next().is_none_or(|(l, h)| (*l..=*h).contains(u)))
+            })
+        })
+    }
+
+    /// Checks that each part of a solution from a file has the length that its horizon requires.
+    #[cfg(feature = "serde")]
+    fn check(&self) -> Result<(), String> {
+        self.shape.check_itself()?;
+        let Shape { nx, ndx, .. } = self.shape;
+        let (horizon, wrong) = (self.shape.horizon(), |name, expected: usize, found: usize| {
+            (expected != found).then(|| format!("`{name}`: expected length {expected}, found {found}"))
+        });
+        let lengths = [
+            ("xs", (horizon + 1) * nx, self.xs.len()),
+            ("us", self.shape.offsets[horizon], self.us.len()),
+            ("K", horizon, self.K.len()),
+            ("k", horizon, self.k.len()),
+        ];
+        let mut faults = lengths.into_iter().filter_map(|(name, expected, found)| wrong(name, expected, found));
+        if let Some(fault) = faults.next() {
+            return Err(fault);
+        }
+        for (t, (K, k)) in self.K.iter().zip(&self.k).enumerate() {
+            let nu = self.shape.nu(t);
+            if K.shape() != (nu, ndx) || k.len() != nu {
+                let (rows, columns) = K.shape();
+                let found = format!("K is {rows} × {columns}, k has length {}", k.len());
+                return Err(format!("knot {t}: expected gains of {nu} × {ndx}, but {found}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "serde")]
+impl Serialize for Solution {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, to)
+    }
+}
+
+#[cfg(feature = "serde")]
+impl<'de> Deserialize<'de> for Solution {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let solution = Self::deserialize(from)?;
+        solution.check().map_err(serde::de::Error::custom)?;
+        Ok(solution)
+    }
+}

@@ -1,0 +1,419 @@
+//! Loop that all solvers share: derivatives, a sweep and a search, repeated until there is a reason to stop.
+//!
+//! A solve [begins](SolverLoop::begin) from a trajectory and makes one or more [passes](SolverLoop::pass). A pass
+//! iterates on one cost. A solver with an outer method, such as an augmented Lagrangian, changes the cost between
+//! passes. All passes of a solve share the clock, the observer and the timings.
+#![allow(non_snake_case)] // K besides k: names of the literature
+
+use super::best::{Best, Merit};
+use super::iterate::Iterate;
+use super::search::{LineSearch, Search, Surroundings};
+use super::settings::{DdpMethod, Settings};
+use super::solution::{Iteration, Solution, Status, Timings};
+use super::watch::{Clock, Phase, Watch};
+use crate::error::Error;
+use crate::lq::{LqKnot, Sweep, SweepError};
+use crate::problem::{ActionModel, Evaluation, Problem};
+use crate::time::Instant;
+use std::time::Duration;
+
+/// Number of iterations for which the trace is allocated when a solve begins; with more it grows.
+const FORESEEN: usize = 10_000;
+
+/// Iterate of a solver, the linear-quadratic problem around it, and the workspace of an iteration.
+#[derive(Debug, Clone)]
+pub(super) struct SolverLoop {
+    pub(super) iterate: Iterate,
+    /// Linear-quadratic problem at the iterate.
+    pub(super) knots: Vec<LqKnot>,
+    pub(super) sweep: Sweep,
+    pub(super) line_search: LineSearch,
+    /// Best iterate; it becomes the solution if the last iterate is worse.
+    pub(super) best: Best,
+    pub(super) clock: Clock,
+    /// Whether knots may be given as equations of inverse dynamics.
+    inverse_dynamics: bool,
+    /// Whether some control has a bound.
+    bounded: bool,
+    /// Whether a trajectory exists from which a solve can resume.
+    started: bool,
+    /// Whether the trajectory was given or found since the last shift. Without a step in between, a shift repeats the
+    /// last state.
+    pub(super) renewed: bool,
+}
+
+/// Properties of a pass that its solver chooses, besides the settings.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Pass {
+    /// Tolerance, instead of the tolerance in the settings.
+    pub(super) tolerance: Option<f64>,
+    /// Whether a warm start without gaps counts as feasible if a control lies on its bound. Crocoddyl's value is false:
+    /// the bounds then only clamp trials until the first full step, which is never accepted where the bounds are
+    /// active.
+    pub(super) trusts_start: bool,
+    /// Whether the pass continues the last solve, instead of a warm start or an earlier pass of the same solve.
+    pub(super) resumes: bool,
+}
+
+/// State that one iteration passes to the next.
+struct Progress {
+    /// Merit of the iterate.
+    merit: Merit,
+    /// Whether the iterate before the last accepted step was feasible.
+    was_feasible: bool,
+    /// Whether this pass has computed gains.
+    swept: bool,
+    /// Whether these gains belong to the best iterate, from which the last step started.
+    swept_best: bool,
+}
+
+impl SolverLoop {
+    /// Allocates the workspace for problems with the dimensions of `problem`.
+    pub(super) fn new(problem: &Problem) -> Self {
+        let mut knots = problem.lq_knots();
+        problem.reserve_inverse_dynamics(&mut knots);
+        Self {
+            iterate: Iterate::new(problem),
+            sweep: Sweep::new(&knots),
+            knots,
+            line_search: LineSearch::new(problem),
+            best: Best::new(problem),
+            clock: Clock::default(),
+            inverse_dynamics: false,
+            bounded: false,
+            started: false,
+            renewed: false,
+        }
+    }
+
+    /// Begins an attempt to solve `problem`, from a warm start or else from the last trajectory.
+    ///
+    /// # Errors
+    /// [`Error`] as documented for [`Fddp::solve`](crate::Fddp::solve).
+    pub(super) fn begin(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        warm_start: Option<[&[f64]; 2]>,
+    ) -> Result<(), Error> {
+        let solution = &mut self.iterate.solution;
+        if let Some([xs, us]) = warm_start {
+            solution.shape().check(problem.shape())?;
+            Error::check("xs", xs, solution.xs.len())?;
+            Error::check("us", us, solution.us.len())?;
+            for (knot, x) in xs.chunks_exact(problem.nx()).enumerate() {
+                problem.action(knot).check_state(x).map_err(|what| Error::State { name: "xs", knot, what })?;
+            }
+            solution.xs.copy_from_slice(xs);
+            solution.us.copy_from_slice(us);
+            (self.started, self.renewed) = (true, true);
+        } else if !self.started {
+            return Err(Error::NothingToResume);
+        }
+        settings.check()?;
+        solution.shape().check(problem.shape())?;
+        if self.knots[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.knots) {
+            self.sweep = Sweep::new(&self.knots); // the problem given to `new` did not have this form
+        }
+        self.bounded = problem.check_bounds()?;
+        self.inverse_dynamics = settings.inverse_dynamics_form && !self.bounded && !settings.second_order;
+        Ok(())
+    }
+
+    /// Starts the clock and the timings of a solve.
+    pub(super) fn start_clock(&mut self, settings: &Settings, watch: &Watch<'_>) {
+        self.iterate.solution.timings = Timings::default();
+        self.clock.start(watch.begin, settings.time_budget);
+    }
+
+    /// Iterates from the current trajectory until there is a reason to stop, and completes the solution.
+    pub(super) fn pass(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        pass: Pass,
+        watch: &mut Watch<'_>,
+    ) -> Status {
+        let solution = &mut self.iterate.solution;
+        if self.bounded && settings.project_warm_start {
+            solution.project(problem, 0..problem.horizon());
+        }
+        let start = settings.regularisation_start;
+        let regularisation = if pass.resumes { solution.resumed_regularisation(start) } else { start };
+        solution.trace.clear();
+        solution.trace.reserve(settings.max_iterations.min(FORESEEN));
+        let motion_size = if self.inverse_dynamics { problem.motion_size() } else { 0 };
+        self.iterate.motions.resize(problem.horizon() * motion_size, 0.0);
+        self.line_search.start(problem, settings.step_lengths, motion_size, settings.threads);
+        self.sweep.set_segments(settings.segments);
+        self.sweep.forget();
+        self.best.start();
+        let last_cost = self.iterate.solution.cost;
+        let mut gap = self.iterate.evaluate(problem);
+        if pass.resumes {
+            gap = self.recover(problem, settings, gap, last_cost);
+        }
+        let Solution { cost, .. } = self.iterate.solution;
+        let bounded = !self.bounded || self.iterate.solution.is_bounded(problem);
+        let feasible = self.bounded && pass.trusts_start && gap == 0.0 && self.iterate.solution.touches_bounds(problem);
+        let merit = Merit { gap, cost, feasible, bounded, steps: 0, regularisation };
+        let mut now = Progress { merit, was_feasible: false, swept: false, swept_best: false };
+        let tolerance = if self.bounded { settings.tolerance_bounded } else { settings.tolerance };
+        let tolerance = pass.tolerance.unwrap_or(tolerance);
+        let status = self.make_iterations(problem, settings, tolerance, &mut now, watch);
+        self.clock.end_guarantee();
+        self.finish(problem, settings, now, status);
+        status
+    }
+
+    /// Ends a solve.
+    pub(super) fn end(&mut self, settings: &Settings, watch: &Watch<'_>) -> &Solution {
+        self.iterate.solution.timings.end(watch.begin.elapsed(), settings.time_budget);
+        &self.iterate.solution
+    }
+
+    /// Makes iterations until one of the reasons to stop occurs.
+    fn make_iterations(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        tolerance: f64,
+        now: &mut Progress,
+        watch: &mut Watch<'_>,
+    ) -> Status {
+        if !(now.merit.cost.is_finite() && now.merit.gap.is_finite()) {
+            return Status::NotFinite;
+        }
+        let mut search = Search::default();
+        for iteration in 0..settings.max_iterations {
+            if search.accepted {
+                now.merit.gap = self.iterate.update_gaps(problem);
+            }
+            let is_new = search.accepted || iteration == 0;
+            if let Err(status) = self.find_direction(problem, settings, now, is_new, watch) {
+                return status;
+            }
+            let Self { iterate, line_search, best, sweep, clock, .. } = self;
+            let (merit, feedback) = (now.merit, sweep.feedback());
+            let around = Surroundings { iterate, merit, best, feedback, settings, clock, watch };
+            search = line_search.run(problem, around, search);
+            if let Some(status) = search.stopped {
+                return status;
+            }
+            now.advance(&search, settings, self.iterate.solution.cost);
+            let Merit { gap, cost, feasible, regularisation, .. } = now.merit;
+            let Search { step, d1, d2, decrease, expected_decrease, accepted, .. } = search;
+            let stop = (d1 + 0.5 * d2).abs(); // expected improvement for α = 1
+            let record = Iteration {
+                iteration,
+                cost,
+                gap,
+                stop,
+                step,
+                regularisation,
+                d1,
+                d2,
+                decrease,
+                expected_decrease,
+                feasible,
+                accepted,
+            };
+            self.iterate.solution.trace.push(record);
+            self.clock.end_guarantee();
+            let verdict = watch.iteration(&record);
+            if regularisation == settings.regularisation_max {
+                return Status::RegularisationLimit;
+            }
+            if now.was_feasible && stop < tolerance {
+                return Status::Converged;
+            }
+            if verdict.is_break() {
+                return Status::Interrupted;
+            }
+        }
+        Status::MaxIterations
+    }
+
+    /// Computes the derivatives, if the iterate is new, and the feedback by a sweep. The sweep is repeated with a
+    /// larger regularisation while Quu is not positive definite.
+    ///
+    /// # Errors
+    /// Reason to stop, if no direction was found or the time is over.
+    fn find_direction(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        now: &mut Progress,
+        is_new: bool,
+        watch: &mut Watch<'_>,
+    ) -> Result<(), Status> {
+        let Merit { feasible, .. } = now.merit;
+        self.sweep.keep_values(settings.counts_gaps(feasible));
+        let mut swept = None;
+        if is_new {
+            let phases = [Phase::CalcDiff, Phase::Sweep];
+            self.clock.allows(&phases[..1 + usize::from(self.follows(settings))], watch)?;
+            swept = self.calc_diff(problem, settings, feasible, now.merit.regularisation);
+        }
+        if swept.is_none() {
+            self.clock.allows(&[Phase::Sweep], watch)?;
+        }
+        now.swept_best = false;
+        while let Err(error) = swept.take().unwrap_or_else(|| self.sweep(problem, settings, now.merit.regularisation)) {
+            assert!(!matches!(error, SweepError::ConstraintRows { .. }), "{error}");
+            now.merit.regularisation = settings.increased(now.merit.regularisation);
+            if now.merit.regularisation == settings.regularisation_max {
+                return Err(match error {
+                    SweepError::NotPositive { .. } => Status::RegularisationLimit,
+                    _ => Status::NotFinite,
+                });
+            }
+            self.clock.allows(&[Phase::Sweep], watch)?;
+        }
+        now.swept = true;
+        Ok(())
+    }
+
+    /// Computes the LQ problem at the iterate. It contains the gaps until the first full step, and the bounds
+    /// afterwards. With several threads, the sweep follows the derivatives from knot to knot if it can, and its outcome
+    /// is returned.
+    #[inline(never)] // `benches/instructions.py` counts this function by name
+    fn calc_diff(
+        &mut self,
+        problem: &mut Problem,
+        settings: &Settings,
+        feasible: bool,
+        regularisation: f64,
+    ) -> Option<Result<(), SweepError>> {
+        let clock = Instant::now();
+        let follows = self.follows(settings);
+        let Self { iterate: Iterate { solution, gaps, motions, knows_motions, .. }, knots, sweep, .. } = self;
+        let what = match self.inverse_dynamics {
+            true => Evaluation::Equations(if *knows_motions { motions } else { &[] }),
+            false => Evaluation::Derivatives,
+        };
+        let (Solution { xs, us, .. }, shape) = (&*solution, solution.shape());
+        let complete = |model: &dyn ActionModel, first: usize, knots: &mut [LqKnot]| {
+            for (t, knot) in (first..).zip(knots) {
+                match gaps.get(shape.dx(t + 1)) {
+                    Some(gap) if !feasible => knot.f.as_mut_slice().copy_from_slice(gap),
+                    _ => knot.f.fill(0.0),
+                }
+                match model.bounds(t) {
+                    Some((lower, upper)) if feasible => {
+                        for (i, u) in us[shape.u(t)].iter().enumerate() {
+                            knot.lower[i] = lower[i] - u;
+                            knot.upper[i] = upper[i] - u;
+                        }
+                    }
+                    _ => {
+                        knot.lower.fill(f64::NEG_INFINITY);
+                        knot.upper.fill(f64::INFINITY);
+                    }
+                }
+            }
+        };
+        let (mut outcome, mut sweeping) = (Ok(()), Duration::ZERO);
+        if settings.threads == 1 {
+            problem.calc_diff_as(what, xs, us, knots);
+            for (t, knot) in knots.chunks_exact_mut(1).enumerate() {
+                complete(problem.action(t), t, knot);
+            }
+        } else {
+            let (mut following, feedback, gains) = sweep.follow(settings.threads);
+            problem.calc_diff_on(what, [xs, us], knots, feedback, gains, |model, first, knots, feedback| {
+                complete(model, first, knots);
+                if follows && outcome.is_ok() {
+                    let clock = Instant::now();
+                    outcome = following.run(first, knots, feedback, regularisation);
+                    sweeping += clock.elapsed();
+                }
+            });
+        }
+        let timings = &mut self.iterate.solution.timings;
+        timings.calc_diff += self.clock.lasted(Phase::CalcDiff, clock.elapsed() - sweeping);
+        if !follows {
+            return None;
+        }
+        timings.sweep += self.clock.lasted(Phase::Sweep, sweeping);
+        Some(outcome)
+    }
+
+    /// Returns whether the sweep follows the derivatives.
+    fn follows(&self, settings: &Settings) -> bool {
+        settings.threads > 1 && !settings.second_order && self.sweep.is_sequential()
+    }
+
+    #[inline(never)] // `benches/instructions.py` counts this function by name
+    fn sweep(&mut self, problem: &mut Problem, settings: &Settings, regularisation: f64) -> Result<(), SweepError> {
+        let clock = Instant::now();
+        let solution = &mut self.iterate.solution;
+        let result = if settings.second_order {
+            let (Solution { xs, us, .. }, shape) = (&*solution, solution.shape());
+            self.sweep.run_with(&self.knots, regularisation, |t, lambda, hessian| {
+                let (x, u) = (&xs[shape.x(t)], &us[shape.u(t)]);
+                problem.action_mut(t).dynamics_hessian(t, x, u, lambda, hessian)
+            })
+        } else {
+            self.sweep.run(&self.knots, regularisation)
+        };
+        solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
+        result
+    }
+
+    /// Completes the solution at the end of a pass, from the last iterate or a better one.
+    fn finish(&mut self, problem: &mut Problem, settings: &Settings, mut now: Progress, status: Status) {
+        let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
+        now.merit.gap = infinite_if_nan(self.iterate.update_gaps(problem));
+        now.merit.cost = infinite_if_nan(self.iterate.solution.cost);
+        (self.iterate.solution.gap, self.iterate.solution.cost) = (now.merit.gap, now.merit.cost);
+        let goes_back = match status {
+            Status::Converged => false,
+            Status::NotFinite => true, // no direction exists at the last iterate
+            _ => self.best.is_better_than(&now.merit),
+        };
+        let Merit { regularisation, .. } = now.merit;
+        if goes_back && let Some(best) = self.best.restore(&mut self.iterate) {
+            now.merit = best;
+            self.iterate.update_gaps(problem);
+            self.iterate.knows_motions = false;
+            if !now.swept_best {
+                self.sweep.keep_values(false);
+                let swept = self.calc_diff(problem, settings, best.feasible, best.regularisation);
+                now.swept = swept.unwrap_or_else(|| self.sweep(problem, settings, best.regularisation)).is_ok();
+            }
+        }
+        self.renewed |= now.merit.steps > 0;
+        let solution = &mut self.iterate.solution;
+        solution.feasible = now.merit.feasible;
+        solution.regularisation = regularisation;
+        solution.status = status;
+        if !now.swept {
+            return; // keep the gains of the previous solve, shifted or not
+        }
+        for ((K, k), feedback) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.feedback()) {
+            K.copy_from(&feedback.K);
+            k.copy_from(&feedback.k);
+        }
+    }
+}
+
+impl Progress {
+    /// Takes over the outcome of a search, after which the iterate has the given cost.
+    fn advance(&mut self, search: &Search, settings: &Settings, cost: f64) {
+        let Self { merit, was_feasible, swept_best, .. } = self;
+        merit.cost = cost;
+        if search.accepted {
+            (merit.bounded, merit.steps) = (true, merit.steps + 1);
+            *swept_best = search.left_best;
+            *was_feasible = merit.feasible;
+            merit.feasible |= search.step == 1.0 || settings.method == DdpMethod::Ddp;
+        }
+        if search.step > settings.regularisation_decrease_above {
+            merit.regularisation = settings.decreased(merit.regularisation);
+        }
+        if search.step <= settings.regularisation_increase_below {
+            merit.regularisation = settings.increased(merit.regularisation);
+        }
+    }
+}

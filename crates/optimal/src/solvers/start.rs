@@ -1,0 +1,94 @@
+//! Starts of a solve that follow from the last one: its trajectory shifted by a knot, or x̂₀ held still where that
+//! trajectory is lost.
+
+use super::iterate::Iterate;
+use super::settings::Settings;
+use super::solver_loop::SolverLoop;
+use crate::error::Error;
+use crate::lq::{LqKnot, Sweep};
+use crate::problem::Problem;
+
+/// Factor by which the cost of a start may exceed the cost of the last solution, with 1 added to both. A push of the
+/// state or a new reference rarely raises the cost more. A horizon whose end diverges exceeds it within a few shifts
+/// (measured: 0.3, 1e3, 2e4, 3e7).
+const LOST: f64 = 10.0;
+
+/// Returns x̂₀ at all knots, and the controls that hold it still. Allocates.
+///
+/// # Errors
+/// [`Error`] if an entry of x̂₀ is not finite.
+pub(super) fn quasi_static_start(problem: &mut Problem) -> Result<[Vec<f64>; 2], Error> {
+    let xs = problem.x0().repeat(problem.horizon() + 1);
+    let us = problem.quasi_static(&xs)?;
+    Ok([xs, us])
+}
+
+impl SolverLoop {
+    /// Replaces the start of a resumed solve by x̂₀ at all knots and the controls that hold it still, if the start is
+    /// lost and this costs less. A start is lost if its cost or a gap is not finite, or if it costs far more than the
+    /// last solution. Returns the largest gap of the start. Allocates only if a start is lost.
+    pub(super) fn recover(&mut self, problem: &mut Problem, settings: &Settings, gap: f64, last_cost: f64) -> f64 {
+        let cost = self.iterate.solution.cost;
+        let limit = if last_cost.is_finite() { LOST * (1.0 + last_cost.abs()) } else { f64::INFINITY };
+        if gap.is_finite() && cost.is_finite() && cost - last_cost <= limit {
+            return gap;
+        }
+        let Ok([mut xs, mut us]) = quasi_static_start(problem) else { return gap };
+        let solution = &mut self.iterate.solution;
+        std::mem::swap(&mut solution.xs, &mut xs);
+        std::mem::swap(&mut solution.us, &mut us);
+        if settings.project_warm_start {
+            solution.project(problem, 0..problem.horizon());
+        }
+        let start_gap = self.iterate.evaluate(problem);
+        let start_cost = self.iterate.solution.cost;
+        let is_finite = start_gap.is_finite() && start_cost.is_finite();
+        if is_finite && !(gap.is_finite() && start_cost >= cost) {
+            return start_gap;
+        }
+        (self.iterate.solution.xs, self.iterate.solution.us) = (xs, us);
+        self.iterate.evaluate(problem)
+    }
+
+    /// Shifts the trajectory and its gains by one knot: see [`Fddp::shift`](crate::Fddp::shift).
+    ///
+    /// # Errors
+    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
+    pub(super) fn shift(&mut self, problem: &mut Problem, settings: &Settings) -> Result<(), Error> {
+        let Iterate { solution, next, .. } = &mut self.iterate;
+        let (old, new) = (solution.shape(), problem.shape());
+        let (horizon, ndx) = (new.horizon(), new.ndx);
+        if old.horizon() != horizon {
+            return Err(Error::Length { name: "knot_models", expected: old.horizon(), found: horizon });
+        }
+        let controls = (0..horizon - 1).map(|t| (t, "nu", old.nu(t + 1), new.nu(t)));
+        let states = [(0, "nx", old.nx, new.nx), (0, "ndx", old.ndx, new.ndx)];
+        if let Some((knot, name, expected, found)) = controls.chain(states).find(|(_, _, old, new)| old != new) {
+            return Err(Error::Dimension { knot, name, expected, found });
+        }
+        solution.shift(new);
+        if (0..horizon).any(|t| self.knots[t].nu() != new.nu(t)) {
+            self.knots[..horizon].rotate_left(1);
+            self.knots[horizon - 1] = LqKnot::zeros(ndx, new.nu(horizon - 1));
+            problem.reserve_inverse_dynamics(&mut self.knots);
+            self.sweep = Sweep::new(&self.knots);
+        }
+        self.line_search.reshape(problem);
+        self.best.reshape(problem);
+        if settings.project_warm_start {
+            solution.project(problem, horizon - 1..horizon);
+        }
+        if !std::mem::take(&mut self.renewed) {
+            return Ok(()); // x_N = x_{N−1}
+        }
+        // x_N = φ(x_{N−1}, u_{N−1}), if it is a valid state
+        let new = problem.shape();
+        let (x, u, last) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
+        let next = &mut next[..last.len()];
+        problem.action_mut(horizon - 1).calc(horizon - 1, &solution.xs[x], &solution.us[u], next);
+        if next.iter().all(|x| x.is_finite()) {
+            solution.xs[last].copy_from_slice(next);
+        }
+        Ok(())
+    }
+}
