@@ -16,8 +16,8 @@
 #![allow(non_snake_case)] // J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
-use crate::robot::knot_data::Output;
 use crate::robot::knot_data::Sensitivities;
+use crate::robot::outputs::Output;
 use crate::robot::residuals::rows::Row;
 use condyle_linalg::{Runs, SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
 use core::ops::Range;
@@ -129,8 +129,8 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau in which a number of eliminations are done; returns whether pivots
-    /// exist. Overwrites the tableau.
+    /// Writes U and D for steps of Δt, from a tableau in which a number of eliminations are done; returns whether
+    /// pivots exist. Overwrites the tableau.
     pub(crate) fn run(
         &mut self,
         tableau: &mut [f64],
