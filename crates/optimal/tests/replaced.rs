@@ -1,5 +1,5 @@
-//! Models and durations of single knots are replaced between solves: the results are those of a new problem, and the next
-//! solve does not allocate.
+//! Models and durations of single knots are replaced between solves: the results are those of a new problem, and the
+//! next solve does not allocate.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]

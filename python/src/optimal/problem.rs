@@ -271,8 +271,8 @@ impl Problem {
         Ok(())
     }
 
-    /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between solves.
-    /// The solver's next iterations do not allocate.
+    /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between
+    /// solves. The solver's next iterations do not allocate.
     ///
     /// knot: its index, 0 to N − 1.
     /// model: the new model, with as many states and controls as the old one. Its costs for single knots count for the

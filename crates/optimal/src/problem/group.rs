@@ -4,7 +4,7 @@ use super::action::ActionModel;
 use super::multipliers::Visit;
 use crate::error::assert_length;
 use crate::lq::LqKnot;
-use crate::robot::RobotDynamics;
+use core::any::Any;
 use core::ops::Range;
 
 /// Action that computes several knots in one call: in the lanes of a vector register, or in one call to another
@@ -13,9 +13,9 @@ use core::ops::Range;
 /// An action that implements this trait returns itself from [`ActionModel::group_model`]. The default methods loop over
 /// the knots.
 ///
-/// A **group** consists of consecutive knots of the horizon, or of the trials of a line search at one knot. Each knot of
-/// a group is given by its index t in the horizon. States and controls are stored one after the other, and so are the
-/// states that are written.
+/// A **group** consists of consecutive knots of the horizon, or of the trials of a line search at one knot. Each knot
+/// of a group is given by its index t in the horizon. States and controls are stored one after the other, and so are
+/// the states that are written.
 pub trait GroupModel: ActionModel {
     /// Returns the number of states that a group call computes at the cost of one; 1 unless it uses vector lanes.
     ///
@@ -24,8 +24,8 @@ pub trait GroupModel: ActionModel {
         1
     }
 
-    /// Returns whether `other` computes the same as this action, so that the knots of both form one group. Only `self` is
-    /// then used. By default false.
+    /// Returns whether `other` computes the same as this action, so that the knots of both form one group. Only `self`
+    /// is then used. By default false.
     fn is_same(&self, other: &dyn ActionModel) -> bool {
         let _ = other;
         false
@@ -58,8 +58,8 @@ pub enum Evaluation<'m> {
     Values,
     /// Derivatives of dynamics and costs.
     Derivatives,
-    /// Derivatives, with the dynamics as equations of inverse dynamics where a knot supports that. They are taken at the
-    /// motions (accelerations and forces) of the group, in equal parts. If no motions are given, they are computed.
+    /// Derivatives, with the dynamics as equations of inverse dynamics where a knot supports that. They are taken at
+    /// the motions (accelerations and forces) of the group, in equal parts. If no motions are given, they are computed.
     Equations(&'m [f64]),
 }
 
@@ -154,8 +154,8 @@ pub trait KnotGroup {
         let _ = (t, x, u, show);
     }
 
-    /// Returns the robot of the knots.
-    fn robot(&mut self) -> Option<&mut RobotDynamics> {
+    /// Returns the dynamics of the knots, whose type their module knows.
+    fn dynamics(&mut self) -> Option<&mut dyn Any> {
         None
     }
 }

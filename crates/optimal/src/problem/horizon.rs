@@ -145,14 +145,14 @@ impl Problem {
         Ok(())
     }
 
-    /// Replaces the model of knot t, as an MPC does when a contact is made earlier than planned. The solver needs no other
-    /// changes, and its next iterations do not allocate. This function allocates; a model that was given to knot t in the
-    /// same way before is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
+    /// Replaces the model of knot t, as an MPC does when a contact is made earlier than planned. The solver needs no
+    /// other changes, and its next iterations do not allocate. This function allocates; a model that was given to knot
+    /// t in the same way before is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
     ///
     /// Costs and limits that the model has for a single knot count for that index.
     ///
     /// # Errors
-    /// [`Error::Dimension`] if nx, ndx or nu differ from those of the old model, [`Error::NoNextState`] for a terminal
+    /// [`Error::Dimension`] if nx, ndx or nu differ from the old model's sizes, [`Error::NoNextState`] for a terminal
     /// model; the problem is then unchanged.
     ///
     /// # Panics
@@ -200,8 +200,8 @@ impl Problem {
         }
     }
 
-    /// Returns the index of the model of each knot. Models that [`set_knot`](Self::set_knot) added have the indices after
-    /// the models with which the problem was created.
+    /// Returns the index of the model of each knot. Models that [`set_knot`](Self::set_knot) added have the indices
+    /// after the models with which the problem was created.
     pub fn knot_models(&self) -> &[usize] {
         &self.knot_models
     }
@@ -383,8 +383,8 @@ impl Problem {
         self.calc_diff_as(Evaluation::Derivatives, xs, us, lq_knots);
     }
 
-    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics where knots support
-    /// them.
+    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics where knots
+    /// support them.
     #[track_caller]
     pub(crate) fn calc_diff_as(&mut self, what: Evaluation<'_>, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         let horizon = self.horizon();

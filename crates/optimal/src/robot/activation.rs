@@ -41,8 +41,8 @@ pub enum Activation {
         /// w, numbers of at least 0.
         weights: Vec<f64>,
     },
-    /// Σ rᵢ: of a number that is a cost by itself. Its Gauss–Newton Hessian is zero: what there is comes from the residual
-    /// ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
+    /// Σ rᵢ: of a number that is a cost by itself. Its Gauss–Newton Hessian is zero: what there is comes from the
+    /// residual ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
     Sum,
     /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
     Smooth1 {
@@ -101,7 +101,8 @@ impl Activation {
         }
     }
 
-    /// Calls a function for each entry of r with its part of the value, and that part's derivatives, for sums over entries.
+    /// Calls a function for each entry of r with its part of the value, and that part's derivatives, for sums over
+    /// entries.
     #[inline(always)]
     fn each(&self, r: &[f64], mut visit: impl FnMut(usize, [f64; 3])) {
         let beyond = |i: usize, lower: &[f64], upper: &[f64]| {

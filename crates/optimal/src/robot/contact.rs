@@ -8,9 +8,10 @@ use core::ops::Range;
 /// Contact of a frame with the world, and the name by which residuals call it.
 ///
 /// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it
-/// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its stabilisation.
-/// Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned`
-/// here. Its `ContactModel1D` and `ContactModel2D` are [`ContactConstraint::line`] and [`ContactConstraint::plane`].
+/// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its
+/// stabilisation. Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is
+/// `LocalWorldAligned` here. Its `ContactModel1D` and `ContactModel2D` are [`ContactConstraint::line`] and
+/// [`ContactConstraint::plane`].
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};

@@ -1,10 +1,9 @@
 //! Dynamics in continuous time, from which an integrator makes knots.
 
 use crate::lq::{Hessian, LqKnot};
+use core::any::Any;
 use core::ops::Range;
 use nalgebra::DMatrix;
-
-use super::dynamics::robot::RobotDynamics;
 
 /// Dynamics in continuous time: q̈ = a(q, v, u), ℓ̇ = ℓ(x, u), with x = (q, v).
 ///
@@ -96,8 +95,8 @@ pub trait ContinuousModel: Send + Sync + 'static {
         None
     }
 
-    /// Returns the coordinates of each group of positions that is not a vector space, at most six in each group. For all
-    /// other coordinates q ⊕ δ is a sum. Empty by default.
+    /// Returns the coordinates of each group of positions that is not a vector space, at most six in each group. For
+    /// all other coordinates q ⊕ δ is a sum. Empty by default.
     fn groups(&self) -> &[Range<usize>] {
         &[]
     }
@@ -127,23 +126,23 @@ pub trait ContinuousModel: Send + Sync + 'static {
     }
 
     /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`, with
-    /// respect to δ (its state) and ε (its control), nv numbers each. Only the blocks of the [`groups`](Self::groups) are
-    /// read. Returns whether it did so. By default it does not: with groups, a step then counts as linear, even if
+    /// respect to δ (its state) and ε (its control), nv numbers each. Only the blocks of the [`groups`](Self::groups)
+    /// are read. Returns whether it did so. By default it does not: with groups, a step then counts as linear, even if
     /// [`second_order`](crate::Settings::second_order) is set.
     fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let _ = (dq, lambda, hessian);
         false
     }
 
-    /// Returns the robot whose dynamics these are. Its knots are computed in groups.
+    /// Returns the dynamics of a robot, whose knots are computed in groups.
     #[doc(hidden)]
-    fn robot(&self) -> Option<&RobotDynamics> {
+    fn robot(&self) -> Option<&dyn Any> {
         None
     }
 
     /// Returns the same robot as [`robot`](Self::robot), for computing.
     #[doc(hidden)]
-    fn robot_mut(&mut self) -> Option<&mut RobotDynamics> {
+    fn robot_mut(&mut self) -> Option<&mut dyn Any> {
         None
     }
 }

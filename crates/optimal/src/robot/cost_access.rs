@@ -2,9 +2,9 @@
 
 use super::activation::Activation;
 use super::costs::{Cost, Costs, check_weight};
+use super::dynamics::robot::robot_of;
 use super::horizon::HorizonTerms;
 use super::residuals::target::Target;
-use crate::problem::innermost;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
 
@@ -29,11 +29,12 @@ impl CostMut<'_> {
         self.cost.residual.target()
     }
 
-    /// Sets the target of its residual: a position, a placement, a reference of as many numbers as before. Allocates nothing.
+    /// Sets the target of its residual: a position, a placement, a reference of as many numbers as before. Allocates
+    /// nothing.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the residual has no target or one of another kind, for a reference of another length, numbers that
-    /// are not finite, and what is no rotation.
+    /// [`Error::Cost`] if the residual has no target or one of another kind, for a reference of another length, numbers
+    /// that are not finite, and what is no rotation.
     pub fn set_target<'t>(&mut self, target: impl Into<Target<'t>>) -> Result<(), Error> {
         let target = target.into();
         let wrong = |what| Error::Cost { name: self.cost.name.clone(), what };
@@ -78,14 +79,14 @@ impl Costs {
 
 /// Returns the costs and limits of the robot of an action.
 fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
-    Some(&mut innermost(action)?.robot()?.terms)
+    Some(&mut robot_of(action)?.terms)
 }
 
-/// Access to the costs of robots, whatever the dynamics and integrator of a knot, under [`Constrained`](crate::Constrained)
-/// actions too.
+/// Access to the costs of robots, whatever the dynamics and integrator of a knot, under
+/// [`Constrained`](crate::Constrained) actions too.
 impl Problem {
-    /// Returns the cost called `name` of the model `index`, which all knots of that model share that have no costs of their
-    /// own; `None` if there is no such model or cost, or the model is not of a robot.
+    /// Returns the cost called `name` of the model `index`, which all knots of that model share that have no costs of
+    /// their own; `None` if there is no such model or cost, or the model is not of a robot.
     ///
     /// ```
     /// use condyle_dynamics::{Vec3, robots};
@@ -120,8 +121,8 @@ impl Problem {
         terms_of(action)?.costs_mut(Some(t)).cost_mut(name)
     }
 
-    /// Calls a function with each cost called `name`: of all models, of knots with costs of their own, and of the terminal
-    /// one. Returns whether there is one.
+    /// Calls a function with each cost called `name`: of all models, of knots with costs of their own, and of the
+    /// terminal one. Returns whether there is one.
     ///
     /// # Errors
     /// The first error of the function; costs that it has changed before keep the change.

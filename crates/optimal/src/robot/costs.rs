@@ -1,7 +1,7 @@
 //! Costs of a robot's state and control: weighted sums of activations of residuals.
 
 use super::activation::Activation;
-use super::knot_data::Capabilities;
+use super::outputs::Capabilities;
 use super::residuals::layout::Plan;
 use super::residuals::residual::Residual;
 use super::residuals::terms::{Objective, Term, Terms};

@@ -1,8 +1,9 @@
 //! Horizon: which costs and limits belong to which knot, for all models that one action represents.
 
 use super::costs::{Cost, Costs, WeightedActivations, check_weight};
-use super::knot_data::{Capabilities, KnotState, Sensitivities};
+use super::knot_data::{KnotState, Sensitivities};
 use super::limits::{Limit, Limits};
+use super::outputs::Capabilities;
 use super::residuals::layout::KnotLayout;
 use super::residuals::terms::{KinematicTerms, KnotTerms};
 use super::residuals::view::{ResidualView, Scratch};

@@ -1,7 +1,7 @@
 //! Limits of a robot's state, control and forces: residuals that are held within bounds.
 
 use super::horizon::{PerKnot, PerModel};
-use super::knot_data::Capabilities;
+use super::outputs::Capabilities;
 use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
@@ -11,9 +11,9 @@ use condyle_dynamics::Model;
 
 /// Residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
 ///
-/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds it; to [`Fddp`](crate::Fddp) alone it is a cost for leaving the
-/// bounds. It shares dynamics and kinematics with the costs of its knot, and holds at the knot's beginning, whatever the
-/// integrator and its Δt. One penalty serves all numbers, whatever their units.
+/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds it; to [`Fddp`](crate::Fddp) alone it is a cost for
+/// leaving the bounds. It shares dynamics and kinematics with the costs of its knot, and holds at the knot's beginning,
+/// whatever the integrator and its Δt. One penalty serves all numbers, whatever their units.
 ///
 /// ```
 /// use condyle_dynamics::robots;

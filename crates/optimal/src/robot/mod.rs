@@ -4,9 +4,9 @@
 //! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a
 //!   residual within bounds, or to zero.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
-//!   [`FreeInverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts too. An
-//!   [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a [`ControlPolynomial`] says how
-//!   the controls go through it.
+//!   [`FreeInverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts
+//!   too. An [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a
+//!   [`ControlPolynomial`] says how the controls go through it.
 //! - A residual of your own is a [`GenericResidual`], written once for any scalar and differentiated exactly
 //!   ([`OwnResidual::autodiff`]), or a [`ResidualFunction`] with its Jacobian. Costs and limits take both.
 //! - [`Problem::motion`](crate::Problem::motion) gives the accelerations, efforts and contact forces of a solution;
@@ -59,6 +59,7 @@ mod integrators;
 mod knot_data;
 mod limits;
 mod motion;
+mod outputs;
 mod own_constraint;
 mod problem;
 mod residuals;
@@ -78,7 +79,6 @@ pub use dynamics::free::{FreeAcceleration, FreeDynamics};
 pub use dynamics::impulse::ImpulseDynamics;
 pub use dynamics::inverse::{ControlledAcceleration, FreeInverseDynamics};
 pub use dynamics::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
-pub(crate) use dynamics::robot::RobotDynamics;
 pub use integrators::{ControlPolynomial, Integrated, Integrator};
 pub use limits::Limit;
 pub use motion::{ContactForce, KnotMotion};

@@ -1,7 +1,7 @@
 //! The motion of a robot at a knot: accelerations, efforts of joints, and forces of contacts.
 
 use super::contact::Contact;
-use crate::problem::innermost;
+use super::dynamics::robot::robot_of;
 use crate::{Problem, Solution};
 use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
 
@@ -89,8 +89,8 @@ impl Problem {
     /// Computes the accelerations, efforts and contact forces of a solution at knot t, 0 to N; `None` at the
     /// end of a horizon, and for actions that do not belong to a robot and compute no accelerations. Allocates.
     ///
-    /// The solution must be of this problem as it is now. After [`shift`](Self::shift), a solution of before belongs to other
-    /// knots.
+    /// The solution must be of this problem as it is now. After [`shift`](Self::shift), a solution of before belongs to
+    /// other knots.
     ///
     /// ```
     /// use condyle_dynamics::robots;
@@ -119,7 +119,8 @@ impl Problem {
         self.motion_at(t, solution.x(t), u)
     }
 
-    /// Computes as [`motion`](Self::motion) at a state x of knot t and its controls u: as many as the knot has, none at t = N.
+    /// Computes as [`motion`](Self::motion) at a state x of knot t and its controls u: as many as the knot has, none at
+    /// t = N.
     ///
     /// # Panics
     /// If t > N, or x or u has a wrong length.
@@ -133,7 +134,7 @@ impl Problem {
             _ => {}
         });
         let action = self.action_mut(t);
-        if let Some(robot) = innermost(action).and_then(|group| group.robot()) {
+        if let Some(robot) = robot_of(action) {
             let (model, is_impact) = (robot.model.clone(), robot.is_impact());
             motion.contacts = forces(&model, robot.contacts(), &rows, &x[..model.nq()]);
             if is_impact {

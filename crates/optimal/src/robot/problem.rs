@@ -84,7 +84,8 @@ pub struct Knot {
     pub controls: ControlPolynomial,
 }
 
-/// Bounds on the controls of a knot, nu numbers each, infinite for an unbounded control. They hold at each node of a polynomial.
+/// Bounds on the controls of a knot, nu numbers each, infinite for an unbounded control. They hold at each node of a
+/// polynomial.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -210,8 +211,8 @@ impl Knot {
     /// Returns the action. Allocates.
     ///
     /// # Errors
-    /// The errors of its constructor; [`Error::Length`] for bounds of another length than nu; [`Error::Actuation`] for a
-    /// polynomial of controls at a knot without controls.
+    /// The errors of its constructor; [`Error::Length`] for bounds of another length than nu; [`Error::Actuation`] for
+    /// a polynomial of controls at a knot without controls.
     pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
         let (model, costs) = (model.clone(), self.costs.clone());
         let drives = |actuation: &Option<DMatrix<f64>>| match actuation {

@@ -11,6 +11,7 @@ use crate::robot::horizon::HorizonTerms;
 use crate::robot::integrators::Integrated;
 use crate::robot::limits::Limit;
 use condyle_dynamics::{Model, difference, integrate};
+use core::any::Any;
 use core::fmt::Debug;
 use core::marker::PhantomData;
 use core::ops::Range;
@@ -116,8 +117,8 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
     }
 
     /// Returns the smallest controls that hold the robot still at a state as nearly as possible. With contacts they are
-    /// computed together with the contact forces λ: (S u, λ) = [S Jᵀ]⁺ g(q). If accelerations are controls, they are zero;
-    /// if contact forces are controls too, λ follows them. Allocates.
+    /// computed together with the contact forces λ: (S u, λ) = [S Jᵀ]⁺ g(q). If accelerations are controls, they are
+    /// zero; if contact forces are controls too, λ follows them. Allocates.
     ///
     /// # Panics
     /// If `x` does not have nq + nv numbers.
@@ -198,11 +199,11 @@ impl<K: RobotKind> ContinuousModel for RobotAcceleration<K> {
         true
     }
 
-    fn robot(&self) -> Option<&RobotDynamics> {
+    fn robot(&self) -> Option<&dyn Any> {
         Some(&self.robot)
     }
 
-    fn robot_mut(&mut self) -> Option<&mut RobotDynamics> {
+    fn robot_mut(&mut self) -> Option<&mut dyn Any> {
         Some(&mut self.robot)
     }
 }

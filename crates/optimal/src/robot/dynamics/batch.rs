@@ -1,8 +1,8 @@
 //! Dynamics of one knot, or of several side by side in the lanes of a vector register, with what their residuals see.
 //!
-//! The coordinates of knots are packed so that each number has a lane for each knot; the passes of dynamics then run once
-//! for all of them. What they give is unpacked into the data of each knot, since the costs and the sweep look at one knot
-//! after the other.
+//! The coordinates of knots are packed so that each number has a lane for each knot; the passes of dynamics then run
+//! once for all of them. What they give is unpacked into the data of each knot, since the costs and the sweep look at
+//! one knot after the other.
 #![allow(non_snake_case)] // J, M
 
 use super::kkt_elimination::Tableau;

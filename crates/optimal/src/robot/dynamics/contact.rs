@@ -8,7 +8,7 @@ use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
-use crate::robot::knot_data::Capabilities;
+use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
@@ -22,8 +22,8 @@ pub type ContactAcceleration = RobotAcceleration<InContact>;
 /// [ J  −μ ] [ −λ ] = [ −γ      ],   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// Any set of point and rigid contacts, also none. The damping μ makes J M⁻¹ Jᵀ + μ 1 regular where contacts are redundant.
-/// These are Crocoddyl's rules (`DifferentialActionModelContactFwdDynamics`).
+/// Any set of point and rigid contacts, also none. The damping μ makes J M⁻¹ Jᵀ + μ 1 regular where contacts are
+/// redundant. These are Crocoddyl's rules (`DifferentialActionModelContactFwdDynamics`).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::robot::actuation::Actuation;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
-use crate::robot::knot_data::Capabilities;
+use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::robot::actuation::Actuation;
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
-use crate::robot::knot_data::Capabilities;
+use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
@@ -20,11 +20,11 @@ pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 /// q̈ = u,   τ = rnea(q, v, u),   v⁺ = v + u Δt,   q⁺ = q ⊕ (v Δt + u Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// No equation is solved, so that a knot costs less than one of [`FreeDynamics`](crate::robot::FreeDynamics). Efforts are
-/// looked at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort); where nothing drives a floating base they
-/// must be 0, which a [`Limit`](crate::robot::Limit) of
-/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) holds. For a robot in contact, and with other drives,
-/// see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
+/// No equation is solved, so that a knot costs less than one of [`FreeDynamics`](crate::robot::FreeDynamics). Efforts
+/// are looked at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort); where nothing drives a floating
+/// base they must be 0, which a [`Limit`](crate::robot::Limit) of
+/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) holds. For a robot in contact, and with other
+/// drives, see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
 ///
 /// ```
 /// use condyle_dynamics::robots;

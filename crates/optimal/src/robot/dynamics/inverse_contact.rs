@@ -8,13 +8,14 @@ use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, rows_of};
 use crate::robot::costs::Cost;
 use crate::robot::integrators::{Integrated, Integrator};
-use crate::robot::knot_data::Capabilities;
 use crate::robot::limits::Limit;
+use crate::robot::outputs::Capabilities;
 use crate::robot::residuals::residual::Residual;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈ + γ = 0.
+/// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈
+/// + γ = 0.
 pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 
 /// Knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
@@ -26,11 +27,11 @@ pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 /// J q̈ + γ = 0    contacts hold
 /// ```
 ///
-/// The equations are [`Limit`]s that the knot has of itself, called `undriven efforts` and `contact …`, before those that are
-/// given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they are costs.
-/// Nothing is inverted, so that contacts may be redundant and M singular. Its solutions equal the solutions with
-/// [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations if it applies. Without contacts it is
-/// [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with drives. These are Crocoddyl's rules
+/// The equations are [`Limit`]s that the knot has of itself, called `undriven efforts` and `contact …`, before those
+/// that are given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they
+/// are costs. Nothing is inverted, so that contacts may be redundant and M singular. Its solutions equal the solutions
+/// with [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations if it applies. Without
+/// contacts it is [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with drives. These are Crocoddyl's rules
 /// (`DifferentialActionModelContactInvDynamics`, and `DifferentialActionModelFreeInvDynamics` without contacts).
 ///
 /// ```
@@ -53,8 +54,8 @@ impl ControlledContactAcceleration {
     /// Returns a robot with some drives, in contact.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit or is named twice; [`Error::Cost`] for a term that does not fit;
-    /// [`Error::Actuation`] for drives of another robot.
+    /// [`Error::Contact`] for a contact that does not fit or is named twice; [`Error::Cost`] for a term that does not
+    /// fit; [`Error::Actuation`] for drives of another robot.
     pub fn new(model: Arc<Model>, actuation: Actuation, contacts: &[Contact], costs: Vec<Cost>) -> Result<Self, Error> {
         actuation.check(&model)?;
         let (all, named, undriven) = (Actuation::all(&model), rows_of(contacts), actuation.undriven());

@@ -8,16 +8,16 @@
 //! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        the joints               → δu
 //! ```
 //!
-//! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those that
-//! it may best do without. A contact's rows prefer joints that move no other contact; where these are close to singular
-//! (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are redundant is there
-//! no pivot, and the knot stays explicit. What the limbs in contact do, and then the base, is mostly solved before, for several
-//! knots side by side: see [`limb_elimination`](super::limb_elimination).
+//! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those
+//! that it may best do without. A contact's rows prefer joints that move no other contact; where these are close to
+//! singular (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are
+//! redundant is there no pivot, and the knot stays explicit. What the limbs in contact do, and then the base, is mostly
+//! solved before, for several knots side by side: see [`limb_elimination`](super::limb_elimination).
 #![allow(non_snake_case)] // J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
-use crate::robot::knot_data::Output;
 use crate::robot::knot_data::Sensitivities;
+use crate::robot::outputs::Output;
 use crate::robot::residuals::rows::Row;
 use condyle_linalg::{Runs, SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
 use core::ops::Range;
@@ -111,7 +111,8 @@ impl KktElimination {
         elimination
     }
 
-    /// Sets the rows that are solved before: see [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
+    /// Sets the rows that are solved before: see
+    /// [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
     pub(crate) fn follow(&mut self, before: Vec<Vec<(usize, usize)>>) {
         self.before = before;
     }
@@ -128,9 +129,8 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau in which a number of eliminations are done; returns whether pivots
-    /// exist.
-    /// Overwrites the tableau.
+    /// Writes U and D for steps of Δt, from a tableau in which a number of eliminations are done; returns whether
+    /// pivots exist. Overwrites the tableau.
     pub(crate) fn run(
         &mut self,
         tableau: &mut [f64],

@@ -1,18 +1,19 @@
-//! The equations of several knots in contact, solved side by side for what each contact's own limb does, then for the base.
+//! The equations of several knots in contact, solved side by side for what each contact's own limb does, then for the
+//! base.
 //!
-//! In the tableau of [`kkt_elimination`](super::kkt_elimination) the rows of a contact hold the base, what stands between it
-//! and the limb, and the limb, whose joints move no other contact. Where these are as many as the rows, with B their block,
-//! the rows are solved for them, and they go out of the equations of motion:
+//! In the tableau of [`kkt_elimination`](super::kkt_elimination) the rows of a contact hold the base, what stands
+//! between it and the limb, and the limb, whose joints move no other contact. Where these are as many as the rows, with
+//! B their block, the rows are solved for them, and they go out of the equations of motion:
 //!
 //! ```text
 //! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i of the equations that the limb is in
 //! ```
 //!
-//! Then the base's rows are solved for forces, and for accelerations where the contacts' forces cannot do all, in the same way.
-//! Which rows and columns all these are depends on the robot and its contacts only, so it is found once (what the base is
-//! solved for at some posture); the numbers are worked on for as many knots as a vector has lanes. A robot that touches nothing
-//! is solved for its base's accelerations. Where B is close to singular in some knot (a straight knee), that knot keeps the
-//! equations as they were, and its pivots are chosen one by one.
+//! Then the base's rows are solved for forces, and for accelerations where the contacts' forces cannot do all, in the
+//! same way. Which rows and columns all these are depends on the robot and its contacts only, so it is found once (what
+//! the base is solved for at some posture); the numbers are worked on for as many knots as a vector has lanes. A robot
+//! that touches nothing is solved for its base's accelerations. Where B is close to singular in some knot (a straight
+//! knee), that knot keeps the equations as they were, and its pivots are chosen one by one.
 #![allow(non_snake_case)] // B, J, M, T, Y
 
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
@@ -25,7 +26,8 @@ use std::sync::Arc;
 /// Number of rows that are solved together, for a point, for a sole, and for a base that moves freely.
 const SIZES: [usize; 2] = [3, 6];
 const MOST: usize = SIZES[1];
-/// B of a base that touches nothing is positive definite: a pivot so much smaller than its row's largest entry is rounding.
+/// B of a base that touches nothing is positive definite: a pivot so much smaller than its row's largest entry is
+/// rounding.
 const DEFINITE: f64 = 1e-9;
 /// Columns for a base in contact were chosen at another posture: a pivot that is so much smaller than its row's largest
 /// entry takes more digits than one that is chosen for the knot.
@@ -248,8 +250,8 @@ fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
 }
 
 kernel! {
-    /// Computes each block's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `singular` becomes
-    /// 1 for the knots of which a pivot is too small.
+    /// Computes each block's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `singular`
+    /// becomes 1 for the knots of which a pivot is too small.
     pub(crate) fn invert_blocks<S>(
         elimination: &LimbElimination, tableau: Tableau, T: &[S], inverses: &mut [S], singular: &mut S,
     ) {

@@ -4,6 +4,7 @@ pub(super) mod acceleration;
 pub(super) mod batch;
 pub(super) mod contact;
 pub(super) mod free;
+mod impact;
 pub(super) mod impulse;
 pub(super) mod inverse;
 pub(super) mod inverse_contact;

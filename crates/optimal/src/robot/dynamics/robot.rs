@@ -2,21 +2,22 @@
 #![allow(non_snake_case)] // J
 
 use super::batch::{DynamicsKind, Group, KnotBatch, Pass};
-use super::impulse::Impact;
+use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use super::sensitivities::DynamicsSensitivities;
-use crate::Error;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
-use crate::problem::Evaluation;
+use crate::problem::{Evaluation, innermost};
 use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, SHARED, check_contacts, constraint_set, moved_by};
 use crate::robot::continuous::{Derivatives, KnotInput};
 use crate::robot::costs::Cost;
 use crate::robot::horizon::HorizonTerms;
-use crate::robot::knot_data::{Capabilities, KnotData, KnotState, OnDemand, Output};
+use crate::robot::knot_data::{KnotData, KnotState, OnDemand};
+use crate::robot::outputs::{Capabilities, Output};
 use crate::robot::state::{GroupHessian, groups};
+use crate::{ActionModel, Error};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
     Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics, gravity, integrate,
@@ -45,7 +46,7 @@ const WORTHWHILE: usize = 3;
 
 /// Robot with its drives, the kind of its dynamics, and the costs and limits of its knots.
 #[derive(Clone, Debug)]
-pub struct RobotDynamics {
+pub(crate) struct RobotDynamics {
     pub(crate) model: Arc<Model>,
     pub(crate) actuation: Actuation,
     pub(crate) terms: HorizonTerms,
@@ -56,6 +57,11 @@ pub struct RobotDynamics {
     /// Coordinates of each group of positions that is no vector space.
     pub(crate) groups: Vec<Range<usize>>,
     work: OnDemand<Work>,
+}
+
+/// Returns the robot of an action, or of the action that it wraps.
+pub(crate) fn robot_of(action: &mut dyn ActionModel) -> Option<&mut RobotDynamics> {
+    innermost(action)?.dynamics()?.downcast_mut()
 }
 
 /// Parts of [`RobotDynamics`] with the workspace.
@@ -201,8 +207,9 @@ impl RobotDynamics {
     /// Returns a robot with some drives whose accelerations obey a law.
     ///
     /// # Errors
-    /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot, [`Error::Cost`]
-    /// for a term that does not fit, [`Error::Actuation`] for a robot of which forward dynamics has no solution.
+    /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot,
+    /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for a robot of which forward dynamics has no
+    /// solution.
     pub(crate) fn new(
         model: Arc<Model>,
         actuation: Actuation,
@@ -283,8 +290,8 @@ impl RobotDynamics {
         lanes(&self.kind)
     }
 
-    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, side by side if that is faster.
-    /// [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each.
+    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, side by side if that is
+    /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
         let Group { knots, xs, us, what, .. } = group;
         if let Evaluation::Equations(motions) = what {
@@ -336,9 +343,9 @@ impl RobotDynamics {
         (&data.a, cost, term)
     }
 
-    /// Returns the derivatives of the accelerations at a knot of the group that was solved, and writes the derivatives of
-    /// `scale` · ℓ and of the limits' term to the LQ knot. If the group was solved for equations, the LQ knot is written
-    /// in inverse-dynamics form where that is possible.
+    /// Returns the derivatives of the accelerations at a knot of the group that was solved, and writes the derivatives
+    /// of `scale` · ℓ and of the limits' term to the LQ knot. If the group was solved for equations, the LQ knot is
+    /// written in inverse-dynamics form where that is possible.
     pub(crate) fn slopes(
         &mut self,
         lane: usize,
@@ -365,8 +372,8 @@ impl RobotDynamics {
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
 
-    /// Returns the number of accelerations and forces from which the equations of inverse dynamics start, and the maximum
-    /// numbers of dependent coordinates and of rows of costs; `None` without such equations.
+    /// Returns the number of accelerations and forces from which the equations of inverse dynamics start, and the
+    /// maximum numbers of dependent coordinates and of rows of costs; `None` without such equations.
     pub(crate) fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         let layout = self.terms.layout(); // Hessians without rows are in Q, S and R, with respect to the controls
         let elimination = self.work.made()?.elimination.as_ref()?;
@@ -431,7 +438,7 @@ impl RobotDynamics {
         }
         let mut both = drives.quasi_static(gravity(model, data, &x[..nq]), &J);
         let forces = both.split_off(drives.nu());
-        if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ) = u, or τ = S u
+        if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ), or u
     }
 
     /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).

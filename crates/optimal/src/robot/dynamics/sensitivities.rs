@@ -2,8 +2,8 @@
 #![allow(non_snake_case)] // J
 
 use crate::robot::actuation::Actuation;
-use crate::robot::knot_data::Output;
 use crate::robot::knot_data::{KnotData, Sensitivities, add_matrix_row};
+use crate::robot::outputs::Output;
 use crate::robot::residuals::rows::Row;
 
 /// Derivatives of the outputs of a knot, from those in its data.

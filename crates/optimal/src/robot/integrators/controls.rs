@@ -14,9 +14,9 @@ use crate::lq::LqKnot;
 /// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials            at s = 0, ½, 1; by `RungeKutta3` at 0, ⅓, ⅔
 /// ```
 ///
-/// Dynamics and costs are taken at the stages of the [`Integrator`], each at its own u(s). Semi-implicit Euler has one, at
-/// s = 0, so that w₁ and w₂ do nothing there, and only regularisation or [`Constrained`](crate::Constrained) terms hold
-/// them. These are Crocoddyl's `ControlParametrizationModelPolyZero`, `PolyOne` and `PolyTwoRK`.
+/// Dynamics and costs are taken at the stages of the [`Integrator`], each at its own u(s). Semi-implicit Euler has one,
+/// at s = 0, so that w₁ and w₂ do nothing there, and only regularisation or [`Constrained`](crate::Constrained) terms
+/// hold them. These are Crocoddyl's `ControlParametrizationModelPolyZero`, `PolyOne` and `PolyTwoRK`.
 ///
 /// ```
 /// use condyle_optimal::robot::{ControlPolynomial, Integrator};

@@ -1,8 +1,8 @@
 //! Semi-implicit Euler, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt. The limits' term is not scaled.
 #![allow(non_snake_case)] // A, B
 
+use super::accelerations::{slopes, values};
 use super::retraction::Retraction;
-use super::{slopes, values};
 use crate::lq::LqKnot;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use crate::robot::dynamics::batch::Group;

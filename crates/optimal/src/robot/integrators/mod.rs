@@ -1,5 +1,6 @@
 //! Integrators: from accelerations to the next state, and knots with a duration.
 
+mod accelerations;
 mod controls;
 mod curvature;
 mod euler;
@@ -16,6 +17,7 @@ use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
 use crate::problem::{Evaluation, KnotGroup, Results, Visit, quasi_static};
 use crate::{ActionModel, Error, GroupModel};
+use accelerations::{robot, robot_mut, slopes, solve, values};
 pub use controls::ControlPolynomial;
 use controls::widen;
 use curvature::Curvature;
@@ -57,45 +59,6 @@ struct Work {
     runge_kutta: Option<RungeKutta>,
     /// Step by the first controls, if there are others.
     first: Option<Box<LqKnot>>,
-}
-
-/// Message for a violated condition: the model was checked to be a robot.
-const ROBOT: &str = "the model is a robot";
-
-/// Computes the dynamics of a group of a robot's knots; user-defined models compute each knot by itself.
-fn solve<M: ContinuousModel>(model: &mut M, group: Group<'_>) {
-    if let Some(robot) = model.robot_mut() {
-        robot.solve(group);
-    }
-}
-
-/// Returns the accelerations, ℓ and the limits' term at a knot of the group that was solved.
-fn values<'m, M: ContinuousModel>(
-    model: &'m mut M,
-    lane: usize,
-    input: KnotInput<'_>,
-    limited: bool,
-) -> (&'m [f64], f64, f64) {
-    if model.robot().is_some() {
-        return model.robot_mut().expect(ROBOT).values(lane, input, limited);
-    }
-    let (a, cost) = model.calc(input);
-    (a, cost, 0.0)
-}
-
-/// Returns the derivatives at a knot of the group that was solved.
-fn slopes<'m, M: ContinuousModel>(
-    model: &'m mut M,
-    lane: usize,
-    input: KnotInput<'_>,
-    scale: f64,
-    group: Group<'_>,
-    knot: &mut LqKnot,
-) -> Derivatives<'m> {
-    match model.robot().is_some() {
-        true => model.robot_mut().expect(ROBOT).slopes(lane, input, scale, group, knot),
-        false => model.calc_diff(input, scale, knot),
-    }
 }
 
 impl<M: ContinuousModel> Integrated<M> {
@@ -295,7 +258,7 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
                     self.differentiate(lane, input, group, &mut results.lq_knots[i]);
                     continue;
                 }
-                if let Some(robot) = self.inner.robot_mut().filter(|_| motion.min(room) > 0) {
+                if let Some(robot) = robot_mut(&mut self.inner).filter(|_| motion.min(room) > 0) {
                     robot.copy_motion(lane, &mut results.motions[i * room..][..motion]);
                 }
                 results.costs[i] = self.step(lane, input, &mut results.next[i * nx..][..nx]);
@@ -304,18 +267,18 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
     }
 
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
-        if let Some(robot) = self.inner.robot_mut() {
+        if let Some(robot) = robot_mut(&mut self.inner) {
             robot.terms.limits.visit(t, visit);
         }
     }
 
     fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         let euler = self.method == Method::Euler && self.controls.is_constant();
-        self.inner.robot().filter(|_| euler)?.inverse_dynamics()
+        robot(&self.inner).filter(|_| euler)?.inverse_dynamics()
     }
 
     fn reserve(&mut self) {
-        if let Some(robot) = self.inner.robot_mut() {
+        if let Some(robot) = robot_mut(&mut self.inner) {
             robot.reserve();
         }
         self.parts();
@@ -328,7 +291,9 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         if rule(self) != rule(other) || self.bounds != other.bounds {
             return false;
         }
-        let (Some(robot), Some(others)) = (self.inner.robot_mut(), other.inner.robot_mut()) else { return false };
+        let (Some(robot), Some(others)) = (robot_mut(&mut self.inner), robot_mut(&mut other.inner)) else {
+            return false;
+        };
         let same = robot.merge(others, place);
         if same {
             self.durations.append(&mut other.durations, place);
@@ -338,14 +303,14 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
 
     fn choose(&mut self, model: usize) {
         self.durations.choose(model);
-        if let Some(robot) = self.inner.robot_mut() {
+        if let Some(robot) = robot_mut(&mut self.inner) {
             robot.terms.choose(model);
         }
     }
 
     fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.durations.serve(t, horizon, model);
-        if let Some(robot) = self.inner.robot_mut() {
+        if let Some(robot) = robot_mut(&mut self.inner) {
             robot.terms.serve(t, horizon, model);
         }
     }
@@ -362,14 +327,14 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         self.outputs(t, x, u, show);
     }
 
-    fn robot(&mut self) -> Option<&mut RobotDynamics> {
+    fn dynamics(&mut self) -> Option<&mut dyn Any> {
         self.inner.robot_mut()
     }
 }
 
 impl<M: ContinuousModel> GroupModel for Integrated<M> {
     fn lanes(&self) -> usize {
-        if self.is_simple_step() { self.inner.robot().map_or(1, RobotDynamics::lanes) } else { 1 }
+        if self.is_simple_step() { robot(&self.inner).map_or(1, RobotDynamics::lanes) } else { 1 }
     }
 
     #[track_caller]

@@ -1,5 +1,5 @@
-//! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the identity,
-//! except a block for each group of positions that is not a vector space.
+//! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the
+//! identity, except a block for each group of positions that is not a vector space.
 #![allow(non_snake_case)] // T, E
 
 use crate::EulerBlock;
@@ -56,8 +56,8 @@ impl Retraction {
         }
     }
 
-    /// ∂(x ⊕ (δ, δv)) in place of X = ∂(δ, δv), by the chain rule: E X + T for positions, X + 1 for velocities. The first
-    /// columns of X are derivatives by x.
+    /// ∂(x ⊕ (δ, δv)) in place of X = ∂(δ, δv), by the chain rule: E X + T for positions, X + 1 for velocities. The
+    /// first columns of X are derivatives by x.
     pub(super) fn chain(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
         self.multiply(groups, X);
         let n = X.nrows();

@@ -11,9 +11,9 @@
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
 
 use super::Integrator;
+use super::accelerations::{slopes, solve, values};
 use super::controls::ControlPolynomial;
 use super::retraction::Retraction;
-use super::{slopes, solve, values};
 use crate::lq::LqKnot;
 use crate::problem::Evaluation;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};

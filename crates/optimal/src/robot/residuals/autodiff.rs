@@ -11,7 +11,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Residual r(t, x, u) of a robot that is written for any [`Scalar`], so that [`OwnResidual::autodiff`] differentiates
 /// it.
 ///
-/// Mark `calc` with `#[inline(always)]`: it is then compiled for the vector registers in which the Jacobian is computed.
+/// Mark `calc` with `#[inline(always)]`: it is then compiled for the vector registers in which the Jacobian is
+/// computed.
 pub trait GenericResidual: Any + Send + Sync {
     /// Returns the number of entries of r.
     fn size(&self) -> usize;
@@ -75,11 +76,12 @@ impl<'a, S: Scalar> RobotState<'a, S> {
 }
 
 impl OwnResidual {
-    /// Makes a residual of a function that is written for any scalar. Its Jacobian is exact, in the tangent space of the
-    /// state, by dual numbers: four or eight columns take one evaluation in vector registers (AVX2, NEON, SIMD128 or
-    /// AVX-512). The Hessian of its cost is Gauss–Newton's.
+    /// Makes a residual of a function that is written for any scalar. Its Jacobian is exact, in the tangent space of
+    /// the state, by dual numbers: four or eight columns take one evaluation in vector registers (AVX2, NEON, SIMD128
+    /// or AVX-512). The Hessian of its cost is Gauss–Newton's.
     ///
-    /// Copies share the function. A thread takes a workspace that no other thread uses, and allocates one only if all are in use.
+    /// Copies share the function. A thread takes a workspace that no other thread uses, and allocates one only if all
+    /// are in use.
     ///
     /// ```
     /// use condyle_dynamics::robots;

@@ -1,7 +1,7 @@
 //! Friction cones, wrench cones and the support of the centre of pressure, as rows of inequalities.
 //!
-//! A contact's force is along the axes of the contact's rows; a cone's rotation R turns the surface's axes (its normal is
-//! z) into those. Rows are in Crocoddyl's order, so that its residuals are the same numbers.
+//! A contact's force is along the axes of the contact's rows; a cone's rotation R turns the surface's axes (its normal
+//! is z) into those. Rows are in Crocoddyl's order, so that its residuals are the same numbers.
 
 use crate::Error;
 use crate::problem::leave_a_value;
@@ -113,8 +113,8 @@ impl FrictionCone {
     /// Checks the numbers of the cone, as problems do that it comes into.
     ///
     /// # Errors
-    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation is invalid,
-    /// or no normal force is between the bounds.
+    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation
+    /// is invalid, or no normal force is between the bounds.
     pub fn check(&self) -> Result<(), Error> {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }

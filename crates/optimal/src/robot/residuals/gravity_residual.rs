@@ -1,4 +1,5 @@
-//! Gravity residual: the efforts of a knot beyond those that hold the robot still, for several knots side by side or for one.
+//! Gravity residual: the efforts of a knot beyond those that hold the robot still, for several knots side by side or
+//! for one.
 
 use super::kernel::KnotGroup;
 use crate::robot::knot_data::unpack;

@@ -1,5 +1,5 @@
-//! Residuals of kinematics with their Jacobians, for several knots side by side in the lanes of a vector register, or for
-//! one. Each kind of residual is a function of its own, compiled for the level of its scalar.
+//! Residuals of kinematics with their Jacobians, for several knots side by side in the lanes of a vector register, or
+//! for one. Each kind of residual is a function of its own, compiled for the level of its scalar.
 #![allow(non_snake_case)] // J, R, X
 
 use super::layout::{Plan, ROWS, STRIDE, row_width};

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // W
 
 use super::residual::{Part, Residual};
-use crate::robot::knot_data::{Capabilities, Output};
+use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::Model;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;

@@ -40,8 +40,8 @@ pub trait ResidualFunction: Any + Send + Sync {
         Inputs::ALL
     }
 
-    /// Refuses a robot, or a number of controls, for which r is not made. By default none is refused. An action calls this
-    /// when it is given the residual.
+    /// Refuses a robot, or a number of controls, for which r is not made. By default none is refused. An action calls
+    /// this when it is given the residual.
     ///
     /// # Errors
     /// The fault, with the numbers.
@@ -53,7 +53,8 @@ pub trait ResidualFunction: Any + Send + Sync {
     /// r(t, x, u) of knot t.
     fn calc(&self, t: usize, x: &[f64], u: &[f64], r: &mut [f64]);
 
-    /// ∂r/∂x in the tangent space of the state, size × ndx, and ∂r/∂u, size × nu, row after row. Both hold zeros before.
+    /// ∂r/∂x in the tangent space of the state, size × ndx, and ∂r/∂u, size × nu, row after row. Both hold zeros
+    /// before.
     fn calc_diff(&self, t: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]);
 
     /// Returns whether [`calc_hessian`](Self::calc_hessian) gives second derivatives. Not by default: the Hessian of
@@ -62,8 +63,9 @@ pub trait ResidualFunction: Any + Send + Sync {
         false
     }
 
-    /// As [`calc_diff`](Self::calc_diff), with Σ dᵢ ∂²rᵢ too, for size numbers d, the slopes of what r is worth: they come to
-    /// the Gauss–Newton Hessian. Of positions on groups it is the Hessian of r(x ⊕ δ) at δ = 0. All hold zeros before.
+    /// As [`calc_diff`](Self::calc_diff), with Σ dᵢ ∂²rᵢ too, for size numbers d, the slopes of what r is worth: they
+    /// come to the Gauss–Newton Hessian. Of positions on groups it is the Hessian of r(x ⊕ δ) at δ = 0. All hold zeros
+    /// before.
     fn calc_hessian(
         &self,
         t: usize,

@@ -4,7 +4,7 @@ use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
 use super::own::{Inputs, OwnResidual};
 use super::target::check_rotation;
-use crate::robot::knot_data::{Capabilities, Output};
+use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
 /// Residual: a vector r(x, u) that should be small.
@@ -32,11 +32,11 @@ pub enum Residual {
         /// τ_ref.
         reference: Vec<f64>,
     },
-    /// Nᵀτ, the efforts that inverse dynamics finds where nothing drives the robot, which must vanish in a motion that is
-    /// possible: of a floating base 6 numbers, the force and the moment on it. Nᵀ S = 0, orthonormal.
+    /// Nᵀτ, the efforts that inverse dynamics finds where nothing drives the robot, which must vanish in a motion that
+    /// is possible: of a floating base 6 numbers, the force and the moment on it. Nᵀ S = 0, orthonormal.
     UndrivenEffort,
-    /// J q̈ + γ of a contact, along the axes of its rows, where accelerations are controls: 1, 2, 3 or 6 numbers that must
-    /// vanish while the contact holds.
+    /// J q̈ + γ of a contact, along the axes of its rows, where accelerations are controls: 1, 2, 3 or 6 numbers that
+    /// must vanish while the contact holds.
     ContactAcceleration {
         /// Contact's name.
         contact: String,
@@ -125,7 +125,8 @@ pub enum Residual {
     Own(OwnResidual),
 }
 
-/// Returns the entries of a wrench along a contact's axes that are its rows, by their number: a line has z, a plane x and z.
+/// Returns the entries of a wrench along a contact's axes that are its rows, by their number: a line has z, a plane x
+/// and z.
 pub(super) fn held(rows: usize) -> &'static [usize] {
     match rows {
         1 => &[2],

@@ -95,8 +95,8 @@ impl Rows {
         self.rows[k * self.stride + self.nu + self.nv..][..self.nv].copy_from_slice(row);
     }
 
-    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q and
-    /// the part of Q for q alone, and leaves the rows that depend on more to the sweep.
+    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q
+    /// and the part of Q for q alone, and leaves the rows that depend on more to the sweep.
     pub(crate) fn write(&mut self, knot: &mut LqKnot) {
         knot.q.as_mut_slice().fill(0.0);
         knot.r.as_mut_slice().fill(0.0);
@@ -172,8 +172,8 @@ fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     }
 }
 
-/// C = Σ left rightᵀ over the first `length` rows of both, for some rows and columns of C that stand from two places on in
-/// the rows of `left` and `right`. The sums are the same on both sides of the diagonal.
+/// C = Σ left rightᵀ over the first `length` rows of both, for some rows and columns of C that stand from two places on
+/// in the rows of `left` and `right`. The sums are the same on both sides of the diagonal.
 fn outer(
     C: &mut [f64],
     ldc: usize,

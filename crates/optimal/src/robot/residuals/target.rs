@@ -39,7 +39,9 @@ macro_rules! targets {
         }
     )*};
 }
-targets!(Vec3<f64> => Position, Mat3<f64> => Rotation, Se3<f64> => Placement, Motion<f64> => Velocity, Force<f64> => Force);
+targets!(
+    Vec3<f64> => Position, Mat3<f64> => Rotation, Se3<f64> => Placement, Motion<f64> => Velocity, Force<f64> => Force
+);
 
 impl<'a> From<&'a [f64]> for Target<'a> {
     fn from(numbers: &'a [f64]) -> Self {

@@ -6,8 +6,8 @@ use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
 use crate::lq::{Hessian, LARGEST_BLOCK, LqKnot};
-use crate::robot::knot_data::Output;
 use crate::robot::knot_data::{KnotState, Sensitivities, add_matrix_row};
+use crate::robot::outputs::Output;
 use crate::robot::state::{groups, state_difference};
 use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian_groups};
 use core::ops::Range;
@@ -113,8 +113,8 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes the rows of the Jacobian of a residual that was just computed, with its worth's slopes d and curvatures dd;
-    /// unless the Jacobian is the identity: then see [`add_diagonal`](Self::add_diagonal).
+    /// Pushes the rows of the Jacobian of a residual that was just computed, with its worth's slopes d and curvatures
+    /// dd; unless the Jacobian is the identity: then see [`add_diagonal`](Self::add_diagonal).
     pub(crate) fn push_rows(&mut self, residual: &Residual, plan: &Plan, sensitivities: &dyn Sensitivities) {
         let (s, nv) = (&mut *self.scratch, self.model.nv());
         let worth = s.d.iter().zip(&s.dd).map(|(d, dd)| [*d, *dd]);

@@ -1,0 +1,55 @@
+//! Accelerations of a group of knots: of a robot side by side, of user-defined models one by one.
+
+use crate::lq::LqKnot;
+use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
+use crate::robot::dynamics::batch::Group;
+use crate::robot::dynamics::robot::RobotDynamics;
+
+/// Returns the robot of a model.
+pub(super) fn robot<M: ContinuousModel>(model: &M) -> Option<&RobotDynamics> {
+    model.robot()?.downcast_ref()
+}
+
+/// Returns the robot of a model, for computing.
+pub(super) fn robot_mut<M: ContinuousModel>(model: &mut M) -> Option<&mut RobotDynamics> {
+    model.robot_mut()?.downcast_mut()
+}
+
+/// Message for a violated condition: the model was checked to be a robot.
+const ROBOT: &str = "the model is a robot";
+
+/// Computes the dynamics of a group of a robot's knots; user-defined models compute each knot by itself.
+pub(super) fn solve<M: ContinuousModel>(model: &mut M, group: Group<'_>) {
+    if let Some(robot) = robot_mut(model) {
+        robot.solve(group);
+    }
+}
+
+/// Returns the accelerations, ℓ and the limits' term at a knot of the group that was solved.
+pub(super) fn values<'m, M: ContinuousModel>(
+    model: &'m mut M,
+    lane: usize,
+    input: KnotInput<'_>,
+    limited: bool,
+) -> (&'m [f64], f64, f64) {
+    if robot(model).is_some() {
+        return robot_mut(model).expect(ROBOT).values(lane, input, limited);
+    }
+    let (a, cost) = model.calc(input);
+    (a, cost, 0.0)
+}
+
+/// Returns the derivatives at a knot of the group that was solved.
+pub(super) fn slopes<'m, M: ContinuousModel>(
+    model: &'m mut M,
+    lane: usize,
+    input: KnotInput<'_>,
+    scale: f64,
+    group: Group<'_>,
+    knot: &mut LqKnot,
+) -> Derivatives<'m> {
+    match robot(model).is_some() {
+        true => robot_mut(model).expect(ROBOT).slopes(lane, input, scale, group, knot),
+        false => model.calc_diff(input, scale, knot),
+    }
+}
