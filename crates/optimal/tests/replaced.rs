@@ -1,5 +1,5 @@
-//! Models and durations of single knots are replaced between solves. The results equal the results of a new problem, and
-//! the next solve does not allocate.
+//! Models and durations of single knots are replaced between solves. The results equal the results of a new problem,
+//! and the next solve does not allocate.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]

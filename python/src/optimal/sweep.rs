@@ -17,8 +17,8 @@ const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 /// knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
 /// controls.
 ///
-/// Raises `ProblemError` if the shapes of the nodes do not fit together. `run` raises it for a knot with constraint rows, which
-/// the sweep does not treat.
+/// Raises `ProblemError` if the shapes of the knots do not fit together. `run` raises it for a knot with constraint
+/// rows, which the sweep does not treat.
 ///
 /// >>> from condyle.optimal import Lqr, Problem, Sweep
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
