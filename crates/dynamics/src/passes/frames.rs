@@ -1,13 +1,14 @@
 //! Queries on bodies and frames whose placements are known: pose, velocity, acceleration, Jacobian and its rate.
 //!
-//! All quantities are stored in the world's frame. To express them in a frame r, with pose oXr and velocity v_r,
+//! All quantities are stored in the world's frame. The same quantities in a frame r with pose oXr and velocity v_r are
 //!
 //! ```text
 //! J = oXr⁻¹ S     dJ/dt = oXr⁻¹ (Ṡ − v_r × S)     v = oXr⁻¹ v_i     a = oXr⁻¹ a_i
 //! ```
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), sections 2.10 (differentiation) and 2.11
-//! (acceleration). A query about one body or frame costs O(1), a Jacobian O(depth + nv). Queries do not allocate.
+//! (acceleration). A Jacobian costs O(depth + nv), any other query about one body or frame costs O(1). Queries do not
+//! allocate.
 
 use crate::passes::answers::answers;
 use crate::passes::kinematics::{Moving, World};
@@ -18,23 +19,23 @@ use condyle_spatial::gate::{FusedF64, Rename};
 use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Motion, Scalar, Se3, Vec3, kernel, same_layout};
 use core::ops::Deref;
 
-/// Frame in which a quantity of a frame is expressed. For a quantity of a body, `Local` means the body's frame.
+/// Reference frame in which a velocity, an acceleration or a Jacobian of a frame or body is expressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ReferenceFrame {
-    /// Frame itself.
+    /// Frame whose quantity is computed; for a quantity of a body, the body's frame.
     Local,
-    /// World's frame: the velocity of the body's point at the world's origin.
+    /// World's frame: a velocity is the velocity of the body's point at the world's origin.
     World,
-    /// Axes of the world at the frame's origin: the motion of this origin.
+    /// Axes of the world at the frame's origin: a linear velocity is the velocity of this origin.
     LocalWorldAligned,
 }
 
 same_layout!(ReferenceFrame);
 
 impl ReferenceFrame {
-    /// Returns oXr, the pose of the reference frame for a frame at oXf.
+    /// Returns oXr, the pose of the reference frame in the world, for a frame with pose oXf.
     #[inline(always)]
     pub(crate) fn pose<S: Scalar>(self, oXf: Se3<S>) -> Se3<S> {
         match self {
@@ -44,8 +45,8 @@ impl ReferenceFrame {
         }
     }
 
-    /// Returns v_r, the velocity of the reference frame in the world's frame, for a frame at oXf on a body with
-    /// velocity v.
+    /// Returns v_r, the velocity of the reference frame, expressed in the world's frame. The queried frame has pose oXf
+    /// and is on a body with velocity v.
     #[inline(always)]
     pub(crate) fn velocity<S: Scalar>(self, oXf: Se3<S>, v: Motion<S>) -> Motion<S> {
         match self {
@@ -126,7 +127,7 @@ impl<'d, S, R> Deref for Accelerations<'d, S, R> {
     }
 }
 
-/// Adds a column to the column of J that belongs to its coordinate.
+/// Adds `s`, times the ratio of column c, to the column of J that belongs to the coordinate of column c.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut [S], c: usize, s: Motion<S>) {
     let column = &model.columns()[c];
@@ -151,7 +152,7 @@ pub(crate) fn check_frame<R>(model: &Model<R>, frame: usize) {
     check_index("frame", frame, model.frames().len(), "frames");
 }
 
-/// Returns the columns of a Jacobian. Panics unless it is 6 × nv.
+/// Returns the entries of a Jacobian, column by column. Panics unless the Jacobian is 6 × nv.
 #[inline]
 #[track_caller]
 pub(crate) fn columns<'a, S>(name: &str, J: &'a mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &'a mut [S] {
@@ -159,8 +160,8 @@ pub(crate) fn columns<'a, S>(name: &str, J: &'a mut DenseMatrix<S, impl Dense<S>
     J.as_mut_slice()
 }
 
-/// Returns the classical acceleration v̇ + ω × v of the point at a frame's origin, from its spatial acceleration and
-/// velocity.
+/// Returns the classical acceleration v̇ + ω × v at a frame's origin, from the spatial acceleration and velocity of the
+/// frame.
 #[inline(always)]
 pub(crate) fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
     Motion::new(a.linear + v.angular.cross(v.linear), a.angular)
@@ -185,8 +186,8 @@ answers! {
         of.body(frame.body) * frame.placement.lift()
     }
 
-    /// Returns the spatial velocity of a body: the velocity of its point at the origin of the reference frame (m/s),
-    /// and its angular velocity (rad/s).
+    /// Returns the spatial velocity of a body: the velocity of the body's point at the origin of the reference frame
+    /// (m/s), and the body's angular velocity (rad/s).
     ///
     /// # Panics
     /// If there is no such body.
@@ -194,8 +195,8 @@ answers! {
         reference.pose(of.body(body)).act_inv(of.moving.v[body])
     }
 
-    /// Returns the spatial velocity of a frame: the velocity of its body's point at the origin of the reference frame
-    /// (m/s), and its angular velocity (rad/s).
+    /// Returns the spatial velocity of a frame. It consists of the velocity of a point that is fixed to the frame's
+    /// body and now at the origin of the reference frame (m/s), and the angular velocity (rad/s).
     ///
     /// # Panics
     /// If there is no such frame.
@@ -203,8 +204,8 @@ answers! {
         reference.pose(of.frame(frame)).act_inv(of.moving.v[of.model.frames()[frame].body])
     }
 
-    /// Returns the spatial acceleration of a body (m/s², rad/s²), without gravity: the rate of its spatial velocity, as
-    /// seen from the world, expressed in the reference frame.
+    /// Returns the spatial acceleration of a body (m/s², rad/s²), without gravity. It is the rate of the body's spatial
+    /// velocity, as seen from the world, and is expressed in the reference frame.
     ///
     /// # Panics
     /// If there is no such body.
@@ -212,8 +213,8 @@ answers! {
         reference.pose(of.body(body)).act_inv(of.moving.a[body])
     }
 
-    /// Returns the spatial acceleration of a frame (m/s², rad/s²), without gravity: the rate of its spatial velocity,
-    /// as seen from the world, expressed in the reference frame.
+    /// Returns the spatial acceleration of a frame (m/s², rad/s²), without gravity. It is the rate of the frame's
+    /// spatial velocity, as seen from the world, and is expressed in the reference frame.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -233,7 +234,7 @@ answers! {
     }
 
     /// Returns the classical acceleration v̇ + ω × v of a frame's point at the origin of the reference frame (m/s²),
-    /// and the frame's angular acceleration (rad/s²). In `LocalWorldAligned` its linear part is p̈ of the frame's
+    /// and the frame's angular acceleration (rad/s²). In `LocalWorldAligned` the linear part is p̈ of the frame's
     /// origin. Source: Featherstone (2008), section 2.11.
     ///
     /// # Panics
@@ -246,7 +247,7 @@ answers! {
 }
 
 kernel! {
-    /// Computes J of a frame at oXf on a body.
+    /// Computes the Jacobian J of a frame with pose oXf that is on the body `body`.
     fn jacobian<S, R>(
         of: Placements<'_, S, R>,
         body: usize,
@@ -263,7 +264,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes dJ/dt of a frame at oXf on a body.
+    /// Computes the rate dJ/dt of the Jacobian of a frame with pose oXf that is on the body `body`.
     fn jacobian_rate<S, R>(
         of: Velocities<'_, S, R>,
         body: usize,
@@ -323,8 +324,9 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
 
     /// Computes the rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. Overwrites dJ.
     ///
-    /// dJ v + J a is the derivative of the velocity's six numbers. In `Local` and `World` it is the spatial
-    /// acceleration. In `LocalWorldAligned`, whose origin moves with the frame, it is the classical acceleration.
+    /// dJ v + J a is the derivative of the six numbers of the frame's velocity. In `Local` and `World` this derivative
+    /// is the spatial acceleration. In `LocalWorldAligned`, whose origin moves with the frame, it is the classical
+    /// acceleration.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};
