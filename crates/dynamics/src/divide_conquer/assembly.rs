@@ -6,9 +6,9 @@
 //!
 //! Here a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983). From each
 //! body, a heavy path continues to the child that carries the most bodies. The other children begin separate paths. The
-//! weight of a part of a path is its number of bodies, including all bodies that they carry. A path is cut so that both
-//! halves have nearly the same weight, and the halves are cut in the same way. So joins are nested ⌈log₂ n⌉ deep for a
-//! chain of n bodies, and O(log n) deep for any tree.
+//! weight of a part of a path is the number of its bodies, plus the number of bodies in the other subtrees attached to
+//! them. A path is cut so that both halves have nearly the same weight, and the halves are cut in the same way. So
+//! joins are nested ⌈log₂ n⌉ deep for a chain of n bodies, and O(log n) deep for any tree.
 //!
 //! No cut is made directly below a body whose own inertia does not resist the motion of its joint, such as a massless
 //! body. The piece above such a cut could not be solved separately.

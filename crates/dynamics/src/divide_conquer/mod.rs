@@ -167,7 +167,7 @@ struct Job<'d, L: Layout> {
     q: &'d [L::S],
     qd: &'d [L::S],
     f_ext: &'d [Force<L::S>],
-    /// Acceleration of the world: −g for gravity g.
+    /// Acceleration of the world: −g for gravity g, or 0 without gravity.
     world: Motion<L::S>,
     parallel: bool,
 }

@@ -5,7 +5,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Kind, Link, Piece};
 use condyle_spatial::{ArticulatedInertia, Force, Motion, Se3};
 
-/// Quantities of a body, along the world's axes, about the origin of the body to which the piece is attached.
+/// Quantities of a body, along the world's axes, about a reference point that all bodies of the piece share.
 #[derive(Clone, Debug)]
 pub(crate) struct Body<S> {
     /// Pose λXi of the body in its parent. Written by: `relate`.
@@ -24,8 +24,8 @@ pub(crate) struct Body<S> {
     pub a: Motion<S>,
 }
 
-/// Quantities of a degree of freedom, along the world's axes, about the origin of the body to which the piece is
-/// attached.
+/// Quantities of a degree of freedom, along the world's axes, about a reference point that all bodies of the piece
+/// share.
 #[derive(Clone, Debug)]
 pub(crate) struct Dof<S> {
     /// Effort. Written by: `aba` and `run`.
