@@ -117,7 +117,7 @@ pub struct ConstrainedEquations<'d, S> {
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// M, nv × nv, including armature.
+    /// Inertia matrix M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
     /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of M q̈ + h − Jᵀ λ per δ when q moves to q
     /// ⊕ δ.
@@ -213,7 +213,7 @@ pub struct ConstrainedDerivatives<'d, S> {
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂q̈/∂q in the tangent space, nv × nv: change of q̈ per δ when q moves to q ⊕ δ.
+    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v, nv × nv.
     pub da_dv: &'d Matrix<S>,

@@ -77,7 +77,7 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
     pub acceleration: &'d [S],
     /// ∂τ/∂q̈ = M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// ∂τ/∂q in the tangent space, nv × nv: change of τ per δ when q moves to q ⊕ δ.
+    /// ∂τ/∂q in the tangent space, nv × nv: the change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v, nv × nv.
     pub dtau_dv: &'d Matrix<S>,

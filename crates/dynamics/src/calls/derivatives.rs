@@ -196,7 +196,7 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
 pub struct AbaDerivatives<'d, S, R = f64> {
     /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// ∂q̈/∂q in the tangent space: change of q̈ per δ when q moves to q ⊕ δ.
+    /// ∂q̈/∂q in the tangent space: the change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v.
     pub da_dv: &'d Matrix<S>,

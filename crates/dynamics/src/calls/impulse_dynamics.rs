@@ -26,7 +26,8 @@ pub struct Impulse<'d, S> {
     pub redundant: S,
 }
 
-/// Computes the velocity after an impact: v⁺ = v + M⁻¹ Jᵀ Λ, with the impulses Λ that make J v⁺ = −ε J v.
+/// Computes the velocity after an impact: v⁺ = v + M⁻¹ Jᵀ Λ, with the impulses Λ that make J v⁺ = −ε J v for a
+/// restitution ε.
 ///
 /// q: nq numbers; v: nv numbers; restitution: ε, from 0 (the frames stick) to 1 (the impact loses no energy). Gains and
 /// desired motions of the constraints are ignored. The placement of a target is used only to locate the point on the

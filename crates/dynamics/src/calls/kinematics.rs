@@ -100,7 +100,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, there is no such frame, or `J` is not 6 × nv.
+/// If `q` does not have nq numbers, the frame does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -141,7 +141,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, there is no such body, or `J` is not 6 × nv.
+/// If `q` does not have nq numbers, the body does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -144,7 +144,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     if model.has_mimic() && !matches!(task, Task::Rnea) {
         return false; // only `Task::Rnea` supports joints that share a coordinate
     }
-    // SAFETY: S and R are f64.
+    // SAFETY: `ready` returns a plan only if S and R are f64.
     unsafe { enter(task, same(model), plan, same(data), arguments.fused()) }
     true
 }

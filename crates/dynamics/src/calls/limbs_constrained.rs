@@ -90,7 +90,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     arguments: Arguments<'_, S>,
 ) -> bool {
     let Some(plan) = ready(model, data).filter(|_| constraints.limbs.is_some()) else { return false };
-    // SAFETY: S and R are f64.
+    // SAFETY: `ready` returns a plan only if S and R are f64.
     unsafe {
         let constraints = same::<_, &mut ConstraintSet<f64>>(constraints).renamed();
         enter(same(model), plan, same(data), constraints, arguments.fused());

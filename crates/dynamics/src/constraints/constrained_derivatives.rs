@@ -10,7 +10,7 @@
 //! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
 //! ```
 //!
-//! [`constrained_equations`] defines r and c. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
+//! `kkt_derivatives.rs` computes r and c. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
 //! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
 //! programming for multi-phase rigid contact dynamics* (2018).
 

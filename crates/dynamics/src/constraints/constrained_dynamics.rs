@@ -25,7 +25,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch of constrained dynamics, in the world's frame.
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
         /// Velocity. Written by: `bias`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
@@ -34,7 +34,7 @@ workspace! {
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Composite inertias Iᶜ. Written by: `bias`, `inertia`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Force through the joint for q̈ = 0. Written by: `bias`.
+        /// Force that each joint transmits for q̈ = 0. Written by: `bias`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Inertia matrix M. Written by: `bias`, `inertia`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -137,7 +137,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes M and τ − h, for bodies whose placements are known.
+    /// Computes the inertia matrix M and τ − h, for bodies whose placements are known.
     pub(crate) fn equations<S, R>(
         model: &Model<R>,
         world: &World<S>,

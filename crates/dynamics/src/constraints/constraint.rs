@@ -43,9 +43,11 @@ pub struct Target<S> {
     /// Desired pose of the frame in the other frame (the world for a contact). All kinds except rigid use only the
     /// translation of this pose.
     pub placement: Se3<S>,
-    /// Desired velocity relative to the other frame, in the reference frame (m/s, rad/s).
+    /// Desired velocity of the frame relative to the other frame, along the axes of the constraint's `reference` (m/s,
+    /// rad/s).
     pub velocity: Motion<S>,
-    /// Desired acceleration relative to the other frame, in the reference frame (m/s², rad/s²).
+    /// Desired acceleration of the frame relative to the other frame, along the axes of the constraint's `reference`
+    /// (m/s², rad/s²).
     pub acceleration: Motion<S>,
 }
 

@@ -16,8 +16,8 @@ use condyle_model::Model;
 use condyle_spatial::{Array, Dense, DenseMatrix, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
-/// Constraints of one model, contacts and loops, with the scratch and results of [`constrained_dynamics`] and similar
-/// functions.
+/// Constraints (contacts and loops) of one model, with the scratch and the results of [`constrained_dynamics`] and
+/// similar functions.
 ///
 /// [`new`](Self::new) allocates all memory. Make one set for each combination of contacts, and change targets with
 /// [`set_target`](Self::set_target). All sets can share one [`Data`](crate::Data).
@@ -51,7 +51,8 @@ pub struct ConstraintSet<S> {
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
     /// Rows in which each column of J may be nonzero; one list per coordinate.
     pub(crate) touching: Vec<Vec<usize>>,
-    /// J in the slots of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
+    /// Rows of J, each in the slots of its constraint. Shape: number of entries of all rows. Written by:
+    /// `constraint_motion`.
     pub(crate) J: Array<S>,
     /// γ, the accelerations of the constraints for q̈ = 0, including the corrections by kp and kd. Shape: rows. Written
     /// by: `constraint_motion`.
@@ -141,7 +142,7 @@ impl<S: Scalar> ConstraintSet<S> {
         self.lambda.len()
     }
 
-    /// Returns the rows of constraint k.
+    /// Returns the range of the rows of constraint k in J and λ.
     ///
     /// # Panics
     /// If constraint k does not exist.
@@ -187,7 +188,7 @@ impl<S: Scalar> ConstraintSet<S> {
         Ok(())
     }
 
-    /// Copies J of the last call, rows × nv. Overwrites J.
+    /// Writes the Jacobian J of the last call, rows × nv. Overwrites J.
     ///
     /// # Panics
     /// If `J` is not rows × nv.

@@ -16,7 +16,7 @@ use condyle_model::{Error, Model};
 use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
 
-/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ, which makes redundant constraints share their forces.
+/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ. It makes redundant constraints share their forces.
 ///
 /// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with the last solution as λ'.
 /// Each iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
@@ -43,7 +43,7 @@ impl Default for ProximalSettings {
 /// Degree of freedom that moves at least one frame of a constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct SupportColumn {
-    /// Index of the joint's column.
+    /// Index of the joint column among all columns of the model.
     pub column: usize,
     /// Index of the column's coordinate among the constraint's slots.
     pub at: usize,

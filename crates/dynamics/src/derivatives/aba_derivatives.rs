@@ -38,7 +38,7 @@ workspace! {
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub solve: tree_solve::Workspace<S> = tree_solve::Workspace::new(model.columns(), size.nv),
     } same {
-        /// First coordinate of each floating body. Written by: `new`.
+        /// Index of the first coordinate of each floating body. Written by: `new`.
         pub floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect(),
         /// Rows of each column of ∂τ that M⁻¹ multiplies. The list is empty for the linear coordinates of floating
         /// bodies. Written by: `new`.

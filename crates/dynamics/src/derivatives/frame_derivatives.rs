@@ -48,7 +48,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// frame's velocity.
     ///
     /// # Panics
-    /// If there is no such body, or `dv_dq` is not 6 × nv.
+    /// If the body does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_velocity_derivative(
@@ -74,7 +74,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or `dv_dq` is not 6 × nv.
+    /// If the frame does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_velocity_derivative(
@@ -138,7 +138,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives) for a frame's acceleration.
     ///
     /// # Panics
-    /// If there is no such body, or a matrix is not 6 × nv.
+    /// If the body does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_acceleration_derivatives(
@@ -156,7 +156,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// accelerations is the frame's Jacobian.
     ///
     /// # Panics
-    /// If there is no such frame, or a matrix is not 6 × nv.
+    /// If the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_acceleration_derivatives(
@@ -190,7 +190,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or a matrix is not 6 × nv.
+    /// If the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_classical_acceleration_derivatives(

@@ -44,7 +44,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the second derivatives of φ, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Velocity w of each body when the joints move with velocity λ. Written by: `pass`.
         pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),

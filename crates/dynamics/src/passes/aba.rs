@@ -15,7 +15,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch of the articulated-body algorithm, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Articulated inertia of each body. Written by: `factorize`, `inward`.
         pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.body_depth),
@@ -138,7 +138,7 @@ pub(crate) fn inward<L: Layout>(
     }
 }
 
-/// Computes the accelerations from the root to the tips.
+/// Computes the accelerations of bodies and joints, from the root to the tips.
 #[inline(always)]
 pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { U, D_inv, a, c, u, qdd, .. } = d;

@@ -25,7 +25,7 @@ workspace! {
         /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
         /// `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Force through the joint for q̈ = 0. Written by: `pass`.
+        /// Force that each joint transmits for q̈ = 0. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// M. Written by: `pass`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -98,9 +98,9 @@ pub struct AllTerms<'d, S, R = f64> {
     /// Queries for the placements and velocities of bodies and frames, and for the Jacobians J and dJ/dt of bodies and
     /// frames.
     pub kinematics: Velocities<'d, S, R>,
-    /// M(q), the full symmetric nv × nv matrix, as returned by [`crba`](crate::crba).
+    /// Inertia matrix M(q), the full symmetric nv × nv matrix, as returned by [`crba`](crate::crba).
     pub M: &'d Matrix<S>,
-    /// h(q, v), nv numbers (N m, N), as returned by [`nonlinear_effects`](crate::nonlinear_effects).
+    /// Bias efforts h(q, v), nv numbers (N m, N), as returned by [`nonlinear_effects`](crate::nonlinear_effects).
     pub h: &'d [S],
     /// Centroidal momentum hg, its map Ag, the rate dAg/dt, the centre of mass and the Jacobian of the centre of mass,
     /// as returned by [`centroidal_map_rate`](crate::centroidal_map_rate).
@@ -155,7 +155,7 @@ answers! {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     fn frame_drift(of: AllTerms, frame: usize) -> Motion = Motion::zero(); {
         let reference = ReferenceFrame::LocalWorldAligned;
         let origin = reference.pose(of.kinematics.frame(frame));

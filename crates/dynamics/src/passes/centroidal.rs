@@ -169,9 +169,9 @@ pub struct CentroidalMap<'d, S> {
     pub Ag: &'d Matrix<S>,
     /// Inertia of all moving bodies about their centre of mass, as if they were one body.
     pub Ig: Inertia<S>,
-    /// c, the centre of mass in the world's frame (m).
+    /// Centre of mass c in the world's frame (m).
     pub com: Vec3<S>,
-    /// Jacobian of c, 3 × nv: ċ = Jcom v.
+    /// Jacobian of the centre of mass c, 3 × nv: ċ = Jcom v.
     pub Jcom: &'d Matrix<S>,
 }
 
@@ -186,11 +186,11 @@ pub struct CentroidalMapRate<'d, S> {
     pub hg: Force<S>,
     /// Inertia of all moving bodies about their centre of mass, as if they were one body.
     pub Ig: Inertia<S>,
-    /// c, the centre of mass in the world's frame (m).
+    /// Centre of mass c in the world's frame (m).
     pub com: Vec3<S>,
-    /// ċ, the velocity of the centre of mass (m/s).
+    /// Velocity ċ of the centre of mass (m/s).
     pub com_velocity: Vec3<S>,
-    /// Jacobian of c, 3 × nv: ċ = Jcom v.
+    /// Jacobian of the centre of mass c, 3 × nv: ċ = Jcom v.
     pub Jcom: &'d Matrix<S>,
 }
 
@@ -242,7 +242,7 @@ answers! {
     }
 
     /// Returns dhg = Σ (I_i a_i + v_i ×* I_i v_i), the rate of the centroidal momentum, along the world's axes (N, N
-    /// m), in O(n). It equals the sum of weight and external forces about the centre of mass.
+    /// m), in O(n). The rate equals the sum of the weight and the external forces, about the centre of mass.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum_rate(of: Accelerations) -> Force = Force::zero(); {

@@ -22,7 +22,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         (I.mass, oX.translation.scale_add(I.mass, oX.rotation * I.mass_com))
     }
 
-    /// Returns Σ m and Σ m c over the moving bodies.
+    /// Returns the total mass Σ m and the total first moment Σ m c of the moving bodies.
     #[inline(always)]
     pub(crate) fn mass_and_moment(&self) -> (S, Vec3<S>) {
         let l = Single::<S, R>::new(self.model);

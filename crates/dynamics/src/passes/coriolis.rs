@@ -86,7 +86,7 @@ impl<S: Scalar> Coriolis<S> {
 }
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the Coriolis matrix, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Iᶜ. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -135,7 +135,7 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// Computes C, for bodies whose velocities are known.
+    /// Computes the Coriolis matrix C, for bodies whose velocities are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         free_armature::add_coriolis(model, &moving.qd, d.C.as_mut_slice());

@@ -63,7 +63,7 @@ pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S
 }
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the derivatives of the energies, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Inertia of all bodies that a joint carries. Written by: `derivatives`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),

@@ -1,4 +1,5 @@
-//! Queries on bodies and frames whose placements are known: pose, velocity, acceleration, Jacobian and its rate.
+//! Queries on bodies and frames whose placements are known: pose, velocity, acceleration, Jacobian and rate of the
+//! Jacobian.
 //!
 //! All quantities are stored in the world's frame. The same quantities in a frame r with pose oXr and velocity v_r are
 //!
@@ -138,14 +139,14 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut [S], c: usize, s: Moti
     }
 }
 
-/// Panics unless the model has this body.
+/// Panics unless the model has a body with this index.
 #[inline(always)]
 #[track_caller]
 pub(crate) fn check_body<R>(model: &Model<R>, body: usize) {
     check_index("body", body, model.nodes().len(), "bodies");
 }
 
-/// Panics unless the model has this frame.
+/// Panics unless the model has a frame with this index.
 #[inline(always)]
 #[track_caller]
 pub(crate) fn check_frame<R>(model: &Model<R>, frame: usize) {
@@ -171,7 +172,7 @@ answers! {
     /// Returns oXb, the pose of a body in the world. The body's frame is the frame that the URDF gives it.
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     fn body(of: Placements, body: usize) -> Se3 = Se3::identity(); {
         let zXb = Se3::new(of.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
         of.world.oX[body] * zXb.lift()
@@ -180,7 +181,7 @@ answers! {
     /// Returns oXf, the pose of a frame in the world.
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     fn frame(of: Placements, frame: usize) -> Se3 = Se3::identity(); {
         let frame = &of.model.frames()[frame];
         of.body(frame.body) * frame.placement.lift()
@@ -190,7 +191,7 @@ answers! {
     /// (m/s), and the body's angular velocity (rad/s).
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     fn body_velocity(of: Velocities, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.body(body)).act_inv(of.moving.v[body])
     }
@@ -199,7 +200,7 @@ answers! {
     /// body and now at the origin of the reference frame (m/s), and the angular velocity (rad/s).
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     fn frame_velocity(of: Velocities, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.frame(frame)).act_inv(of.moving.v[of.model.frames()[frame].body])
     }
@@ -208,7 +209,7 @@ answers! {
     /// velocity, as seen from the world, and is expressed in the reference frame.
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     fn body_acceleration(of: Accelerations, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.body(body)).act_inv(of.moving.a[body])
     }
@@ -217,7 +218,7 @@ answers! {
     /// spatial velocity, as seen from the world, and is expressed in the reference frame.
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     fn frame_acceleration(of: Accelerations, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.frame(frame)).act_inv(of.moving.a[of.model.frames()[frame].body])
     }
@@ -226,7 +227,7 @@ answers! {
     /// the body's angular acceleration (rad/s²).
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     fn body_classical_acceleration(
         of: Accelerations, body: usize, reference: ReferenceFrame
     ) -> Motion = Motion::zero(); {
@@ -238,7 +239,7 @@ answers! {
     /// origin. Source: Featherstone (2008), section 2.11.
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     fn frame_classical_acceleration(
         of: Accelerations, frame: usize, reference: ReferenceFrame
     ) -> Motion = Motion::zero(); {
@@ -285,7 +286,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a body, 6 × nv, linear rows first: the body's velocity is J v. Overwrites J.
     ///
     /// # Panics
-    /// If there is no such body, or `J` is not 6 × nv.
+    /// If the body does not exist, or `J` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -295,7 +296,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
     ///
     /// # Panics
-    /// If there is no such frame, or `J` is not 6 × nv.
+    /// If the frame does not exist, or `J` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -315,7 +316,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// for a frame. Overwrites dJ.
     ///
     /// # Panics
-    /// If there is no such body, or `dJ` is not 6 × nv.
+    /// If the body does not exist, or `dJ` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -343,7 +344,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or `dJ` is not 6 × nv.
+    /// If the frame does not exist, or `dJ` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {

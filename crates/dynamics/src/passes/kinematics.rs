@@ -70,7 +70,7 @@ workspace! {
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Rate Ṡ = v × S of each column S, which is fixed in a body with velocity v. Written by: `advance`.
         pub dS: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Velocity coordinates. Written by: `advance`.
+        /// Joint velocities. Written by: `advance`.
         pub qd: Array<S> = filled(S::zero, size.nv),
         /// Spatial acceleration of each body, without gravity; the world's acceleration stays 0. Written by:
         /// `accelerate`.

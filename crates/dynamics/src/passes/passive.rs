@@ -31,7 +31,8 @@ use condyle_model::layout::Single;
 use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Scalar, Vec3, kernel};
 
-/// Computes the passive efforts of a robot: τ = −d v − f tanh(v/ε) + springs + gravity compensation.
+/// Computes the passive efforts of a robot: τ = −d v − f tanh(v/ε) + springs + gravity compensation, with damping d,
+/// friction f and smoothing ε.
 ///
 /// q: nq numbers; v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv
 /// numbers (N m, N), overwritten.
@@ -173,7 +174,7 @@ fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
         || model.damping_polynomial()[of].iter().any(|&polynomial| polynomial != [0.0; 2])
 }
 
-/// Returns the rotation of a free joint, and the velocity of its origin along the axes of the body.
+/// Returns the rotation of a free joint, and the velocity of the body's origin along the axes of the body.
 #[inline(always)]
 fn turn<S: Scalar>(q: &[S], v: &[S]) -> (Mat3<S>, Vec3<S>) {
     (Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(v[0], v[1], v[2]))

@@ -37,7 +37,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// [`frame_point_jacobian`](Self::frame_point_jacobian).
     ///
     /// # Panics
-    /// If there is no such body, or `J` is not 3 × nv.
+    /// If the body does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_jacobian(&self, body: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -67,7 +67,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or `J` is not 3 × nv.
+    /// If the frame does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_jacobian(&self, frame: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -95,7 +95,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force_on_body(&self, body: usize, point: Vec3<S>, force: Vec3<S>) -> Force<S> {
@@ -108,7 +108,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// the frame of the body (m).
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_velocity(&self, body: usize, point: Vec3<S>) -> Vec3<S> {
@@ -120,7 +120,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// the frame (m).
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_velocity(&self, frame: usize, point: Vec3<S>) -> Vec3<S> {

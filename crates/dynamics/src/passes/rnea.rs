@@ -32,7 +32,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Force, Inertia, Scalar, Se3, Vec3};
 
 workspace! {
-    /// Scratch in the bodies' turned frames.
+    /// Scratch of the recursive Newton–Euler algorithm, in the turned frames of the bodies.
     pub(crate) struct Workspace<S>(size) {
         /// λXi. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.body_depth),
@@ -40,7 +40,7 @@ workspace! {
         /// is −g, which includes gravity. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.body_depth),
-        /// Force through the joint. Written by: `pass`.
+        /// Force that each joint transmits. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.body_depth),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),

@@ -76,7 +76,7 @@ fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q
     let (node, own) = (&model.nodes()[i], model.bodies()[i].joint);
     let position = l.position(q, i, 0);
     if turns(node.joint) {
-        // The offset of a mimic joint is part of its placement.
+        // The offset of a mimic joint is part of the joint's placement, not of its position.
         let offset = node.mimic.map_or(0.0, |mimic| mimic.offset);
         let (sin0, cos0) = Scalar::sin_cos(rest - offset);
         return angle([position, l.position(q, i, 1)], [L::S::splat(cos0), L::S::splat(sin0)]);

@@ -17,7 +17,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the efforts that hold a robot still, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Sum of the weights and external forces of all bodies that a joint carries. Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),

@@ -51,7 +51,7 @@ workspace! {
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Ψ̈. Written by: `pass`.
         pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Ψ̇ + Ṡ. Written by: `pass`.
+        /// Sum Ψ̇ + Ṡ of each column. Written by: `pass`.
         pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Numbers of each column d that all pairs (d, e) need, for `vectorized`. Written by: `pass`.
         pub rows: Rows<S> = Rows::new(size.columns),
