@@ -144,8 +144,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     &data.statics.tau
 }
 
-/// Computes the Coriolis matrix C(q, v) of the Christoffel symbols, in O(n · depth). It satisfies C v = h − g and Ṁ = C
-/// + Cᵀ, so Ṁ − 2C is skew.
+/// Computes the Coriolis matrix C(q, v) of the Christoffel symbols, in O(n · depth). It satisfies C v = h − g and C +
+/// Cᵀ = Ṁ, so Ṁ − 2C is skew.
 ///
 /// q: nq numbers; v: nv numbers. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing. Source:
 /// Echeandia and Wensing (2021), algorithm 1.

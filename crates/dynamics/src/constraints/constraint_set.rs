@@ -51,11 +51,11 @@ pub struct ConstraintSet<S> {
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
     /// Rows in which each column of J may be nonzero; one list per coordinate.
     pub(crate) touching: Vec<Vec<usize>>,
-    /// Rows of J, each in the slots of its constraint. Shape: number of entries of all rows. Written by:
-    /// `constraint_motion`.
+    /// Rows of J, each in the slots of its constraint. Shape: number of entries of all rows. Written by: `jacobian` of
+    /// `constraint_motion.rs`.
     pub(crate) J: Array<S>,
-    /// γ, the accelerations of the constraints for q̈ = 0, including the corrections by kp and kd. Shape: rows. Written
-    /// by: `constraint_motion`.
+    /// γ, the accelerations of the constraints for q̈ = 0, including the corrections by kp and kd; for impacts, (1 + ε)
+    /// J v. Shape: rows. Written by: `constrained_dynamics`, `impulse_dynamics`.
     pub(crate) gamma: Array<S>,
     pub(crate) delassus: Delassus<S>,
     /// Forces λ, or impulses, of the constraints. Shape: rows. Written by: the algorithms.

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! These are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ = (1 + ε) J v. The
-//! derivatives have the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ Λ)/∂q, c = ∂(J w)/∂q and w = v⁺
-//! + ε v. Here r is the derivative of inverse dynamics for a robot at rest without gravity, with acceleration Δ:
+//! derivatives have the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ Λ)/∂q, w = v⁺ + ε v and c = ∂(J
+//! w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without gravity, with acceleration Δ:
 //!
 //! ```text
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
@@ -28,9 +28,9 @@ use condyle_spatial::{Array, Cross, Matrix, Motion, Scalar};
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// v⁺. Written by: `pass`.
+        /// Velocity v⁺ after the impact. Written by: `part`.
         pub v_after: Array<S> = filled(S::zero, size.nv),
-        /// w = v⁺ + ε v. Written by: `pass`.
+        /// w = v⁺ + ε v, with the velocity v before the impact. Written by: `approach`, `part`.
         pub w: Array<S> = filled(S::zero, size.nv),
         /// Velocities of the bodies when the joints move with velocity w, in the world's frame. Written by: `spread`.
         pub velocity: Array<Motion<S>> = filled(Motion::zero, size.bodies),
@@ -92,8 +92,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the derivatives with respect to the velocity before the impact: ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1
-    /// + ε) (J M⁻¹ Jᵀ)⁻¹ J.
+    /// Computes the derivatives with respect to the velocity v before the impact: ∂v⁺/∂v is 1 − (1 + ε) J̄ J, and ∂Λ/∂v
+    /// is −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
     pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut Matrix<S>) {
         let (n, rows) = (set.nv, set.lambda.len());
         let (Jbar, inertia) = (set.Jbar.as_slice(), set.delassus.inverse.as_slice());
