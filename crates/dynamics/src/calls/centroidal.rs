@@ -8,7 +8,8 @@ use crate::passes::frames::{Placements, Velocities};
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar};
 
-/// Computes the centroidal momentum matrix Ag(q), the centre of mass, its Jacobian, and the inertia about it, in O(n).
+/// Computes the centroidal momentum matrix Ag(q), the centre of mass, the Jacobian of the centre of mass, and the
+/// inertia about the centre of mass, in O(n).
 ///
 /// q: nq numbers. Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates nothing.
 /// Source: Orin, Goswami, Lee (2013).
@@ -36,11 +37,11 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     data.centroidal.map()
 }
 
-/// Computes Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with all results of [`centroidal_map`], in
-/// O(n).
+/// Computes Ag(q), the rate dAg/dt for the velocity v, the centroidal momentum hg = Ag v, and all results of
+/// [`centroidal_map`], in O(n).
 ///
-/// q: nq numbers; v: nv. Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates
-/// nothing. Source: Wensing and Orin (2016).
+/// q: nq numbers; v: nv numbers. Bodies fixed to the world are ignored; results are NaN if no moving body has mass.
+/// Allocates nothing. Source: Wensing and Orin (2016).
 ///
 /// ```
 /// use condyle_dynamics::{Data, centroidal_map_rate, forward_accelerations, robots};
@@ -66,13 +67,13 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     data.centroidal.map_rate()
 }
 
-/// Computes all terms of the equations of motion in two passes, in O(n · depth): M, h, Ag, dAg, hg, centre of mass,
-/// energies, and the Jacobians of all frames.
+/// Computes all terms of the equations of motion in two passes, in O(n · depth): M, h, Ag, dAg, hg, the centre of mass
+/// and the energies. The result also answers queries for poses and Jacobians of all frames.
 ///
-/// q: nq numbers; v: nv. Up to rounding, the results equal the results of the separate calls [`crba`](crate::crba),
-/// [`nonlinear_effects`](crate::nonlinear_effects), [`centroidal_map_rate`](crate::centroidal_map_rate) and
-/// [`forward_velocities`](crate::forward_velocities). Allocates nothing. Source: Featherstone, *Rigid Body Dynamics
-/// Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
+/// q: nq numbers; v: nv numbers. Up to rounding, the results equal the results of the separate calls
+/// [`crba`](crate::crba), [`nonlinear_effects`](crate::nonlinear_effects),
+/// [`centroidal_map_rate`](crate::centroidal_map_rate) and [`forward_velocities`](crate::forward_velocities). Allocates
+/// nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, compute_all_terms, robots};

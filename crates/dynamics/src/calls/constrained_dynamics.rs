@@ -1,4 +1,4 @@
-//! Forward dynamics under constraints, its derivatives, and its linearised equations.
+//! Forward dynamics under constraints, the derivatives of its results, and the linearised equations.
 
 use super::inverse_dynamics::check_arguments;
 use super::limbs_constrained;
@@ -16,25 +16,25 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar};
 /// Result of [`constrained_dynamics`].
 #[derive(Clone, Copy, Debug)]
 pub struct Constrained<'d, S> {
-    /// q̈, nv numbers (rad/s², m/s²).
+    /// Joint accelerations q̈, nv numbers (rad/s², m/s²).
     pub a: &'d [S],
-    /// λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m); one number per
-    /// row.
+    /// Forces λ of the constraints, one number per row of J (N, N m). Each force acts on the body of the constraint's
+    /// frame and is along the axes of the constraint's rows.
     pub lambda: &'d [S],
-    /// Largest absolute value in J q̈ + γ (m/s², rad/s²): measures how well the constraints are satisfied.
+    /// Largest absolute value in J q̈ + γ (m/s², rad/s²). It is 0 if the constraints are satisfied exactly.
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force of their own (in f64, J
-    /// M⁻¹ Jᵀ + μ 1 is singular to 13 digits). 0 means that the solution is unique.
+    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force (in f64, J M⁻¹ Jᵀ + μ 1
+    /// is singular to 13 digits). 0 means that the solution is unique.
     pub redundant: S,
 }
 
 /// Computes forward dynamics under constraints: q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i), with the forces λ that make J
 /// q̈ + γ = 0.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: one force per body in the body's frame (N, N m), index 0 is the world; or empty
-/// for none. The computation uses the sparsity of the tree: O(n d²) for a tree of depth d, O(d) for each pair of rows,
-/// and O(rows³). For robots with limbs ([`Model::with_limbs`]) it uses the articulated bodies: O(n) plus the cost of
-/// the rows. Allocates nothing.
+/// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (N, N m), or empty for no
+/// forces; index 0 is the world. The computation uses the sparsity of the tree. It costs O(n d²) for a tree of depth d,
+/// O(d) for each pair of rows, and O(rows³). For robots with limbs ([`Model::with_limbs`]) it uses the articulated-body
+/// algorithm, and O(n) replaces O(n d²). Allocates nothing.
 ///
 /// If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the result is
 /// finite and `residual` is not zero. [`ProximalSettings`](crate::ProximalSettings) decide how redundant constraints
@@ -81,7 +81,7 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Panics if an argument is invalid.
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular.
 #[inline]
 #[track_caller]
 fn check<S: Scalar, R>(model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>, arguments: Arguments<'_, S>) {
@@ -90,7 +90,7 @@ fn check<S: Scalar, R>(model: &Model<R>, data: &Data<S>, constraints: &Constrain
     model.check_regular();
 }
 
-/// Runs the whole algorithm with the factor of M. The arguments must be valid.
+/// Computes constrained dynamics with the sparse factor of M. The arguments must be valid.
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -109,17 +109,18 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
 /// Result of [`constrained_dynamics_equations`]. [`ConstraintSet::jacobian`] returns J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedEquations<'d, S> {
-    /// q̈, nv numbers.
+    /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// λ, one number per row.
+    /// Forces λ of the constraints, one number per row of J.
     pub lambda: &'d [S],
     /// Largest absolute value in J q̈ + γ (m/s², rad/s²).
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// M, nv × nv, including armature.
+    /// Inertia matrix M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: change of τ per δ when q moves to q ⊕ δ.
+    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of M q̈ + h − Jᵀ λ per δ when q moves to q
+    /// ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// r_v = ∂h/∂v, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
@@ -129,19 +130,20 @@ pub struct ConstrainedEquations<'d, S> {
     pub dgamma_dv: &'d Matrix<S>,
 }
 
-/// Computes [`constrained_dynamics`](crate::constrained_dynamics()) and its linearised equations, which relate changes
-/// of q, v and τ to changes of q̈ and λ:
+/// Computes the results of [`constrained_dynamics`](crate::constrained_dynamics()) and the linearised equations. These
+/// equations relate changes of q, v and τ to changes of q̈ and λ:
 ///
 /// ```text
 /// M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,      J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 /// ```
 ///
-/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves these equations. This function
-/// is for callers that eliminate other unknowns: it inverts nothing, and all blocks keep the sparsity of the tree.
+/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves these equations. The linearised
+/// equations are for callers that eliminate other unknowns: no matrix is inverted, and all blocks keep the sparsity of
+/// the tree.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for
-/// none. Targets of the constraints are fixed. Costs O(n · depth) in addition to the forward dynamics. Allocates
-/// nothing. Source: Carpentier and Mansard (2018).
+/// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with the
+/// body), or empty for no forces. Targets of the constraints are fixed. Costs O(n · depth) in addition to the forward
+/// dynamics. Allocates nothing. Source: Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_equations, crba, robots};
@@ -183,7 +185,7 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes forward dynamics and its linearised equations. The arguments must be valid.
+/// Computes forward dynamics under constraints and the linearised equations. The arguments must be valid.
 pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -199,18 +201,19 @@ pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     differentiate_motion(constraints, world, &id.bodies);
 }
 
-/// Result of [`constrained_dynamics_derivatives`]. The blocks of K⁻¹ are ∂q̈/∂τ, −∂λ/∂τ (transposed) and −Λ.
+/// Result of [`constrained_dynamics_derivatives`]. K is the matrix of the equations of motion and constraints. K⁻¹ has
+/// the diagonal blocks ∂q̈/∂τ and −Λ, and the other blocks are −∂λ/∂τ and its transpose.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedDerivatives<'d, S> {
-    /// q̈, nv numbers.
+    /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// λ, one number per row.
+    /// Forces λ of the constraints, one number per row of J.
     pub lambda: &'d [S],
     /// Largest absolute value in J q̈ + γ (m/s², rad/s²).
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂q̈/∂q in the tangent space, nv × nv: change of q̈ per δ when q moves to q ⊕ δ.
+    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v, nv × nv.
     pub da_dv: &'d Matrix<S>,
@@ -226,16 +229,17 @@ pub struct ConstrainedDerivatives<'d, S> {
     pub inertia: &'d Matrix<S>,
 }
 
-/// Computes [`constrained_dynamics`](crate::constrained_dynamics()) and its exact derivatives with respect to q, v and
-/// τ.
+/// Computes the results q̈ and λ of [`constrained_dynamics`](crate::constrained_dynamics()) and their exact derivatives
+/// with respect to q, v and τ.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for
-/// none. Targets of the constraints are fixed. Costs O(n · depth) for the right-hand sides and O((n + rows)² n) for the
-/// products with K⁻¹, which skip the zeros of the tree. Allocates nothing.
+/// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with the
+/// body), or empty for no forces. Targets of the constraints are fixed. Costs O(n · depth) for the right-hand sides and
+/// O((n + rows)² n) for the products with K⁻¹, the inverse of the constrained equations' matrix. The products skip the
+/// zeros of the tree. Allocates nothing.
 ///
-/// Where constraints are redundant, the derivatives of q̈ are exact up to the residual. The derivatives of λ then solve
-/// the differentiated equations in the same sense as λ: without μ, redundant rows have no force; with μ, the solution
-/// is the smallest one. Source: Carpentier and Mansard (2018).
+/// If constraints are redundant, the derivatives of q̈ are exact up to the residual. The derivatives of λ then satisfy
+/// the same choice as λ: for μ = 0, redundant rows have no force; for μ > 0, the solution is the smallest one. Source:
+/// Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};

@@ -1,5 +1,5 @@
-//! Inverse dynamics under constraints: efforts and constraint accelerations for given motions and forces, and their
-//! derivatives.
+//! Inverse dynamics under constraints: efforts and accelerations of the constraints for given motions and forces, and
+//! the derivatives of both.
 
 use super::inverse_dynamics;
 use crate::constraints::constrained_dynamics::evaluate;
@@ -17,19 +17,20 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar};
 /// Result of [`constrained_inverse_dynamics`]. [`ConstraintSet::jacobian`] returns J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverse<'d, S> {
-    /// τ = M q̈ + h − Jᵀ λ, nv numbers (N m, N).
+    /// Joint efforts τ = M q̈ + h − Jᵀ λ − Σ Jᵢᵀ f_ext,i, nv numbers (N m, N).
     pub tau: &'d [S],
-    /// J q̈ + γ, one number per row (m/s², rad/s²): 0 where the motion satisfies the constraints.
+    /// Accelerations J q̈ + γ of the constraints, one number per row (m/s², rad/s²). They are 0 if the motion satisfies
+    /// the constraints.
     pub acceleration: &'d [S],
 }
 
-/// Computes inverse dynamics under constraints for given accelerations and forces: τ = M q̈ + h − Jᵀ λ − Σ Jᵢᵀ f_ext,i,
-/// and J q̈ + γ.
+/// Computes inverse dynamics under constraints for given accelerations q̈ and forces λ: the efforts τ = M q̈ + h − Jᵀ λ
+/// − Σ Jᵢᵀ f_ext,i, and the accelerations J q̈ + γ of the constraints.
 ///
 /// For a feasible motion, τ is 0 at each coordinate without an actuator, and J q̈ + γ is 0.
 ///
-/// q: nq numbers; v, a: nv; lambda: one number per row; f_ext: one force per body in its frame, index 0 is the world;
-/// or empty for none. Costs O(n) plus the cost of the rows of J. Allocates nothing.
+/// q: nq numbers; v, a: nv numbers each; lambda: one number per row; f_ext: one force per body, in the body's frame, or
+/// empty for no forces; index 0 is the world. Costs O(n) plus the cost of the rows of J. Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics, constrained_inverse_dynamics};
@@ -70,13 +71,13 @@ pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
 /// Result of [`constrained_inverse_dynamics_derivatives`]. [`ConstraintSet::jacobian`] returns J, and ∂τ/∂λ = −Jᵀ.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverseDerivatives<'d, S> {
-    /// τ, nv numbers.
+    /// Joint efforts τ, nv numbers.
     pub tau: &'d [S],
-    /// J q̈ + γ, one number per row.
+    /// Accelerations J q̈ + γ of the constraints, one number per row.
     pub acceleration: &'d [S],
     /// ∂τ/∂q̈ = M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// ∂τ/∂q in the tangent space, nv × nv: change of τ per δ when q moves to q ⊕ δ.
+    /// ∂τ/∂q in the tangent space, nv × nv: the change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
@@ -86,12 +87,12 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
     pub dacceleration_dv: &'d Matrix<S>,
 }
 
-/// Computes [`constrained_inverse_dynamics`] and its exact derivatives with respect to q, v and q̈. The derivatives
-/// with respect to λ are −Jᵀ (of τ) and 0 (of J q̈ + γ).
+/// Computes the results of [`constrained_inverse_dynamics`] and their exact derivatives with respect to q, v and q̈.
+/// The derivative with respect to λ is −Jᵀ for τ, and 0 for J q̈ + γ.
 ///
-/// Arguments are as for [`constrained_inverse_dynamics`]; targets of the constraints are fixed. In O(n · depth).
-/// Allocates nothing. Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms*
-/// (2018).
+/// The arguments are the same as for [`constrained_inverse_dynamics`]. Targets of the constraints are fixed. Costs O(n
+/// · depth). Allocates nothing. Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics
+/// algorithms* (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_inverse_dynamics_derivatives, crba};
@@ -106,7 +107,7 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// As [`constrained_inverse_dynamics`].
+/// Under the same conditions as [`constrained_inverse_dynamics`].
 #[track_caller]
 pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -143,8 +144,8 @@ pub struct EquationsAt<'d, S> {
     pub dgamma_dv: &'d Matrix<S>,
 }
 
-/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. It serves the knots of an optimal
-/// control problem, whose rollout has already computed q̈ and λ.
+/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. Used at the knots of an optimal control
+/// problem, because the rollout of the problem has already computed q̈ and λ.
 #[doc(hidden)]
 #[track_caller]
 pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
@@ -167,7 +168,7 @@ pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes the derivatives. The arguments must be valid.
+/// Computes the derivatives of constrained inverse dynamics. The arguments must be valid.
 fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -185,7 +186,7 @@ fn differentiate<S: Scalar, R: Constant<S>>(
     differentiate_motion(constraints, world, &id.bodies);
 }
 
-/// Computes τ for bodies whose placements are known.
+/// Computes the efforts τ, for bodies whose placements are known.
 fn inverse<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -198,7 +199,7 @@ fn inverse<S: Scalar, R: Constant<S>>(
     rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, &data.constrained_derivatives.forces);
 }
 
-/// Panics if an argument is invalid.
+/// Panics if an argument has the wrong length, or `data` or `constraints` were made for another model.
 #[inline]
 #[track_caller]
 fn check_arguments<S: Scalar, R>(

@@ -1,4 +1,4 @@
-//! First derivatives of inverse and forward dynamics, of momentum and of energies.
+//! First derivatives of inverse and forward dynamics, of the centroidal momentum, and of the energies.
 
 use super::differentiated::State;
 use super::forward_dynamics;
@@ -19,12 +19,12 @@ use condyle_linalg::tree_product::neg_products;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 
-/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without forces it is ∂τ/∂q of
-/// [`gravity`](crate::gravity).
+/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without external forces it is
+/// the derivative of [`gravity`](crate::gravity).
 ///
-/// q: nq numbers; f_ext: one force per body in its frame (the force moves with the body), or empty for none. Returns
-/// the full nv × nv matrix (N m/rad, N/m), with entry (i, j) = ∂τᵢ/∂q_j. Allocates nothing. Source: as for
-/// [`rnea_derivatives`], at rest.
+/// q: nq numbers; f_ext: one force per body, in the body's frame (the force moves with the body), or empty for no
+/// forces. Returns the full nv × nv matrix (N m/rad, N/m); entry (i, j) is ∂τᵢ/∂q_j. Allocates nothing. Source: the
+/// equations of [`rnea_derivatives`] for a robot at rest.
 ///
 /// ```
 /// use condyle_dynamics::{Data, robots, static_torque_derivative};
@@ -51,9 +51,9 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
 
 /// Computes the exact derivatives of kinetic and potential energy with respect to q and v, in O(n).
 ///
-/// q: nq numbers; v: nv. Returns three vectors of nv numbers (J/rad, J s/rad, J/rad; per m for sliding joints).
-/// Allocates nothing. Source: T = ½ Σ ⟨v, I v⟩ + ½ Σ armature q̇² and V = −Σ m gᵀ c, with ∂v/∂q of
-/// `frame_derivatives.rs`.
+/// q: nq numbers; v: nv numbers. Returns ∂T/∂q, ∂T/∂v and ∂V/∂q, nv numbers each (J/rad, J s/rad, J/rad; for sliding
+/// joints m instead of rad). Allocates nothing. Source: T = ½ Σ ⟨v, I v⟩ + ½ Σ armature q̇² and V = −Σ m gᵀ c, with
+/// ∂v/∂q from `frame_derivatives.rs`.
 ///
 /// ```
 /// use condyle_dynamics::{Data, energy_derivatives, gravity, robots};
@@ -83,7 +83,7 @@ pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
 /// the derivatives with respect to other inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaDerivatives<'d, S, R = f64> {
-    /// ∂τ/∂q in the tangent space: change of τ per δ when q moves to q ⊕ δ.
+    /// ∂τ/∂q in the tangent space: the change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v.
     pub dtau_dv: &'d Matrix<S>,
@@ -94,9 +94,9 @@ pub struct RneaDerivatives<'d, S, R = f64> {
 
 /// Computes the exact derivatives of [`rnea`](crate::rnea) with respect to q, v and a, in O(n · depth).
 ///
-/// q: nq numbers; v, a: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for none.
-/// Returns three nv × nv matrices; row i is ∂τᵢ/∂·. Allocates nothing. Source: Singh, Russell, Wensing (2022),
-/// algorithm 1.
+/// q: nq numbers; v, a: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with the
+/// body), or empty for no forces. Returns three nv × nv matrices; row i of each contains the derivatives of τᵢ.
+/// Allocates nothing. Source: Singh, Russell, Wensing (2022), algorithm 1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, rnea_derivatives, robots};
@@ -126,8 +126,7 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     view(model, data)
 }
 
-/// Computes the derivatives body by body and keeps the terms needed for second derivatives. The arguments must be
-/// valid.
+/// Computes the derivatives body by body and keeps the terms that second derivatives need. The arguments must be valid.
 pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -139,7 +138,8 @@ pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
 
-/// Returns a view of the results of `rnea_derivatives`, computed body by body or in the limbs' lanes.
+/// Returns a view of the derivatives of inverse dynamics that the last call computed, body by body or with limbs in
+/// parallel lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
     let state = state(model, data, &d.qdd);
@@ -165,8 +165,8 @@ pub struct CoriolisDerivatives<'d, S> {
 
 /// Computes the exact derivatives of the Coriolis and centrifugal efforts C(q, v) v = h(q, v) − g(q), in O(n · depth).
 ///
-/// q: nq numbers; v: nv. Returns two nv × nv matrices (N m/rad, N m s/rad). Allocates nothing. Source: the derivatives
-/// of [`rnea`](crate::rnea) at a = 0 without gravity.
+/// q: nq numbers; v: nv numbers. Returns two nv × nv matrices (N m/rad, N m s/rad). Allocates nothing. Source: the
+/// equations of [`rnea_derivatives`] for a = 0 and no gravity.
 ///
 /// ```
 /// use condyle_dynamics::{Data, coriolis_derivatives, coriolis_matrix, robots};
@@ -194,13 +194,13 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     CoriolisDerivatives { dq: &d.dtau_dq, dv: &d.dtau_dv }
 }
 
-/// q̈ = aba(q, v, τ) and its derivatives: three full nv × nv matrices. [`with_respect_to`](Self::with_respect_to)
-/// computes the derivatives with respect to other inputs.
+/// Accelerations q̈ = aba(q, v, τ), and the derivatives of q̈: three full nv × nv matrices.
+/// [`with_respect_to`](Self::with_respect_to) computes the derivatives with respect to other inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct AbaDerivatives<'d, S, R = f64> {
-    /// q̈, nv numbers.
+    /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// ∂q̈/∂q in the tangent space: change of q̈ per δ when q moves to q ⊕ δ.
+    /// ∂q̈/∂q in the tangent space: the change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v.
     pub da_dv: &'d Matrix<S>,
@@ -209,11 +209,11 @@ pub struct AbaDerivatives<'d, S, R = f64> {
     pub(crate) state: State<'d, S, R>,
 }
 
-/// Computes [`aba`](crate::aba) and its exact derivatives with respect to q, v and τ.
+/// Computes q̈ as [`aba`](crate::aba) does, and the exact derivatives of q̈ with respect to q, v and τ.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for
-/// none. Returns q̈ and three nv × nv matrices. Costs O(n · depth) for the derivatives of τ and O(n³) for the products
-/// with M⁻¹. Allocates nothing. Source: Carpentier and Mansard (2018), equation 18.
+/// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with the
+/// body), or empty for no forces. Returns q̈ and three nv × nv matrices. Costs O(n · depth) for the derivatives of τ
+/// and O(n³) for the products with M⁻¹. Allocates nothing. Source: Carpentier and Mansard (2018), equation 18.
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba_derivatives, minv, robots};
@@ -248,8 +248,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     view_of_aba(model, data)
 }
 
-/// Computes the derivatives body by body and keeps the terms needed for second derivatives. The arguments must be
-/// valid.
+/// Computes the derivatives body by body and keeps the terms that second derivatives need. The arguments must be valid.
 pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -273,7 +272,7 @@ pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes ∂q̈ = −M⁻¹ ∂τ, after `rnea_derivatives` and `minv`.
+/// Computes ∂q̈ = −M⁻¹ ∂τ with respect to q and v. Runs after `rnea_derivatives` and `minv`.
 fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let float_freely = out.float_freely(model);
@@ -286,12 +285,12 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     }
 }
 
-/// Computes the exact derivatives of the centroidal momentum, its rate, and the position, velocity and acceleration of
-/// the centre of mass, in O(n).
+/// Computes the exact derivatives of the centroidal momentum, of the rate of this momentum, and of the position,
+/// velocity and acceleration of the centre of mass, in O(n).
 ///
-/// q: nq numbers; v, a: nv. Returns derivatives with respect to q, v and a. Accelerations exclude gravity. Bodies fixed
-/// to the world are ignored; results are NaN if no moving body has mass. Allocates nothing. Source: Carpentier and
-/// Mansard (2018).
+/// q: nq numbers; v, a: nv numbers each. Returns derivatives with respect to q, v and a. Accelerations exclude gravity.
+/// Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates nothing. Source:
+/// Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{Data, centroidal_derivatives, centroidal_map, neutral, robots};

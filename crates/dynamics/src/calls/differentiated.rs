@@ -1,4 +1,5 @@
-//! State at which inverse dynamics was differentiated, with all quantities of the bodies that its passes computed.
+//! State at which inverse dynamics was differentiated, with all quantities of the bodies that were computed for the
+//! derivatives.
 
 use crate::derivatives::rnea_derivatives::Workspace;
 use crate::lanes::limbs::LaneView;
@@ -8,7 +9,7 @@ use condyle_model::Model;
 use condyle_spatial::gate::{FusedF64, Rename};
 use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
 
-/// State at which inverse dynamics was differentiated.
+/// State at which inverse dynamics was differentiated, and the quantities of the bodies in this state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
@@ -16,7 +17,7 @@ pub(crate) struct State<'d, S, R> {
     pub pass: &'d Workspace<S>,
     /// Acceleration coordinates.
     pub qdd: &'d [S],
-    /// Lanes that hold the bodies' quantities; `None` if the bodies were computed one by one.
+    /// Lanes that contain the quantities of the bodies. `None` if the bodies were computed one by one.
     pub limbs: Option<LaneView<'d>>,
 }
 
@@ -29,7 +30,7 @@ impl<'d> Rename<State<'d, FusedF64, f64>> for State<'d, f64, f64> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Returns oXb, the pose of body b in the frame that the URDF gives it.
+    /// Returns oXb, the pose of body b in the world. The body's frame is the frame that the URDF gives it.
     #[inline(always)]
     pub(crate) fn pose(&self, b: usize) -> Se3<S> {
         if let Some(limbs) = self.limbs {
@@ -38,7 +39,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         Placements { model: self.model, world: self.world }.body(b)
     }
 
-    /// Returns column k of joint i's S.
+    /// Returns column k of the matrix S of joint i.
     #[inline(always)]
     pub(crate) fn column(&self, i: usize, k: usize) -> Motion<S> {
         if let Some(limbs) = self.limbs {
@@ -47,8 +48,8 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         self.world.S[self.model.nodes()[i].column + k]
     }
 
-    /// Returns the velocity and the acceleration of a body. The acceleration includes gravity, as the world's
-    /// acceleration.
+    /// Returns the velocity and the acceleration of a body. The world's acceleration is −g, so the acceleration
+    /// includes gravity.
     #[inline(always)]
     pub(crate) fn moving(&self, b: usize) -> (Motion<S>, Motion<S>) {
         if let Some(limbs) = self.limbs {
@@ -57,7 +58,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         (self.pass.bodies.v[b], self.pass.bodies.a[b])
     }
 
-    /// Returns Iᶜ of joint i.
+    /// Returns the inertia Iᶜ of all bodies that joint i carries.
     #[inline(always)]
     pub(crate) fn carried(&self, i: usize) -> Inertia<S> {
         if let Some(limbs) = self.limbs {
@@ -66,7 +67,8 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         self.pass.bodies.IC[i]
     }
 
-    /// Returns the pairs (body, column within its joint) on the path from body b to the root.
+    /// Returns all joint columns on the path from body b to the root, as pairs (body, index of the column in the body's
+    /// joint).
     pub(crate) fn columns(&self, b: usize) -> impl Iterator<Item = (usize, usize)> {
         let nodes = &self.model.nodes();
         let way = core::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);

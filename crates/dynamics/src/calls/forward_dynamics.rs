@@ -15,8 +15,8 @@ use condyle_spatial::{Constant, Force, Scalar};
 
 /// Computes forward dynamics, q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), in O(n).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its
-/// frame, index 0 is the world; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
+/// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body (N, N m), at the body's origin and in the body's
+/// frame, or empty for no forces; index 0 is the world. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
 /// Featherstone (2008), table 7.1. If joints share a coordinate (mimic), the call uses a sparse factor of M, as
 /// [`forward_dynamics`] does with [`ForwardDynamicsMethod::Sparse`].
 ///
@@ -30,9 +30,9 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// assert!(back.iter().all(|&tau| f64::abs(tau - 1.0) < 1e-10));
 /// ```
 ///
-/// M may be singular at single positions only, for example when a point mass lies on the axis about which it turns.
-/// This is not checked: the accelerations are then not finite or dominated by rounding. The same holds for all
-/// functions that need M⁻¹.
+/// M may be singular at some positions only, for example if a point mass lies on the axis about which it turns. Such
+/// positions are not detected: the accelerations are then not finite, or mostly rounding errors. The same is true of
+/// all functions that need M⁻¹.
 ///
 /// # Panics
 /// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular at every position
@@ -55,7 +55,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     &data.aba.qdd
 }
 
-/// Computes q̈ body by body and keeps the quantities that depend on q. The arguments must be valid.
+/// Computes q̈ body by body, and keeps the placements and the factors in `data`. The arguments must be valid.
 pub(crate) fn run_serially<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -76,8 +76,8 @@ pub(crate) fn run_serially<S: Scalar, R: Constant<S>>(
 }
 
 impl ForwardDynamicsMethod {
-    /// Returns the fastest method for a model. It is [`ArticulatedBody`](Self::ArticulatedBody), or
-    /// [`Sparse`](Self::Sparse) if joints share a coordinate (mimic), which the recursion over bodies does not support.
+    /// Returns the fastest method for a model: [`ArticulatedBody`](Self::ArticulatedBody), or [`Sparse`](Self::Sparse)
+    /// if joints share a coordinate (mimic). The recursion over bodies does not support shared coordinates.
     ///
     /// ```
     /// use condyle_dynamics::{ForwardDynamicsMethod, robots};
@@ -88,11 +88,11 @@ impl ForwardDynamicsMethod {
     }
 }
 
-/// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a given method, or by the
-/// [`fastest`](ForwardDynamicsMethod::fastest) one for `None`.
+/// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a given method. `None` selects the
+/// [`fastest`](ForwardDynamicsMethod::fastest) method.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its
-/// frame, index 0 is the world; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
+/// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body (N, N m), at the body's origin and in the body's
+/// frame, or empty for no forces; index 0 is the world. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
 /// Featherstone, *Rigid Body Dynamics Algorithms* (2008), chapters 6 and 7. If joints share a coordinate,
 /// [`ForwardDynamicsMethod::ArticulatedBody`] factorises M too, as [`aba`](crate::aba()) does.
 ///
@@ -131,7 +131,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes forward dynamics with a factor of M.
+/// Computes forward dynamics with the dense or sparse factor of M.
 pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -140,7 +140,7 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
 ) {
     let zero = core::mem::take(&mut data.forward_dynamics.zero);
     if method == ForwardDynamicsMethod::Dense && is_short_chain(model) {
-        // h and M of one set of sines and cosines: a chain has no limbs
+        // A chain has no limbs, so h and M can share the sines and cosines that `rnea` computes.
         rnea::run(model, &mut data.world, &mut data.rnea, q, v, &zero, f_ext);
         positions_after_rnea(model, &mut data.world, q);
         crba::run(model, &data.world, &mut data.crba);

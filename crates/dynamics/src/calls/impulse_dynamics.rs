@@ -1,4 +1,4 @@
-//! Impacts: jumps of the velocity when constraints become active, and their derivatives.
+//! Impacts: jumps of the velocity when constraints become active, and the derivatives of the jumps.
 
 use crate::constraints::constrained_derivatives::{By, invert, respond};
 use crate::constraints::constrained_dynamics::{factorize, inertia, solve};
@@ -15,24 +15,25 @@ use condyle_spatial::{Constant, Matrix, Scalar, Vec3};
 /// Result of [`impulse_dynamics`].
 #[derive(Clone, Copy, Debug)]
 pub struct Impulse<'d, S> {
-    /// v⁺, the velocity after the impact, nv numbers (rad/s, m/s).
+    /// Velocity v⁺ after the impact, nv numbers (rad/s, m/s).
     pub v: &'d [S],
-    /// Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s); one number
-    /// per row.
+    /// Impulses Λ of the constraints, one number per row of J (N s, N m s). Each impulse acts on the body of the
+    /// constraint's frame and is along the axes of the constraint's rows.
     pub lambda: &'d [S],
-    /// Largest absolute value in J (v⁺ + ε v) (m/s, rad/s).
+    /// Largest absolute value in J (v⁺ + ε v), with the restitution ε (m/s, rad/s).
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
 }
 
-/// Computes the velocity after an impact: v⁺ = v + M⁻¹ Jᵀ Λ, with the impulses Λ that make J v⁺ = −ε J v.
+/// Computes the velocity after an impact: v⁺ = v + M⁻¹ Jᵀ Λ, with the impulses Λ that make J v⁺ = −ε J v for a
+/// restitution ε.
 ///
-/// q: nq numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy. Only the
-/// constraints' frames and reference frames matter. Gains and targets are ignored, except that targets locate the point
-/// on the other frame. Like [`constrained_dynamics`](crate::constrained_dynamics()), it uses the sparsity of the tree
-/// and the same [`ProximalSettings`](crate::ProximalSettings). Allocates nothing. Source: Featherstone, *Rigid Body
-/// Dynamics Algorithms* (2008), section 11.7.
+/// q: nq numbers; v: nv numbers; restitution: ε, from 0 (the frames stick) to 1 (the impact loses no energy). Gains and
+/// desired motions of the constraints are ignored. The placement of a target is used only to locate the point on the
+/// other frame. Like [`constrained_dynamics`](crate::constrained_dynamics()), this function uses the sparsity of the
+/// tree and the [`ProximalSettings`](crate::ProximalSettings) of the set. Allocates nothing. Source: Featherstone,
+/// *Rigid Body Dynamics Algorithms* (2008), section 11.7.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};
@@ -80,7 +81,7 @@ where
     check("v", v.len(), model.nv());
 }
 
-/// Runs the whole algorithm. The arguments must be valid.
+/// Computes the velocity after the impact and the impulses. The arguments must be valid.
 fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -101,15 +102,15 @@ fn run<S: Scalar, R: Constant<S>>(
 /// Result of [`impulse_dynamics_derivatives`].
 #[derive(Clone, Copy, Debug)]
 pub struct ImpulseDerivatives<'d, S> {
-    /// v⁺, nv numbers.
+    /// Velocity v⁺ after the impact, nv numbers.
     pub v: &'d [S],
-    /// Λ, one number per row.
+    /// Impulses Λ of the constraints, one number per row of J.
     pub lambda: &'d [S],
-    /// Largest absolute value in J (v⁺ + ε v) (m/s, rad/s).
+    /// Largest absolute value in J (v⁺ + ε v), with the restitution ε (m/s, rad/s).
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂v⁺/∂q in the tangent space, nv × nv: change of v⁺ per δ when q moves to q ⊕ δ.
+    /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ per δ when q moves to q ⊕ δ.
     pub dv_dq: &'d Matrix<S>,
     /// ∂v⁺/∂v, nv × nv.
     pub dv_dv: &'d Matrix<S>,
@@ -121,10 +122,11 @@ pub struct ImpulseDerivatives<'d, S> {
     pub inertia: &'d Matrix<S>,
 }
 
-/// Computes [`impulse_dynamics`] and its exact derivatives with respect to q and the velocity before the impact.
+/// Computes the results v⁺ and Λ of [`impulse_dynamics`] and their exact derivatives with respect to q and to the
+/// velocity v before the impact.
 ///
-/// q: nq numbers; v: nv; restitution: ε. Cost and treatment of redundant constraints are as for
-/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()). Allocates nothing.
+/// q: nq numbers; v: nv numbers; restitution: ε. The cost and the treatment of redundant constraints are the same as
+/// for [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()). Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};

@@ -9,7 +9,8 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Matrix, Scalar};
 
-/// Computes the joint-space inertia matrix M(q), in O(n · depth): τ = M a + h, kinetic energy ½ vᵀ M v.
+/// Computes the joint-space inertia matrix M(q), in O(n · depth). With M, the efforts are τ = M a + h, and the kinetic
+/// energy is ½ vᵀ M v.
 ///
 /// q: nq numbers. Returns the full symmetric nv × nv matrix, including armature. Allocates nothing. Source:
 /// Featherstone (2008), table 6.2.
@@ -36,11 +37,12 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     &data.crba.M
 }
 
-/// Computes M(q)⁻¹, the accelerations for unit efforts, in O(n²).
+/// Computes M(q)⁻¹ in O(n²). Column k of M⁻¹ contains the accelerations for a unit effort at coordinate k.
 ///
-/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Trees with
-/// short branches, and joints that share a coordinate (mimic), use the factor of Featherstone (2005)
-/// ([`Ltdl`](crate::Ltdl)). Chains of at most eight coordinates invert M by Gauss–Jordan elimination.
+/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Other
+/// methods are used for some models: the factor of Featherstone (2005), [`Ltdl`](crate::Ltdl), for trees with short
+/// branches and for joints that share a coordinate (mimic), and Gauss–Jordan elimination for chains of at most eight
+/// coordinates.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, minv, robots};

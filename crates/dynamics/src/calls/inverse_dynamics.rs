@@ -9,7 +9,8 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// Runs RNEA with the limbs in parallel lanes if the robot has limbs, otherwise body by body.
+/// Runs the recursive Newton–Euler algorithm: with limbs in parallel lanes if the robot has limbs, otherwise body by
+/// body.
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     if !limbs::rnea(model, data, arguments) {
         let Arguments { q, v, x: a, f_ext } = arguments;
@@ -17,11 +18,11 @@ fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, argument
     }
 }
 
-/// Computes inverse dynamics, in O(n): τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i, the joint efforts for the acceleration a.
+/// Computes inverse dynamics in O(n): the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i for the acceleration a.
 ///
-/// q: nq numbers; v, a: nv; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its frame,
-/// index 0 is the world; or empty for none. Returns nv numbers (N m, N). Allocates nothing. Source: Luh, Walker, Paul
-/// (1980).
+/// q: nq numbers; v, a: nv numbers each; f_ext: one force per body (N, N m), at the body's origin and in the body's
+/// frame, or empty for no forces; index 0 is the world. Returns nv numbers (N m, N). Allocates nothing. Source: Luh,
+/// Walker, Paul (1980).
 ///
 /// ```
 /// use condyle_dynamics::{Data, robots, rnea};
@@ -48,7 +49,8 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     &data.rnea.tau
 }
 
-/// Panics if an argument is invalid. `name` is the name of the third argument, `x`.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree. `name` is the name of
+/// the argument `x` in the panic's message.
 #[inline]
 #[track_caller]
 pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str, arguments: Arguments<'_, S>) {
@@ -60,10 +62,10 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str
     check_forces(f_ext.len(), model.nodes().len());
 }
 
-/// Computes the bias efforts h(q, v) = C(q, v) v + g(q), which keep the velocity constant, in O(n). This is [`rnea`]
-/// with a = 0.
+/// Computes the bias efforts h(q, v) = C(q, v) v + g(q), in O(n). These efforts keep the velocity constant. The result
+/// equals [`rnea`] with a = 0.
 ///
-/// q: nq numbers; v: nv. Returns nv numbers (N m, N). Allocates nothing.
+/// q: nq numbers; v: nv numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
@@ -83,7 +85,8 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     &data.rnea.tau
 }
 
-/// Computes the gravity efforts g(q), which hold the robot still, in O(n). This is [`rnea`] with v = a = 0.
+/// Computes the gravity efforts g(q), in O(n). These efforts hold the robot still. The result equals [`rnea`] with v =
+/// a = 0.
 ///
 /// q: nq numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
@@ -108,11 +111,11 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
     &data.rnea.tau
 }
 
-/// Computes the efforts that hold the robot still under external forces, in O(n): τ = g(q) − Σ Jᵢᵀ f_ext,i. This is
-/// [`rnea`](crate::rnea) with v = a = 0, at a lower cost.
+/// Computes the efforts that hold the robot still under external forces, in O(n): τ = g(q) − Σ Jᵢᵀ f_ext,i. The result
+/// equals [`rnea`](crate::rnea) with v = a = 0, at a lower cost.
 ///
-/// q: nq numbers; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its frame, index 0
-/// is the world; or empty for none. Returns nv numbers (N m, N). Allocates nothing. Source: Featherstone, *Rigid Body
+/// q: nq numbers; f_ext: one force per body (N, N m), at the body's origin and in the body's frame, or empty for no
+/// forces; index 0 is the world. Returns nv numbers (N m, N). Allocates nothing. Source: Featherstone, *Rigid Body
 /// Dynamics Algorithms* (2008), section 5.3.
 ///
 /// ```
@@ -141,11 +144,11 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     &data.statics.tau
 }
 
-/// Computes the Coriolis matrix C(q, v) from Christoffel symbols, in O(n · depth): C v = h − g and Ṁ = C + Cᵀ, so that
-/// Ṁ − 2C is skew.
+/// Computes the Coriolis matrix C(q, v) of the Christoffel symbols, in O(n · depth). It satisfies C v = h − g and C +
+/// Cᵀ = Ṁ, so Ṁ − 2C is skew.
 ///
-/// q: nq numbers; v: nv. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing.
-/// Source: Echeandia and Wensing (2021), algorithm 1.
+/// q: nq numbers; v: nv numbers. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing. Source:
+/// Echeandia and Wensing (2021), algorithm 1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, coriolis_matrix, gravity, nonlinear_effects, robots};

@@ -1,4 +1,4 @@
-//! Kinematics: placements and motions of the bodies.
+//! Kinematics: placements, velocities and accelerations of the bodies, and Jacobians of single frames.
 
 use super::limbs::spread;
 use crate::data::Data;
@@ -10,10 +10,10 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Scalar, Se3, Vec3};
 
 impl<S: Scalar> Data<S> {
-    /// Returns the placements at the position of the last call on this data, without computing them again. Returns
-    /// `None` if that call computed no placements, as for [`rnea`](crate::rnea()).
+    /// Returns the placements that the last call with this data computed, without computing them again. Returns `None`
+    /// if the last call computed no placements, as for [`rnea`](crate::rnea()).
     ///
-    /// The model must have the same joints and frames as the model of that call. Inertias and gravity may differ.
+    /// The model must have the same joints and frames as the model of the last call. Inertias and gravity may differ.
     ///
     /// ```
     /// use condyle_dynamics::{Data, aba, forward_kinematics, robots};
@@ -44,7 +44,7 @@ impl<S: Scalar> Data<S> {
     }
 }
 
-/// Panics: the placements belong to another robot.
+/// Panics because the placements in the data belong to another robot.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -85,8 +85,8 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// Computes the Jacobian J of one frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
 ///
 /// q: nq numbers. The function needs no `Data` and visits only the joints between the frame and the world, in O(depth +
-/// nv). For several quantities at one position, use [`Placements::frame_jacobian`], which gives the same numbers up to
-/// rounding. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example 4.1.
+/// nv). If several quantities are needed at one position, use [`Placements::frame_jacobian`]. It gives the same numbers
+/// up to rounding. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example 4.1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, forward_kinematics, frame_jacobian, robots};
@@ -100,7 +100,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, there is no such frame, or `J` is not 6 × nv.
+/// If `q` does not have nq numbers, the frame does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -112,8 +112,8 @@ pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     frame_jacobian_strided(model, q, frame, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
-/// Computes [`frame_jacobian`] with strides: `strides[0]` is the distance from one row to the next, `strides[1]` from
-/// one column to the next. It serves languages that store matrices by rows.
+/// Computes the Jacobian of [`frame_jacobian`] with any strides. `strides[0]` is the distance between rows, and
+/// `strides[1]` is the distance between columns. Used by languages that store matrices by rows.
 #[doc(hidden)]
 #[track_caller]
 pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
@@ -129,7 +129,8 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
     jacobian_on(model, q, frame.body, frame.placement, reference, J, strides);
 }
 
-/// Computes the Jacobian J of one body, 6 × nv: [`frame_jacobian`] of the frame that the URDF gives the body.
+/// Computes the Jacobian J of one body, 6 × nv, like [`frame_jacobian`] for a frame. The body's frame is the frame that
+/// the URDF gives it.
 ///
 /// ```
 /// use condyle_dynamics::{ReferenceFrame, body_jacobian, robots};
@@ -140,7 +141,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, there is no such body, or `J` is not 6 × nv.
+/// If `q` does not have nq numbers, the body does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -152,7 +153,7 @@ pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     body_jacobian_strided(model, q, body, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
-/// Computes [`body_jacobian`] with strides, as in [`frame_jacobian_strided`].
+/// Computes the Jacobian of [`body_jacobian`] with any strides, as in [`frame_jacobian_strided`].
 #[doc(hidden)]
 #[track_caller]
 pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
@@ -185,7 +186,7 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
 
 /// Computes the placements and velocities of all bodies, v_i = v_λ + S q̇, in O(n).
 ///
-/// q: nq numbers; v: nv. Allocates nothing. Source: Featherstone (2008), table 5.1; in the world's frame.
+/// q: nq numbers; v: nv numbers. Allocates nothing. Source: Featherstone (2008), table 5.1, in the world's frame.
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, forward_velocities, robots};
@@ -214,8 +215,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
 
 /// Computes the placements, velocities and accelerations of all bodies, a_i = a_λ + S q̈ + Ṡ q̇, in O(n).
 ///
-/// q: nq numbers; v, a: nv. Accelerations exclude gravity. Allocates nothing. Source: Featherstone (2008), table 5.1;
-/// in the world's frame.
+/// q: nq numbers; v, a: nv numbers each. Accelerations exclude gravity. Allocates nothing. Source: Featherstone (2008),
+/// table 5.1, in the world's frame.
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, forward_accelerations, robots};

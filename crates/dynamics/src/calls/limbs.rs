@@ -1,7 +1,7 @@
-//! Calls that compute the limbs of a robot in parallel lanes.
+//! Algorithms that compute the limbs of a robot in parallel lanes.
 //!
-//! Limbs are branches of the tree, such as legs and arms. Steps of different limbs are computed at once, one limb per
-//! lane of a SIMD vector.
+//! Limbs are branches of the tree, such as legs and arms. A step computes bodies of different limbs at once, one limb
+//! per lane of a SIMD vector.
 #![allow(unsafe_code)]
 
 use crate::data::Data;
@@ -18,7 +18,7 @@ use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Scalar};
 
 register_kernel! {
-    /// Computes τ by steps.
+    /// Computes the efforts τ, step by step.
     fn rnea_by_steps<V>(
         model: &Model,
         plan: &Plan,
@@ -37,14 +37,14 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Loads the arguments into lanes.
+    /// Loads the arguments of a call into lanes.
     pub(super) fn load_steps<V>(plan: &Plan, s: &mut Scratch, arguments: Arguments<'_>) {
         load(plan, s, arguments);
     }
 }
 
 register_kernel! {
-    /// Computes the placements and columns of all steps.
+    /// Computes the placements and the joint columns S of all steps.
     pub(super) fn place_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
         let l = Limbs::new(plan, model);
         place(&l, &mut s.world, &s.q);
@@ -53,21 +53,22 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes M by steps whose placements are known.
+    /// Computes M step by step. The placements of all steps must be known.
     fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [FusedF64]) {
         crba::pass(&Limbs::new(plan, model), &s.world, &mut s.IC, M);
     }
 }
 
 register_kernel! {
-    /// Computes the factors of the articulated bodies, by steps whose placements are known.
+    /// Computes the factors U and 1/D of the articulated-body algorithm, step by step. The placements of all steps must
+    /// be known.
     fn factorize_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
         aba::factorize(&Limbs::new(plan, model), &s.world, &mut s.aba);
     }
 }
 
 register_kernel! {
-    /// Computes q̈ by steps whose placements are known.
+    /// Computes q̈ step by step. The placements of all steps must be known.
     fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [FusedF64]) {
         aba::pass(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, given(f_ext, &s.f_ext));
         scatter(plan, &s.aba.qdd, qdd);
@@ -75,7 +76,7 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes M⁻¹ from the factors of the articulated bodies.
+    /// Computes M⁻¹ from the factors U and 1/D of the articulated-body algorithm.
     fn inverse_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, Minv: &mut [FusedF64]) {
         let l = Limbs::new(plan, model);
         l.broadcast(&mut s.aba.D_inv);
@@ -84,8 +85,8 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes ∂τ/∂q, ∂τ/∂v and M by steps whose placements are known. The acceleration is the given one, or the
-    /// computed one if `after_aba`.
+    /// Computes ∂τ/∂q, ∂τ/∂v and M step by step. The placements of all steps must be known. If `after_aba` is set, q̈
+    /// is the result of the articulated-body algorithm; otherwise it is an argument of the call.
     fn rnea_derivatives_by_steps<V>(
         model: &Model,
         plan: &Plan,
@@ -105,13 +106,14 @@ register_kernel! {
     }
 }
 
-/// Returns the forces on all steps, or an empty slice for none.
+/// Returns the external forces on the bodies of all steps, or an empty slice if there are no forces.
 #[inline(always)]
 fn given<T>(some: bool, f_ext: &[T]) -> &[T] {
     if some { f_ext } else { &[] }
 }
 
-/// Returns the plan if the model and `data` have limbs in parallel lanes and the processor supports them.
+/// Returns the plan of the limbs, if the model and `data` have limbs in parallel lanes and the processor supports the
+/// vectors.
 #[inline]
 pub(crate) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
     let (Some(plan), Some(scratch)) = (&model.limbs(), &data.limbs) else { return None };
@@ -232,11 +234,11 @@ pub(crate) fn rnea_derivatives<S: Scalar, R: Constant<S>>(
     let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
     load_steps(c.plan, c.s, arguments);
     c.place();
-    let Arguments { v, x: a, f_ext, .. } = arguments;
+    let Arguments { v, x: an, f_ext, .. } = arguments;
     let matrices = c.rnea_derivatives.parts().1.map(FusedF64::of_mut);
     rnea_derivatives_by_steps(c.model, c.plan, c.s, false, v, !f_ext.is_empty(), matrices);
     FusedF64::of_mut(&mut c.rnea_derivatives.qd).copy_from_slice(v);
-    FusedF64::of_mut(&mut c.rnea_derivatives.qdd).copy_from_slice(a);
+    FusedF64::of_mut(&mut c.rnea_derivatives.qdd).copy_from_slice(an);
     true
 }
 
@@ -258,7 +260,8 @@ pub(crate) fn aba_derivatives<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// Loads the arguments of forward dynamics into lanes. The efforts exclude the bias of free joints with armature.
+/// Loads the arguments of forward dynamics into lanes, with efforts from which the bias of free joints with armature is
+/// subtracted.
 pub(super) fn load_free(
     model: &Model,
     plan: &Plan,
@@ -274,7 +277,7 @@ pub(super) fn load_free(
     load_steps(plan, s, Arguments { x: effort, ..arguments });
 }
 
-/// Copies the placements that a call left in lanes to the arrays of single bodies.
+/// Copies the placements and joint columns that the last call computed in lanes to the arrays of single bodies.
 pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let Some(plan) = ready(model, data) else { return };
     let Data { limbs: Some(scratch), world: World { oX, S: columns, placed, .. }, .. } = data else { return };

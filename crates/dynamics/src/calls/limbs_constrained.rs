@@ -1,4 +1,4 @@
-//! Dynamics under constraints with the limbs of a robot in parallel lanes.
+//! Forward dynamics under constraints, with the limbs of a robot in parallel lanes.
 #![allow(unsafe_code)]
 
 use super::limbs::{load_free, place_steps, ready};
@@ -17,7 +17,7 @@ use condyle_spatial::{Constant, Scalar};
 use condyle_spatial::{kernel, register_kernel};
 
 register_kernel! {
-    /// Computes the articulated bodies for steps whose placements are known.
+    /// Runs the inward pass of the articulated-body algorithm. The placements of all steps must be known.
     fn articulate<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool) {
         let f_ext = if f_ext { &s.f_ext[..] } else { &[] };
         aba::inward(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, f_ext);
@@ -25,7 +25,7 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes J and J M⁻¹ Jᵀ, and stores −(J q̈ + γ) for λ = 0 in λ.
+    /// Computes J and J M⁻¹ Jᵀ. Also computes −(J q̈ + γ) for λ = 0 and stores it in `set.lambda`.
     fn carry_forces<V>(
         model: &Model,
         plan: &Plan,
@@ -42,7 +42,7 @@ register_kernel! {
 }
 
 kernel! {
-    /// Computes λ from J M⁻¹ Jᵀ.
+    /// Factorises J M⁻¹ Jᵀ and computes the forces λ.
     fn decompose<S>(set: &mut ConstraintSet<S>) {
         set.delassus.redundant = S::zero();
         for island in &set.islands {
@@ -52,7 +52,7 @@ kernel! {
 }
 
 register_kernel! {
-    /// Computes q̈ and J q̈ + γ for λ.
+    /// Computes q̈ and J q̈ + γ for the forces λ.
     fn accelerate<V>(
         model: &Model,
         plan: &Plan,
@@ -80,8 +80,8 @@ register_kernel! {
     }
 }
 
-/// Computes constrained dynamics with the limbs in parallel lanes, if the model, `data` and `constraints` have them.
-/// Returns whether it did.
+/// Computes constrained dynamics with limbs in parallel lanes, if the model, `data` and `constraints` support this.
+/// Returns whether constrained dynamics was computed.
 #[inline]
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -90,7 +90,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     arguments: Arguments<'_, S>,
 ) -> bool {
     let Some(plan) = ready(model, data).filter(|_| constraints.limbs.is_some()) else { return false };
-    // SAFETY: S and R are f64.
+    // SAFETY: `ready` returns a plan only if S and R are f64.
     unsafe {
         let constraints = same::<_, &mut ConstraintSet<f64>>(constraints).renamed();
         enter(same(model), plan, same(data), constraints, arguments.fused());
@@ -98,7 +98,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// Runs the call. The arguments must be valid.
+/// Computes constrained dynamics in lanes and writes the results to `data` and `set`. The arguments must be valid.
 fn enter(
     model: &Model,
     plan: &Plan,

@@ -1,5 +1,5 @@
-//! Calls: the public functions. Each one checks its arguments, selects an algorithm ([`selection`](crate::selection)),
-//! and runs passes on [`Data`](crate::Data).
+//! Public functions of this crate. Each function checks its arguments, selects an algorithm
+//! ([`selection`](crate::selection)), and runs passes on [`Data`](crate::Data).
 
 pub(crate) mod centroidal;
 pub(crate) mod constrained_dynamics;

@@ -1,8 +1,8 @@
 //! Derivatives of inverse and forward dynamics with respect to inputs other than q, v, a and τ.
 //!
-//! Inverse dynamics is linear in external forces, inertial parameters, armature, damping, friction and gravity. So each
-//! derivative is a matrix B, assembled from quantities that the derivatives with respect to q and v have already
-//! computed:
+//! Inverse dynamics is linear in external forces, inertial parameters, armature, damping, friction and gravity. So the
+//! derivative of τ with respect to such an input is a matrix B. Its entries come from quantities that the computation
+//! of the derivatives with respect to q and v leaves in the data:
 //!
 //! ```text
 //! ∂τ/∂f_b = −J_bᵀ                        ∂τ_c/∂π_b = y(S_c, a_b) − y(v_b × S_c, v_b)     (regressor.rs)
@@ -11,7 +11,7 @@
 //! ∂τ/∂damping = Rᵀ diag(R v)             ∂τ/∂friction = Rᵀ diag(tanh(R v/ε))             (v of a free joint)
 //! ```
 //!
-//! For forward dynamics, M q̈ + h = τ gives ∂q̈/∂· = −M⁻¹ B.
+//! For forward dynamics, M q̈ + h = τ gives the derivative −M⁻¹ B of q̈.
 
 use super::derivatives::{AbaDerivatives, RneaDerivatives};
 use super::differentiated::State;
@@ -27,21 +27,23 @@ use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Mat3, Matrix, Scalar, V
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Input {
-    /// External force on a body, six numbers in the body's frame, linear first, as in `f_ext` (N, N m).
+    /// External force on the body with this index: six numbers in the body's frame, linear first, as in `f_ext` (N, N
+    /// m).
     Force(usize),
-    /// Ten [inertial parameters](crate::inertial_parameters::from_inertia) of a body, in its frame.
+    /// Ten [inertial parameters](crate::inertial_parameters::from_inertia) of the body with this index, in the body's
+    /// frame.
     Inertia(usize),
     /// Acceleration of free fall, three numbers in the world's frame (m/s²).
     Gravity,
     /// Armature of each coordinate, nv numbers (kg m², kg).
     Armature,
-    /// Viscous damping of each coordinate, nv numbers (N m s/rad, N s/m), if [`passive_torque`](crate::passive_torque)
-    /// is added to τ.
+    /// Viscous damping of each coordinate, nv numbers (N m s/rad, N s/m). The derivative assumes that
+    /// [`passive_torque`](crate::passive_torque) acts in addition to τ.
     Damping,
-    /// Coulomb friction of each coordinate, nv numbers (N m, N), if [`passive_torque`](crate::passive_torque) is added
-    /// to τ.
+    /// Coulomb friction of each coordinate, nv numbers (N m, N). The derivative assumes that
+    /// [`passive_torque`](crate::passive_torque) acts in addition to τ.
     Friction {
-        /// ε of `passive_torque` (rad/s, m/s).
+        /// Smoothing speed ε of `passive_torque` (rad/s, m/s).
         smoothing: f64,
     },
 }
@@ -49,7 +51,7 @@ pub enum Input {
 same_layout!(Input);
 
 impl Input {
-    /// Returns the length of the input, which is the number of columns of a derivative with respect to it.
+    /// Returns the number of values in the input. A derivative with respect to the input has this number of columns.
     ///
     /// ```
     /// use condyle_dynamics::{Input, robots};
@@ -66,7 +68,7 @@ impl Input {
     }
 }
 
-/// Destination of the entries of B: adds them to B, or multiplied with −M⁻¹ to −M⁻¹ B.
+/// Destination of the entries of B: the matrix `out`, which is B, or −M⁻¹ B if `Minv` is given.
 struct Entries<'e, S> {
     out: &'e mut [S],
     Minv: Option<&'e Matrix<S>>,
@@ -74,7 +76,7 @@ struct Entries<'e, S> {
 }
 
 impl<S: Scalar> Entries<'_, S> {
-    /// Adds a number to an entry of B.
+    /// Adds x to the entry (row, column) of B, or adds the corresponding column to −M⁻¹ B.
     #[inline(always)]
     fn add(&mut self, row: usize, column: usize, x: S) {
         let out = &mut self.out[column * self.nv..(column + 1) * self.nv];
@@ -91,7 +93,7 @@ impl<S: Scalar> Entries<'_, S> {
 }
 
 kernel! {
-    /// Computes B, or −M⁻¹ B.
+    /// Computes the derivative B of inverse dynamics, or the derivative −M⁻¹ B of forward dynamics if `Minv` is given.
     fn write<S, R>(state: State<'_, S, R>, input: Input, Minv: Option<&Matrix<S>>, out: &mut [S]) {
         out.fill(S::zero());
         let nv = state.model.nv();
@@ -100,7 +102,7 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Passes each nonzero entry of B to `to`. An entry may be passed in several parts.
+    /// Adds each nonzero entry of B to `to`. An entry may be added in several parts.
     #[inline(always)]
     fn entries(&self, input: Input, to: &mut Entries<'_, S>) {
         let (model, pass) = (self.model, self.pass);
@@ -157,8 +159,8 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Passes the entries of B for unit damping, or for unit friction if a smoothing is given. A free joint's losses
-    /// act along the axes of its parent; in the body's axes they are Rᵀ diag(x(R v)).
+    /// Adds the entries of B for damping, or for friction if a smoothing is given, to `to`. A free joint's losses x act
+    /// along the axes of its parent. Along the body's axes, B is Rᵀ diag(x(R v)) with the rotation R of the joint.
     #[inline(always)]
     fn losses(&self, smoothing: Option<f64>, to: &mut Entries<'_, S>) {
         let (model, qd) = (self.model, &self.pass.qd[..]);
@@ -168,7 +170,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         };
         for (i, node) in model.nodes().iter().enumerate().skip(1) {
             if node.mimic.is_some() {
-                continue; // its coordinate is its leader's
+                continue; // the coordinate belongs to the leader
             }
             let (first, nv) = (node.idx_v, node.joint.nv());
             let turned = if node.joint == Joint::FreeFlyer { 3 } else { 0 };
@@ -202,7 +204,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl Input {
-    /// Panics if the input does not exist or the derivative has another shape.
+    /// Panics if the input does not exist in the model, or the matrix `name` does not have the shape of the derivative.
     #[track_caller]
     pub(crate) fn check<R>(self, model: &Model<R>, name: &str, found: (usize, usize)) {
         let shape = (model.nv(), self.len(model));
@@ -221,7 +223,8 @@ impl Input {
 }
 
 impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
-    /// Computes ∂τ/∂(any other input), nv × [`Input::len`], in at most O(n) operations per column. Overwrites dtau.
+    /// Computes the derivative of τ with respect to another input, nv × [`Input::len`], in at most O(n) operations per
+    /// column. Overwrites dtau.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Input, rnea, rnea_derivatives, robots};
@@ -236,14 +239,15 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `dtau` does not have that shape, the input names a body that does not move, or its smoothing is not positive.
+    /// If `dtau` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the world, or
+    /// the input's smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, dtau: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "dtau", dtau.shape());
         self.write_input(input, dtau.as_mut_slice());
     }
 
-    /// Computes ∂τ/∂(any other input), stored by columns.
+    /// Computes the derivative of τ with respect to another input, stored by columns.
     pub(crate) fn write_input(&self, input: Input, dtau: &mut [S]) {
         let model = self.state.model;
         input.check(model, "dtau", (model.nv(), input.len(model)));
@@ -252,7 +256,8 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
-    /// Computes ∂q̈/∂(any other input), nv × [`Input::len`], in at most O(n²) operations per column. Overwrites da.
+    /// Computes the derivative of q̈ with respect to another input, nv × [`Input::len`], in at most O(n²) operations
+    /// per column. Overwrites da.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Input, aba_derivatives, neutral, robots};
@@ -266,14 +271,15 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `da` does not have that shape, the input names a body that does not move, or its smoothing is not positive.
+    /// If `da` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the world, or
+    /// the input's smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, da: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "da", da.shape());
         self.write_input(input, da.as_mut_slice());
     }
 
-    /// Computes ∂q̈/∂(any other input), stored by columns.
+    /// Computes the derivative of q̈ with respect to another input, stored by columns.
     pub(crate) fn write_input(&self, input: Input, da: &mut [S]) {
         let model = self.state.model;
         input.check(model, "da", (model.nv(), input.len(model)));

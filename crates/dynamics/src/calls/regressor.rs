@@ -6,12 +6,14 @@ use crate::passes::regressor;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Matrix, Scalar};
 
-/// Computes the regressor Y(q, v, a) of inverse dynamics, τ = Y π, in O(n · depth). It excludes armature.
+/// Computes the regressor Y(q, v, a) of inverse dynamics, τ = Y π, in O(n · depth). π are the inertial parameters of
+/// all bodies; armature is excluded.
 ///
-/// q: nq numbers; v, a: nv. Returns the nv × 10 (bodies − 1) matrix whose columns 10 (i − 1) … 10 i − 1 belong to body
-/// i, in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia).
-/// Armature is not an inertial parameter: with rotors, τ = Y π + armature a. Along the linear coordinates of a free
-/// joint, the rotors add armature (v̇ + ω × v). Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
+/// q: nq numbers; v, a: nv numbers each. Returns an nv × 10 (bodies − 1) matrix. Columns 10 (i − 1) to 10 i − 1 belong
+/// to body i, in the order and frame of
+/// [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Armature is not an inertial
+/// parameter: with armature, τ = Y π + armature a. Along the linear coordinates of a free joint, armature adds armature
+/// · (v̇ + ω × v). Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
 ///
 /// ```
 /// use condyle_dynamics::{Data, inertial_parameters, joint_torque_regressor, rnea, robots};
@@ -40,11 +42,13 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     &data.regressor.torque
 }
 
-/// Computes the regressor y(q, v) of the kinetic energy, T = y · π, in O(n). It excludes the rotors' ½ armature v².
+/// Computes the regressor y(q, v) of the kinetic energy, T = y · π, in O(n). π are the inertial parameters of all
+/// bodies. The energy ½ armature v² of the rotors is excluded.
 ///
-/// q: nq numbers; v: nv. Returns 10 (bodies − 1) numbers, ½ y(v_i, v_i) for each body i, in the order and frame of
-/// [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates nothing. Source: Gautier
-/// and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots* (1990).
+/// q: nq numbers; v: nv numbers. Returns 10 (bodies − 1) numbers: ½ y(v_i, v_i) for each body i with velocity v_i, in
+/// the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates
+/// nothing. Source: Gautier and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots*
+/// (1990).
 ///
 /// ```
 /// use condyle_dynamics::{Data, kinetic_energy_regressor, neutral, robots};
@@ -69,7 +73,8 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     &data.regressor.kinetic
 }
 
-/// Computes the regressor y(q) of the potential energy, V = y · π, in O(n). V is zero at the world's origin.
+/// Computes the regressor y(q) of the potential energy, V = y · π, in O(n). π are the inertial parameters of all
+/// bodies. V is zero for a mass at the world's origin.
 ///
 /// q: nq numbers. Returns 10 (bodies − 1) numbers, \[−g · p_i, −R_iᵀ g, 0\] for each body i with pose (R_i, p_i), in
 /// the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates

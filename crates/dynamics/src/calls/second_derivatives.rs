@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 /// Second derivatives of φ = λᵀ rnea(q, v, a), each a full nv × nv matrix. The derivatives ∂²φ/∂v∂a and ∂²φ/∂a∂a are
 /// zero.
 ///
-/// The matrices are blocks of the Hessian of φ(q ⊕ δ, v + …, a + …) at δ = 0.
+/// The matrices are blocks of the Hessian of φ(q ⊕ δ, v + δv, a + δa) at δ = 0, δv = 0 and δa = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaHessian<'d, S, R = f64> {
     /// ∂²φ/∂q∂q, symmetric.
@@ -26,16 +26,17 @@ pub struct RneaHessian<'d, S, R = f64> {
     pub dvdv: &'d Matrix<S>,
     /// ∂²φ/∂a∂q, the derivative of M λ with respect to q: entry (j, k) is ∂²φ/∂a_j∂q_k.
     pub dadq: &'d Matrix<S>,
-    /// First derivatives of τ, computed at the same time.
+    /// First derivatives of τ, which the same call computes.
     pub first: RneaDerivatives<'d, S, R>,
 }
 
-/// Computes the second derivatives of [`rnea`](crate::rnea), contracted with a vector λ, in O(n · depth): the exact
-/// Hessian of φ = λᵀ τ(q, v, a).
+/// Computes the second derivatives of [`rnea`](crate::rnea), contracted with a vector λ, in O(n · depth). The result is
+/// the exact Hessian of φ = λᵀ τ(q, v, a).
 ///
-/// q: nq numbers; v, a, lambda: nv; f_ext: one force per body in its frame (the force moves with the body), or empty
-/// for none. Returns four nv × nv matrices (units: λᵀ τ divided by the units of q, v and a), and the first derivatives
-/// of τ. Allocates nothing. Source: as for [`rnea_derivatives`](crate::rnea_derivatives()), differentiated once more.
+/// q: nq numbers; v, a, lambda: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with
+/// the body), or empty for no forces. Returns four nv × nv matrices (units: λᵀ τ divided by the units of q, v and a),
+/// and the first derivatives of τ. Allocates nothing. Source: the equations of
+/// [`rnea_derivatives`](crate::rnea_derivatives()), differentiated once more.
 ///
 /// ```
 /// use condyle_dynamics::{Data, rnea_hessian, robots};
@@ -85,7 +86,7 @@ pub struct RneaSecondDerivatives<S> {
     pub dvdv: Vec<DMatrix<S>>,
     /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
     pub dadq: Vec<DMatrix<S>>,
-    /// Unit vector, overwritten for each effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
+    /// Scratch for the unit vector of each effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
     lambda: Array<S>,
 }
 
@@ -100,9 +101,9 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
 
 /// Computes the second derivatives of [`rnea`](crate::rnea) as full tensors, in O(n² · depth).
 ///
-/// q: nq numbers; v, a: nv; f_ext: one force per body in its frame, or empty for none; out is overwritten. Allocates
-/// nothing. Solvers usually need the tensors contracted with a vector: see [`rnea_hessian`], which this function calls
-/// for each unit vector.
+/// q: nq numbers; v, a: nv numbers each; f_ext: one force per body, in the body's frame, or empty for no forces; out:
+/// the tensors, overwritten. Allocates nothing. Solvers usually need only the tensors contracted with a vector, which
+/// [`rnea_hessian`] computes. This function contracts with each unit vector.
 ///
 /// ```
 /// use condyle_dynamics::{Data, RneaSecondDerivatives, rnea_second_derivatives, robots};
@@ -135,8 +136,8 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     });
 }
 
-/// Computes [`rnea_hessian`] for each unit vector in turn, and calls `give` with its index and the matrices. lambda is
-/// scratch, overwritten.
+/// Computes the matrices of [`rnea_hessian`] for each unit vector, and calls `give` with the index of the unit vector
+/// and the matrices. `lambda` is scratch.
 #[track_caller]
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -159,7 +160,7 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
 
 /// Second derivatives of ψ = λᵀ aba(q, v, τ), each a full nv × nv matrix. All other second derivatives are zero.
 ///
-/// The matrices are blocks of the Hessian of ψ(q ⊕ δ, v + …, τ + …) at δ = 0.
+/// The matrices are blocks of the Hessian of ψ(q ⊕ δ, v + δv, τ + δτ) at δ = 0, δv = 0 and δτ = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct AbaHessian<'d, S, R = f64> {
     /// ∂²ψ/∂q∂q, symmetric.
@@ -170,17 +171,17 @@ pub struct AbaHessian<'d, S, R = f64> {
     pub dvdv: &'d Matrix<S>,
     /// ∂²ψ/∂τ∂q, the derivative of M⁻¹ λ with respect to q: entry (j, k) is ∂²ψ/∂τ_j∂q_k.
     pub dtaudq: &'d Matrix<S>,
-    /// q̈ and its first derivatives, computed at the same time.
+    /// q̈ and the first derivatives of q̈, which the same call computes.
     pub first: AbaDerivatives<'d, S, R>,
 }
 
-/// Computes the second derivatives of [`aba`](crate::aba), contracted with a vector λ: the exact Hessian of ψ = λᵀ
-/// q̈(q, v, τ).
+/// Computes the second derivatives of [`aba`](crate::aba), contracted with a vector λ. The result is the exact Hessian
+/// of ψ = λᵀ q̈(q, v, τ).
 ///
-/// q: nq numbers; v, tau, lambda: nv; f_ext: one force per body in its frame (the force moves with the body), or empty
-/// for none. Returns q̈, its first derivatives, and four nv × nv matrices (units: λᵀ q̈ divided by the units of q, v
-/// and τ). Costs O(n · depth) for the second derivatives of τ, and three sparse products of O(n²) columns. Allocates
-/// nothing. Source: Nganga and Wensing (2021).
+/// q: nq numbers; v, tau, lambda: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with
+/// the body), or empty for no forces. Returns q̈, the first derivatives of q̈, and four nv × nv matrices (units: λᵀ q̈
+/// divided by the units of q, v and τ). Costs O(n · depth) for the second derivatives of τ, and three sparse products
+/// of O(n²) columns. Allocates nothing. Source: Nganga and Wensing (2021).
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba_hessian, robots};

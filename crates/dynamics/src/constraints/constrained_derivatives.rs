@@ -1,7 +1,8 @@
 //! Analytical derivatives of forward dynamics under constraints.
 //!
-//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. Differentiating them gives linear equations with the
-//! same matrix K. With r = ∂(M q̈ + h − Jᵀ λ) and c = ∂(J q̈ + γ), at fixed q̈ and λ, and the blocks of K⁻¹:
+//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. These equations are linear in (q̈, −λ), with a
+//! matrix K. Their derivatives are linear equations with the same K. Let r = ∂(M q̈ + h − Jᵀ λ)/∂x and c = ∂(J q̈ +
+//! γ)/∂x at fixed q̈ and λ, for x = q or v. With the blocks of K⁻¹:
 //!
 //! ```text
 //! K⁻¹ = [ P    J̄  ]      Λ = (J M⁻¹ Jᵀ)⁻¹,   J̄ = M⁻¹ Jᵀ Λ,   P = M⁻¹ − J̄ J M⁻¹
@@ -9,7 +10,7 @@
 //! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
 //! ```
 //!
-//! [`constrained_equations`] defines r and c. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
+//! `kkt_derivatives.rs` computes r and c. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
 //! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
 //! programming for multi-phase rigid contact dynamics* (2018).
 
@@ -24,20 +25,21 @@ use core::ops::Range;
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// All forces on each body, in its frame. Written by: `load`.
+        /// Sum of all external and constraint forces on each body, in the frame of the body. Written by: `load`.
         pub forces: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// M⁻¹, then P. Written by: `finish`.
+        /// M⁻¹, then the block P of K⁻¹. Written by: `invert`.
         pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂(M q̈ + h − Jᵀ λ)/∂q. Written by: `differentiate`.
+        /// ∂(M q̈ + h − Jᵀ λ)/∂q. Written by: `turn`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Derivative of q̈ or of the velocity after an impact. Written by: `constrained_dynamics_derivatives`,
+        /// Derivatives of q̈, or of the velocity after an impact. Written by: `constrained_dynamics_derivatives`,
         /// `impulse_dynamics_derivatives`.
         pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// Computes C −= A B in some columns and some rows of C. Column j of B is zero outside the rows `rows[j]`.
+/// Computes C −= A B in the rows `of_C` and the columns `columns` of C. Column j of B is zero outside the rows
+/// `rows[j]`.
 #[inline(always)]
 fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
     A: &Matrix<S>,
@@ -54,7 +56,8 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Computes Λ, J̄ and P of K⁻¹ of an island. P holds M⁻¹ on entry, and J M⁻¹ Jᵀ must be factorised.
+    /// Computes the blocks Λ, J̄ and P of K⁻¹ for one island. `P` contains M⁻¹ on entry, and J M⁻¹ Jᵀ must be
+    /// factorised.
     #[inline(always)]
     fn invert_island(&mut self, k: usize, P: &mut Matrix<S>) {
         let Self { U, Jbar, dlambda_dtau, delassus, proximal, .. } = self;
@@ -98,7 +101,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes the blocks of K⁻¹.
+    /// Computes the blocks Λ, J̄ and P of K⁻¹.
     pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut Matrix<S>) {
         factor.inverse(P); // M⁻¹
         for k in 0..set.islands.len() {
@@ -107,7 +110,7 @@ kernel! {
     }
 }
 
-/// Variable with respect to which the equations are differentiated.
+/// Variable with respect to which the equations of motion and constraints are differentiated.
 #[derive(Clone, Copy)]
 pub(crate) enum By {
     Position,
@@ -117,8 +120,8 @@ pub(crate) enum By {
 same_layout!(By);
 
 kernel! {
-    /// Computes the derivatives of acceleration and forces, in the entries that may be nonzero. Inputs are the blocks
-    /// of K⁻¹, r, and the set's c.
+    /// Computes the derivatives −P r − J̄ c of q̈ and J̄ᵀ r − Λ c of λ, in the entries that may be nonzero. Inputs are
+    /// the blocks of K⁻¹, r, and the set's c.
     pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &Matrix<S>, r: &Matrix<S>, da: &mut Matrix<S>) {
         let ConstraintSet { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, .. } = set;
         let (c, dlambda) = match by {
@@ -129,7 +132,7 @@ kernel! {
         for island in islands {
             let columns = &island.coordinates;
             island.clear_beside(da.as_mut_slice(), n, S::zero());
-            // −P r − J̄ c
+            // This product and the next one compute da = −P r − J̄ c.
             minus_block_product(P.as_slice(), r.as_slice(), da.as_mut_slice(), nonzero_rows, columns.clone());
             if island.rows.is_empty() {
                 continue;

@@ -1,7 +1,7 @@
 //! Forward dynamics under constraints.
 //!
-//! Gauss's principle: among all accelerations with J q̈ + γ = 0, the robot's acceleration is the nearest to its free
-//! acceleration, in the metric of M. With the forces λ of the constraints,
+//! Gauss's principle: among all accelerations with J q̈ + γ = 0, the robot has the acceleration that is nearest, in the
+//! metric of M, to its acceleration without constraints. With the forces λ of the constraints,
 //!
 //! ```text
 //! [ M   Jᵀ ] [  q̈ ]   [ τ − h ]         J M⁻¹ Jᵀ λ = −(γ + J M⁻¹ (τ − h)),
@@ -25,29 +25,31 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch of constrained dynamics, in the world's frame.
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
         /// Velocity. Written by: `bias`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration for q̈ = 0, including gravity as the world's acceleration. Written by: `bias`.
+        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
+        /// `bias`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Iᶜ. Written by: `bias`, `inertia`.
+        /// Composite inertias Iᶜ. Written by: `bias`, `inertia`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Force through the joint for q̈ = 0. Written by: `bias`.
+        /// Force that each joint transmits for q̈ = 0. Written by: `bias`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// M. Written by: `bias`, `inertia`.
+        /// Inertia matrix M. Written by: `bias`, `inertia`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        /// Sparse factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub factor: Ltdl<S> = Ltdl::new(model),
-        /// τ − h. Written by: `bias`, `constrained_dynamics`.
+        /// Bias efforts h, then τ − h. Written by: `bias`, `constrained_dynamics`.
         pub effort: Array<S> = filled(S::zero, size.nv),
-        /// Acceleration, or change of velocity. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        /// Joint accelerations, or changes of the joint velocities in an impact. Written by: `constrained_dynamics`,
+        /// `impulse_dynamics`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Computes M, h and the bodies' motion for q̈ = 0, for bodies whose placements are known. It runs the Newton–Euler and
-/// the composite-rigid-body algorithm in one pass to the tips and one back.
+/// Computes M, h and the bodies' motion for q̈ = 0, for bodies whose placements are known. The Newton–Euler algorithm
+/// and the composite-rigid-body algorithm run together, in one pass to the tips and one pass back.
 #[inline(always)]
 fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let Workspace { v, a, IC, F, M, effort, .. } = d;
@@ -77,7 +79,7 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Computes y = J x + y.
+    /// Adds J x to y, where x has one number per coordinate and y one per row.
     #[inline(always)]
     pub(crate) fn add_motion(&self, x: &[S], y: &mut [S]) {
         for plan in &self.plans {
@@ -91,7 +93,7 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// Computes y = Jᵀ λ + y.
+    /// Adds the efforts Jᵀ λ of the constraints to y.
     #[inline(always)]
     pub(crate) fn add_effort(&self, y: &mut [S]) {
         for plan in &self.plans {
@@ -104,16 +106,16 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// Returns the largest |J q̈ + γ|.
+    /// Returns the largest absolute value in J q̈ + γ.
     pub(crate) fn residual(&self) -> S {
         let mut residual = S::zero();
         largest(&self.error, &mut residual);
         residual
     }
 
-    /// Returns the force of constraint k from the last call, at the origin of its frame, along the axes of its
-    /// reference. Only rigid constraints have a moment. The force acts on the body of the frame; the opposite force
-    /// acts on the other body or the world.
+    /// Returns the force of constraint k from the last call, at the origin of the constraint's frame, along the axes of
+    /// its `reference`. Only rigid constraints have a moment. The force acts on the body of the frame. The opposite
+    /// force acts on the other body or the world.
     ///
     /// # Panics
     /// If constraint k does not exist.
@@ -135,7 +137,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes M and τ − h, for bodies whose placements are known.
+    /// Computes the inertia matrix M and τ − h, for bodies whose placements are known.
     pub(crate) fn equations<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -153,7 +155,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes only M, for bodies whose placements are known.
+    /// Computes only the inertia matrix M, for bodies whose placements are known.
     pub(crate) fn inertia<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let l = Single::new(model);
         for i in l.bodies() {
@@ -171,8 +173,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes J and J q̈ + γ, for bodies whose velocities and accelerations are known. With the accelerations for q̈
-    /// = 0, it computes γ.
+    /// Computes J and J q̈ + γ from the velocities v and accelerations a of the bodies. If a are the accelerations for
+    /// q̈ = 0, J q̈ + γ is γ.
     pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
         for (i, plan) in set.plans.iter().enumerate() {
             let target = &set.targets[i];
@@ -187,7 +189,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes λ and the acceleration x for an effort, so that J x + γ = 0. M must be factorised.
+    /// Computes the forces λ and the acceleration x for given efforts, so that J x + γ = 0. M must be factorised.
     pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
         x.copy_from_slice(effort);
         factor.solve(x); // M⁻¹ (τ − h)
@@ -212,7 +214,7 @@ kernel! {
 }
 
 kernel! {
-    /// Raises `largest` to the largest absolute value of some numbers.
+    /// Raises `largest` to the largest absolute value in `of`, if that value is larger.
     pub(crate) fn largest<S>(of: &[S], largest: &mut S) {
         for &x in of {
             *largest = S::select(largest.lt(x.abs()), x.abs(), *largest);

@@ -1,4 +1,4 @@
-//! Definition of constraints: contacts of frames with the world, and pairs of frames that are held together.
+//! Definition of constraints: contacts between frames and the world, and loops that hold two frames together.
 
 use crate::passes::frames::ReferenceFrame;
 use alloc::borrow::ToOwned;
@@ -6,24 +6,25 @@ use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, same_layout};
 use core::any::Any;
 
-/// Kind of motion that a constraint holds.
+/// Kind of constraint: which motions of a frame it prevents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum ConstraintKind {
-    /// Origin of a frame: three rows, a force.
+    /// The origin of a frame is held: three rows; λ is a force.
     Point,
-    /// Origin of a frame along one axis, the third of [`axes`](ContactConstraint::axes): one row.
+    /// The origin of a frame is held along one axis, the third column of [`axes`](ContactConstraint::axes): one row.
     Line,
-    /// Origin of a frame along two axes, the first and the third of [`axes`](ContactConstraint::axes): two rows.
+    /// The origin of a frame is held along two axes, the first and the third column of
+    /// [`axes`](ContactConstraint::axes): two rows.
     Plane,
-    /// Frame: six rows, a force and a moment, linear first.
+    /// The whole frame is held: six rows, linear first; λ is a force and a moment.
     Rigid,
 }
 
 impl ConstraintKind {
-    /// Returns the number of rows: 1 (line), 2 (plane), 3 (point) or 6 (rigid).
+    /// Returns the number of rows of a constraint: 1 (line), 2 (plane), 3 (point) or 6 (rigid).
     pub fn rows(self) -> usize {
         match self {
             Self::Line => 1,
@@ -34,24 +35,26 @@ impl ConstraintKind {
     }
 }
 
-/// Target of a constraint: desired pose of its frame, and desired motion there.
+/// Target of a constraint: desired pose, velocity and acceleration of the constraint's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Target<S> {
-    /// Desired pose of the frame in the other frame (the world for a contact). All kinds except rigid use only its
-    /// translation.
+    /// Desired pose of the frame in the other frame (the world for a contact). All kinds except rigid use only the
+    /// translation of this pose.
     pub placement: Se3<S>,
-    /// Desired velocity relative to the other frame, in the reference frame (m/s, rad/s).
+    /// Desired velocity of the frame relative to the other frame, along the axes of the constraint's `reference` (m/s,
+    /// rad/s).
     pub velocity: Motion<S>,
-    /// Desired acceleration relative to the other frame, in the reference frame (m/s², rad/s²).
+    /// Desired acceleration of the frame relative to the other frame, along the axes of the constraint's `reference`
+    /// (m/s², rad/s²).
     pub acceleration: Motion<S>,
 }
 
 same_layout!(Target { placement, velocity, acceleration });
 
 impl<S: Scalar> Target<S> {
-    /// Returns the target with coinciding frames, at rest.
+    /// Returns the target at which both frames coincide and are at rest relative to each other.
     pub fn identity() -> Self {
         Self { placement: Se3::identity(), velocity: Motion::zero(), acceleration: Motion::zero() }
     }
@@ -81,8 +84,9 @@ impl<S: Scalar> Target<S> {
 
 /// Contact of a frame with the world, or a loop that two frames close.
 ///
-/// Let X = ₂X₁ be the frame's pose in the other frame moved to the target, and v and a its velocity and acceleration
-/// relative to the other body. The constraint requires
+/// Frame 1 is `frame`. Frame 2 is at the target's placement in the other frame. Let X = ₂X₁ be the pose of frame 1 in
+/// frame 2, p₁ and p₂ the origins of both, and v and a the velocity and acceleration of frame 1 relative to the other
+/// body. The target has the velocity v* and acceleration a*. The constraint requires
 ///
 /// ```text
 /// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), the axes of frame 1 applied to p₁ − p₂ (point)
@@ -90,20 +94,20 @@ impl<S: Scalar> Target<S> {
 ///
 /// This is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0. All quantities
 /// are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the world
-/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The same holds for the force λ that the constraint
-/// exerts on the body of `frame`. The force −λ acts on the other body, or the world.
+/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The force λ of the constraint is expressed in the same
+/// way. It acts on the body of `frame`, and the force −λ acts on the other body or the world.
 ///
-/// The acceleration of a point is the classical one, and the acceleration of a rigid frame is the spatial one. A rigid
-/// loop in `Local` uses the rate of v's six numbers. In `LocalWorldAligned` it uses the difference of the spatial
-/// accelerations, which is the same where v = 0. Signs, gains and axes agree with Pinocchio's `RigidConstraintModel`
-/// (whose second placement is the other frame's placement times the target). For contacts they agree with Crocoddyl's
-/// `ContactModel3D` and `ContactModel6D`.
+/// The acceleration of a point is its classical acceleration, and the acceleration of a rigid frame is its spatial
+/// acceleration. For a rigid loop in `Local`, a is the rate of the six numbers of v. For a rigid loop in
+/// `LocalWorldAligned`, a is the difference of the two spatial accelerations; both definitions agree if v = 0. Signs,
+/// gains and axes agree with Pinocchio's `RigidConstraintModel`, whose second placement is the other frame's placement
+/// times the target. For contacts they also agree with Crocoddyl's `ContactModel3D` and `ContactModel6D`.
 ///
-/// A contact along a line or in a plane has some rows of a point's contact, along columns e₁, e₂, e₃ of `axes`, which
-/// are expressed in the axes of `reference`: e₃ (line), or e₁ and e₃ (plane). The other directions are free.
-/// Crocoddyl's `ContactModel1D` with a `rotation` and a reference x* is the line with `axes` = rotationᵀ and the target
-/// rotation · (0, 0, x*). Its `ContactModel2D` is the plane in `Local` (with kp, `ContactModel2D` measures the error of
-/// position along the world's x and z).
+/// A line or plane contact holds a point only along some columns of `axes`: along e₃ (line), or along e₁ and e₃
+/// (plane). The columns e₁, e₂, e₃ are expressed in the axes of `reference`. The other directions are free. Crocoddyl's
+/// `ContactModel1D` with a `rotation` and a reference x* is the line with `axes` = rotationᵀ and the target rotation ·
+/// (0, 0, x*). Crocoddyl's `ContactModel2D` is the plane in `Local`. But if kp is not 0, `ContactModel2D` measures the
+/// error of position along the world's x and z.
 ///
 /// Source: Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems* (1972).
 ///
@@ -121,9 +125,9 @@ impl<S: Scalar> Target<S> {
 pub struct ContactConstraint {
     /// Index of the frame that is held.
     pub frame: usize,
-    /// Index of the frame to which it is held; `None` for the world.
+    /// Index of the other frame, to which `frame` is held; `None` for the world.
     pub other: Option<usize>,
-    /// Kind: a point, some directions of a point, or the whole frame.
+    /// Kind of the constraint: it holds a point, a point along one or two axes, or the whole frame.
     pub kind: ConstraintKind,
     /// Axes of a line or a plane, as columns expressed in the axes of `reference`; the identity for other kinds.
     #[cfg_attr(feature = "serde", serde(default = "Mat3::identity"))]
@@ -134,7 +138,7 @@ pub struct ContactConstraint {
     pub kp: f64,
     /// Gain of the velocity error (1/s).
     pub kd: f64,
-    /// Desired placement and motion; can be changed later
+    /// Desired placement, velocity and acceleration of the frame. The target can be changed later
     /// ([`ConstraintSet::set_target`](crate::ConstraintSet::set_target)).
     pub target: Target<f64>,
 }
@@ -148,12 +152,13 @@ impl ContactConstraint {
         Self { frame, other: None, kind: ConstraintKind::Point, axes, reference, kp: 0.0, kd: 0.0, target }
     }
 
-    /// Returns a contact of a frame's origin with the world along the frame's z only, without stabilisation.
+    /// Returns a contact that holds a frame's origin to the world along the frame's z axis only, without stabilisation.
     pub fn line(frame: usize) -> Self {
         Self { kind: ConstraintKind::Line, ..Self::point(frame) }
     }
 
-    /// Returns a contact of a frame's origin with the world along the frame's x and z, without stabilisation.
+    /// Returns a contact that holds a frame's origin to the world along the frame's x and z axes, without
+    /// stabilisation.
     pub fn plane(frame: usize) -> Self {
         Self { kind: ConstraintKind::Plane, ..Self::point(frame) }
     }
@@ -163,12 +168,12 @@ impl ContactConstraint {
         Self { kind: ConstraintKind::Rigid, ..Self::point(frame) }
     }
 
-    /// Returns the constraint of a model's file, in `Local`, without stabilisation. Returns `None` for a coupling of
+    /// Converts a constraint from a model's file, in `Local`, without stabilisation. Returns `None` for a coupling of
     /// joints, which does not hold a frame.
     ///
-    /// A model lists the loops of its file ([`Model::constraints`]) and leaves them open: the algorithms for trees
-    /// ignore them. [`constrained_dynamics`](crate::constrained_dynamics()) closes them. A position error, for example
-    /// of the initial state, decays with the gains kp and kd.
+    /// [`Model::constraints`] lists the loops of the model's file. The algorithms for trees ignore these loops, and
+    /// [`constrained_dynamics`](crate::constrained_dynamics()) closes them. A position error, for example in the
+    /// initial state, decays with the gains kp and kd.
     ///
     /// ```
     /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, ProximalSettings,

@@ -1,4 +1,5 @@
-//! Inputs and results of constrained dynamics for a robot with limbs (`constrained.rs`), for the constraints of a set.
+//! Scratch of constrained dynamics for a robot with limbs (`lanes/limbs/constrained.rs`): arrays for the constraints of
+//! one set.
 
 use crate::constraints::plan::Plan;
 use alloc::boxed::Box;
@@ -10,66 +11,70 @@ use condyle_spatial::gate::is;
 /// Maximum number of constraint rows in parallel lanes: one or two vectors.
 pub(crate) const WIDE: usize = 2 * LANES;
 
-/// Body on which the forces of a constraint act.
+/// Body on the path from a constraint's frame to the root.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub body: usize,
-    /// Columns of its joint: their number, and the slot of the first among the slots of the constraint.
+    /// Number of columns of the body's joint (`nv`), and index of the first column's slot among the slots of the
+    /// constraint (`at`).
     pub nv: usize,
     pub at: usize,
 }
 
-/// Rows of one constraint.
+/// Paths, slots and forces of the rows of one constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
-    /// Paths towards the root, without the root: from the first frame's body to the junction, from the other frame's
-    /// body to the junction, and from the junction on.
+    /// Three paths towards the root, which exclude the root: from the first frame's body to the junction of both paths,
+    /// from the other frame's body to this junction, and from the junction to the root.
     pub ways: [Vec<Link>; 3],
-    /// Number of values that each of its slots has in Y, and the index of the first value of slot 0.
+    /// Number of values per slot in `Y` (`wide`), and index in `Y` of the first value of slot 0 (`start`).
     pub wide: usize,
     pub start: usize,
-    /// Constraints, up to and including this one, that share slots beyond the root's slots with it. Each has the runs
-    /// of these slots, as in the plan.
+    /// Constraints up to and including this one that share slots with this one, apart from the slots of the root. Each
+    /// entry has the index of a constraint and the runs of the shared slots, as in the plan.
     pub beside: Vec<(usize, Vec<[usize; 3]>)>,
-    /// Unit forces of its rows on the bodies of both frames, in the world's frame. Written by: `begin`.
+    /// Unit forces of the constraint's rows on the bodies of both frames, in the world's frame. Written by: `begin`.
     pub forces: [[[f64; WIDE]; 6]; 2],
-    /// γ'. Written by: `begin`.
+    /// γ', the part of γ that is not the acceleration of a body. Written by: `begin`.
     pub gamma: [f64; WIDE],
 }
 
-/// Quantities of all rows: one number per row, padded with zeros to whole vectors plus one vector.
+/// Quantities of the rows of all constraints. Each array has one number per row, zeros up to a whole number of vectors,
+/// and one more vector of zeros.
 #[derive(Clone, Debug)]
 pub(crate) struct All {
-    /// Body that carries all others, 0 if none does, and the number of columns of its joint.
+    /// Body that carries all other bodies, or 0 if there is no such body (`root`), and the number of columns of its
+    /// joint (`nv`).
     pub root: usize,
     pub nv: usize,
     pub stride: usize,
-    /// Force on the root: the sum of all forces on the bodies that it carries, and the remainder of that sum. Shape: 6
-    /// × stride. Written by: `carry`.
+    /// Two forces on the root: the sum of the unit forces on all bodies that it carries (`whole`), and the part of this
+    /// sum that the joints below the root pass on to it (`rest`). Shape: 6 × stride. Written by: `carry`.
     pub whole: Vec<f64>,
     pub rest: Vec<f64>,
     /// J q̈ + γ for λ = 0, then λ. Shape: stride. Written by: `carry`, `carry_on`, `constrained.rs`.
     pub x: Vec<f64>,
-    /// J, Y and Y D⁻¹ of the root's joint. Shape: nv × stride. Written by: `carry_on`.
+    /// J, Y and Y D⁻¹ in the columns of the root's joint. Shape: nv × stride. Written by: `carry_on`.
     pub J: Vec<f64>,
     pub Y: Vec<f64>,
     pub YD: Vec<f64>,
 }
 
-/// Constraints of a set.
+/// Scratch for all constraints of a set.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstraintLanes {
     pub(crate) rows: Vec<Rows>,
-    /// Y and Y D⁻¹. Shape: slots of each constraint × its width. Written by: `carry`.
+    /// Y and Y D⁻¹. Shape: for each constraint, its number of slots × `wide`. Written by: `carry`.
     pub(crate) Y: Vec<f64>,
     pub(crate) YD: Vec<f64>,
     pub(crate) all: All,
 }
 
 impl ConstraintLanes {
-    /// Returns the lanes for a robot with limbs but without mimic joints, if all constraints are points or frames.
+    /// Returns the scratch for a robot with limbs but without mimic joints, if all constraints are of the kind point or
+    /// rigid.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
-        // The number of rows must be a multiple of three.
+        // The passes over lanes need a multiple of three rows per constraint.
         let whole = plans.iter().all(|plan| plan.rows().is_multiple_of(3));
         if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() || !whole {
             return None;
@@ -88,7 +93,7 @@ impl ConstraintLanes {
             let [one, other] = plan.bodies.map(way);
             let own = |a: &[usize], b: &[usize]| a.iter().filter(|i| !b.contains(i)).map(link).collect();
             let shared = one.iter().filter(|i| other.contains(i)).map(link).collect();
-            // The root's slots come first.
+            // The root's slots come first; they are left out of each run.
             let beyond = |&[here, there, n]: &[usize; 3]| {
                 let root = if here < nv { nv } else { 0 };
                 (n > root).then_some([here + root, there + root, n - root])

@@ -1,24 +1,26 @@
-//! Relative motion of the frames of a constraint: J, the acceleration γ for q̈ = 0, and their derivatives.
+//! Relative motion of the two frames of a constraint: the Jacobian J, the acceleration γ for q̈ = 0, and the
+//! derivatives of both.
 //!
-//! In the world's frame, body 1 carries frame 1 at ₀X₁, and body 2 carries the target at ₀X₂. With Δv = v₁ − v₂, the
-//! following acceleration must vanish:
+//! Body 1 carries frame 1, with pose ₀X₁ in the world. Body 2 carries the target, frame 2, with pose ₀X₂. With Δv = v₁
+//! − v₂, the following acceleration must vanish:
 //!
 //! ```text
 //! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)     (no Δv × v₂ along the world's axes)
 //! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)          u, α: velocity, acceleration of points
 //! ```
 //!
-//! For a line or a plane it is the part of a point's acceleration along some axes, e₃ᵀ (…) or [e₁ e₃]ᵀ (…).
+//! For a line or a plane, the rows are components of the point's row above: e₃ᵀ (…) for a line, [e₁ e₃]ᵀ (…) for a
+//! plane.
 //!
-//! When coordinate e moves a body, ∂v and ∂a are given at the top of `rnea_derivatives.rs`. For a point p of the body,
-//! with s = S_e, Ψ̇ and Ψ̈ evaluated at p,
+//! When coordinate e moves a body, ∂v and ∂a are as in `rnea_derivatives`. A point p of the body has the velocity u and
+//! the acceleration α. With s = S_e, and Ψ̇ and Ψ̈ evaluated at p,
 //!
 //! ```text
 //! ∂u/∂q_e = s_ω × u + Ψ̇     ∂α/∂q_e = s_ω × α + Ψ̈ + 2 Ψ̇_ω × u     ∂α/∂q̇_e = Ψ̇ + Ṡ + 2 s_ω × u
 //! ```
 //!
-//! A motion ₀X₁⁻¹ m expressed in frame 1 changes by ₀X₁⁻¹ (∂m − S_e × m) if e moves frame 1. Gravity is the world's
-//! acceleration here and cancels in all differences.
+//! If e moves frame 1, a motion ₀X₁⁻¹ m that is expressed in frame 1 changes by ₀X₁⁻¹ (∂m − S_e × m). Gravity is
+//! included as the world's acceleration and cancels in all differences.
 
 use crate::constraints::constraint::{ConstraintKind, Target};
 use crate::constraints::plan::Plan;
@@ -26,18 +28,19 @@ use crate::passes::kinematics::World;
 use condyle_spatial::lie::{Quaternion, jlog6, log6};
 use condyle_spatial::{Act, Cross, Mat3, Matrix, Motion, Scalar, Se3, Vec3};
 
-/// Poses of the two frames of a constraint and motions of their bodies, in the world's frame.
+/// Poses of the two frames of a constraint, and velocities and accelerations of the bodies that carry them, in the
+/// world's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FramePair<S> {
-    /// ₀X₁, the pose of the frame.
+    /// Pose ₀X₁ of frame 1, the constraint's frame.
     pub x1: Se3<S>,
-    /// ₀X₂, the pose of the target, given in the other frame.
+    /// Pose ₀X₂ of frame 2: the other frame's pose times the target's placement.
     pub x2: Se3<S>,
     pub v: [Motion<S>; 2],
     pub a: [Motion<S>; 2],
 }
 
-/// Columns of the motion of all joints, in the world's frame, as in `rnea_derivatives.rs`.
+/// Columns S, Ψ̇, Ψ̈ and Ψ̇ + Ṡ of all joints, in the world's frame, as in `rnea_derivatives`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Columns<'w, S> {
     pub S: &'w [Motion<S>],
@@ -46,13 +49,13 @@ pub(crate) struct Columns<'w, S> {
     pub PsidSd: &'w [Motion<S>],
 }
 
-/// Returns the velocity of the point p of a rigid motion: v + ω × p.
+/// Returns v + ω × p, the velocity of the point p of a body with the motion (v, ω).
 #[inline(always)]
 fn at<S: Scalar>(m: Motion<S>, p: Vec3<S>) -> Vec3<S> {
     m.linear + m.angular.cross(p)
 }
 
-/// Returns x − y, with x or y omitted if its flag is false.
+/// Returns x − y. x counts as zero if `first` is false, y if `second` is false.
 #[inline(always)]
 fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Motion<S> {
     match (first, second) {
@@ -63,14 +66,14 @@ fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Mo
     }
 }
 
-/// Returns ω × m for both parts of a motion m.
+/// Returns the motion m with both its linear and its angular part crossed with ω: ω × m_v and ω × m_ω.
 #[inline(always)]
 fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
     Motion::new(w.cross(m.linear), w.cross(m.angular))
 }
 
 impl<S: Scalar> FramePair<S> {
-    /// Returns the frames of bodies with these poses, at rest.
+    /// Returns the frame pair of two bodies at rest with the given poses.
     #[inline(always)]
     pub(crate) fn between(plan: &Plan, target: &Target<S>, [one, other]: [Se3<S>; 2]) -> Self {
         let x1 = one * plan.turned[0].lift();
@@ -78,14 +81,14 @@ impl<S: Scalar> FramePair<S> {
         Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
     }
 
-    /// Returns the frames of bodies at rest whose placements are known.
+    /// Returns the frame pair of two bodies at rest whose placements are known.
     #[inline(always)]
     pub(crate) fn at_rest(plan: &Plan, target: &Target<S>, World { oX, .. }: &World<S>) -> Self {
         let [i, j] = plan.bodies;
         Self::between(plan, target, [oX[i], oX[j]])
     }
 
-    /// Returns the frames of moving bodies.
+    /// Returns the frame pair of two bodies with velocities v and accelerations a.
     #[inline(always)]
     pub(crate) fn new(plan: &Plan, target: &Target<S>, w: &World<S>, v: &[Motion<S>], a: &[Motion<S>]) -> Self {
         let [i, j] = plan.bodies;
@@ -104,7 +107,8 @@ impl<S: Scalar> FramePair<S> {
         if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
     }
 
-    /// Returns the rows of the constraint, from the vector x of a point's rows: its part along the constraint's axes.
+    /// Returns the rows of a point, line or plane constraint from the vector x of all three rows of the point. For a
+    /// line or a plane, these are the components of x along the held axes.
     #[inline(always)]
     fn held(plan: &Plan, x: Vec3<S>) -> Motion<S> {
         let axes: Mat3<S> = plan.axes.lift();
@@ -116,7 +120,8 @@ impl<S: Scalar> FramePair<S> {
         Motion::new(linear, Vec3::zero())
     }
 
-    /// Returns a column of the points' J along the axes of `reference`, like `column`.
+    /// Returns a column of the Jacobian of p₁ − p₂ along the axes of `reference`, for the joint column s. The flags
+    /// tell which frames the joint carries.
     #[inline(always)]
     pub(crate) fn point_column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Vec3<S> {
         let (s1, s2) = (at(s, self.x1.translation), at(s, self.x2.translation));
@@ -135,7 +140,7 @@ impl<S: Scalar> FramePair<S> {
         if plan.aligned() { Motion::new(R * m.linear, R * m.angular) } else { m }
     }
 
-    /// Returns ₂X₁ as a twist.
+    /// Returns log(₂X₁), the pose of frame 1 in frame 2 as a twist.
     #[inline(always)]
     fn error(&self) -> Motion<S> {
         let x = self.x2.inverse() * self.x1;
@@ -153,7 +158,7 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Computes the constraint's rows of J, in its slots.
+    /// Computes the constraint's rows of J, in the slots of the constraint.
     #[inline(always)]
     pub(crate) fn jacobian(&self, plan: &Plan, columns: &[Motion<S>], J: &mut [S]) {
         let (rows, n) = (plan.rows(), plan.places.len());
@@ -168,7 +173,8 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Returns the acceleration that must vanish, including the corrections, for the accelerations of the bodies.
+    /// Returns the acceleration that must vanish, including the corrections by kp and kd, from the motions of the
+    /// bodies.
     #[inline(always)]
     pub(crate) fn acceleration(&self, plan: &Plan, target: &Target<S>) -> Motion<S> {
         let (kp, kd) = (S::splat(plan.kp), S::splat(plan.kd));
@@ -176,7 +182,7 @@ impl<S: Scalar> FramePair<S> {
         match plan.kind {
             ConstraintKind::Rigid => {
                 let m = self.express(plan, self.rigid(plan, kd));
-                // Without kp, skip the logarithm, which is not smooth at half turns.
+                // If kp is 0, the logarithm is not needed. It is skipped because it is not smooth at half turns.
                 let m = if plan.kp > 0.0 { m + self.outward(plan, self.error().scale(kp)) } else { m };
                 m - wanted
             }
@@ -184,7 +190,8 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Returns a₁ − a₂ + Δv × v₂ + kd Δv, without Δv × v₂ along the world's axes.
+    /// Returns a₁ − a₂ + Δv × v₂ + kd Δv with Δv = v₁ − v₂. The term Δv × v₂ is left out if the rows are along the
+    /// world's axes.
     #[inline(always)]
     fn rigid(&self, plan: &Plan, kd: S) -> Motion<S> {
         let [v1, v2] = self.v;
@@ -192,7 +199,7 @@ impl<S: Scalar> FramePair<S> {
         if plan.aligned() { m } else { m + (v1 - v2).cross(v2) }
     }
 
-    /// Returns the points' velocities u and accelerations α = a + ω × u.
+    /// Returns the velocity u and the classical acceleration α = a + ω × u of the origins of both frames.
     #[inline(always)]
     fn points(&self) -> [[Vec3<S>; 2]; 2] {
         let (p1, p2) = (self.x1.translation, self.x2.translation);
@@ -202,7 +209,7 @@ impl<S: Scalar> FramePair<S> {
         [[u1, alpha1], [u2, alpha2]]
     }
 
-    /// Returns α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂).
+    /// Returns α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂) for the origins of both frames.
     #[inline(always)]
     fn point(&self, kp: S, kd: S) -> Vec3<S> {
         let [[u1, alpha1], [u2, alpha2]] = self.points();
@@ -210,8 +217,8 @@ impl<S: Scalar> FramePair<S> {
         (self.x1.translation - self.x2.translation).scale_add(kp, velocity)
     }
 
-    /// Adds the derivatives of `acceleration` with respect to q and v to the constraint's rows of dq and dv. The
-    /// bodies' accelerations are those at a fixed q̈. `error` is the value of `acceleration` there.
+    /// Adds the derivatives of `acceleration` with respect to q and v, at fixed q̈, to the constraint's rows of dq and
+    /// dv. `error` is the value of `acceleration`.
     #[inline(always)]
     pub(crate) fn acceleration_derivatives(
         &self,
@@ -293,10 +300,10 @@ impl<S: Scalar> FramePair<S> {
             let (mut by_q, mut by_v) = (Vec3::zero(), Vec3::zero());
             for end in 0..2 {
                 let (p, [u, alpha]) = ([self.x1, self.x2][end].translation, points[end]);
-                // ∂(α + kd u + kp p) = s_ω × (α + kd u) + Ψ̈ + 2 Ψ̇_ω × u + kd Ψ̇ + kp s
+                // ∂(α + kd u + kp p)/∂q_e = s_ω × (α + kd u) + Ψ̈ + 2 Ψ̇_ω × u + kd Ψ̇ + kp s
                 let turned = s.angular.cross(u.scale_add(kd, alpha)) + Psid.angular.cross(u).scale(two);
                 let moved = at(s, p).scale_add(kp, at(Psid, p).scale_add(kd, at(Psidd, p)));
-                // Ψ̇ + Ṡ + 2 s_ω × u + kd s
+                // ∂(α + kd u)/∂q̇_e = Ψ̇ + Ṡ + 2 s_ω × u + kd s
                 let faster = at(s, p).scale_add(kd, at(PsidSd, p)) + s.angular.cross(u).scale(two);
                 if end == 0 && touch.first {
                     by_q += turned + moved;
@@ -319,8 +326,8 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Adds the derivative of the relative velocity J w with respect to q, for a fixed w, to the constraint's rows of
-    /// dq. The frames' motions and Ψ̇ are computed for w; `value` is J w.
+    /// Adds the derivative of the relative velocity J w with respect to q, for fixed w, to the constraint's rows of dq.
+    /// The velocities in this pair and Ψ̇ must be computed for w. `value` is J w.
     #[inline(always)]
     pub(crate) fn velocity_derivative(
         &self,

@@ -1,4 +1,4 @@
-//! Constraints of one model: their plans, and all memory that they need.
+//! Set of constraints of one model: the plans of the constraints, and all memory for computations with them.
 
 use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_lanes::ConstraintLanes;
@@ -16,14 +16,15 @@ use condyle_model::Model;
 use condyle_spatial::{Array, Dense, DenseMatrix, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
-/// Constraints of one model, contacts and loops, with the scratch and results of [`constrained_dynamics`] and similar
-/// functions.
+/// Constraints (contacts and loops) of one model, with the scratch and the results of [`constrained_dynamics`] and
+/// similar functions.
 ///
-/// All memory is allocated here. Make one set for each combination of contacts, and change targets with
+/// [`new`](Self::new) allocates all memory. Make one set for each combination of contacts, and change targets with
 /// [`set_target`](Self::set_target). All sets can share one [`Data`](crate::Data).
 ///
-/// A model may hold several robots that no constraint connects. Then each robot costs as much as alone, except for the
-/// zeros between robots in matrices. This requires that the constraints of each robot are adjacent.
+/// A model may contain several robots that no constraint connects. Then each robot costs as much as in a model of its
+/// own. In addition, matrices have zeros for each pair of robots, and these zeros must be written. For this, the
+/// constraints of each robot must be adjacent in the list.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
@@ -38,40 +39,42 @@ use core::ops::Range;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct ConstraintSet<S> {
-    /// Settings that decide how redundant constraints share their forces; may be changed between calls.
+    /// Settings that decide how redundant constraints share their forces. They may be changed between calls.
     pub proximal: ProximalSettings,
     pub(crate) plans: Vec<Plan>,
     pub(crate) islands: Vec<Island>,
     pub(crate) targets: Array<Target<S>>,
     pub(crate) nv: usize,
-    /// Hash of the robot for which the set was made; it covers the frames and the axes of the joints.
+    /// Geometry hash of the model for which the set was made. It covers the frames and the axes of the joints.
     geometry: u64,
-    /// Rows, for each coordinate, in which ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero.
+    /// Rows in which each column of ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero; one list per coordinate.
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
-    /// Rows of J, for each coordinate, in which J may be nonzero.
+    /// Rows in which each column of J may be nonzero; one list per coordinate.
     pub(crate) touching: Vec<Vec<usize>>,
-    /// J in the slots of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
+    /// Rows of J, each in the slots of its constraint. Shape: number of entries of all rows. Written by: `jacobian` of
+    /// `constraint_motion.rs`.
     pub(crate) J: Array<S>,
-    /// γ, the constraints' accelerations for q̈ = 0, including all corrections. Shape: rows. Written by:
-    /// `constraint_motion`.
+    /// γ, the accelerations of the constraints for q̈ = 0, including the corrections by kp and kd; for impacts, (1 + ε)
+    /// J v. Shape: rows. Written by: `constrained_dynamics`, `impulse_dynamics`.
     pub(crate) gamma: Array<S>,
     pub(crate) delassus: Delassus<S>,
-    /// Forces, or impulses. Shape: rows. Written by: the algorithms.
+    /// Forces λ, or impulses, of the constraints. Shape: rows. Written by: the algorithms.
     pub(crate) lambda: Array<S>,
-    /// J q̈ + γ. Shape: rows. Written by: the algorithms.
+    /// Error J q̈ + γ of the constraints. Shape: rows. Written by: the algorithms.
     pub(crate) error: Array<S>,
-    /// Derivatives of the constraints' accelerations (or velocities). Shape: rows × nv. Written by: the algorithms'
-    /// derivatives.
+    /// Derivatives of the accelerations (for impacts: velocities) of the constraints. Shape: rows × nv. Written by: the
+    /// algorithms' derivatives.
     pub(crate) dgamma_dq: Matrix<S>,
     pub(crate) dgamma_dv: Matrix<S>,
-    /// M⁻¹ Jᵀ, and M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
+    /// Matrices U = M⁻¹ Jᵀ and J̄ = M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
     pub(crate) U: Matrix<S>,
     pub(crate) Jbar: Matrix<S>,
-    /// Derivatives of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
+    /// Derivatives of the forces λ with respect to q, v and τ. Shape: rows × nv. Written by: the algorithms'
+    /// derivatives.
     pub(crate) dlambda_dq: Matrix<S>,
     pub(crate) dlambda_dv: Matrix<S>,
     pub(crate) dlambda_dtau: Matrix<S>,
-    /// Scratch of single calls on robots with limbs.
+    /// Scratch of calls with limbs in parallel lanes; `None` if the robot or the constraints do not allow this.
     pub(crate) limbs: Option<Box<ConstraintLanes>>,
 }
 
@@ -80,12 +83,12 @@ same_layout!(ConstraintSet {
 } same { proximal, plans, islands, nv, geometry, nonzero_rows, touching, limbs });
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Plans the constraints of a model and allocates all memory.
+    /// Makes the plans of the constraints in a model and allocates all memory.
     ///
     /// # Errors
     /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference
-    /// frame is `World`, or a gain is negative or not finite. Also if a target or its rotation is invalid, `axes` are
-    /// invalid for the kind, or two constraints are the same.
+    /// frame is `World`, or a gain is negative or not finite. The same error is returned if a target or its rotation is
+    /// invalid, `axes` are invalid for the kind, or two constraints are equal.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
@@ -119,7 +122,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Checks the constraints of a model as [`new`](Self::new) does, without allocating a set.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// Same errors as for [`new`](Self::new).
     pub fn check_all<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<(), Error> {
         constraints.iter().enumerate().try_for_each(|(i, one)| one.bodies(model, &constraints[..i]).map(drop))
     }
@@ -139,7 +142,7 @@ impl<S: Scalar> ConstraintSet<S> {
         self.lambda.len()
     }
 
-    /// Returns the rows of constraint k.
+    /// Returns the range of the rows of constraint k in J and λ.
     ///
     /// # Panics
     /// If constraint k does not exist.
@@ -149,14 +152,14 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
-    /// Returns the islands: the coordinates and the rows of each independent part. Constraints that share no body, or
-    /// only bodies that do not move, are independent. The coordinates are the model's, in order. A tree without
-    /// constraints has no rows.
+    /// Returns the islands, which are independent of each other, as pairs (coordinates, rows). Constraints that share
+    /// no body, or only bodies that do not move, are in different islands. The ranges of coordinates are sorted and
+    /// cover all coordinates of the model. A tree without constraints is an island without rows.
     pub fn islands(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
         self.islands.iter().map(|island| (island.coordinates.clone(), island.rows.clone()))
     }
 
-    /// Returns the target of constraint k; each lane has its own.
+    /// Returns the target of constraint k. If the scalars have lanes, each lane has its own target.
     ///
     /// # Panics
     /// If constraint k does not exist.
@@ -185,7 +188,7 @@ impl<S: Scalar> ConstraintSet<S> {
         Ok(())
     }
 
-    /// Copies J of the last call, rows × nv. Overwrites J.
+    /// Writes the Jacobian J of the last call, rows × nv. Overwrites J.
     ///
     /// # Panics
     /// If `J` is not rows × nv.
@@ -214,7 +217,7 @@ impl<S: Scalar> ConstraintSet<S> {
     }
 }
 
-/// Panics on behalf of [`ConstraintSet::check`].
+/// Panics because [`ConstraintSet::check`] found another model.
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -1,10 +1,12 @@
-//! Delassus matrix J M⁻¹ Jᵀ and its inverse Λ, the inertia of a robot along its constraints.
+//! Delassus matrix J M⁻¹ Jᵀ of a robot's constraints. The inverse Λ of this matrix is the inertia of the robot along
+//! the constraints.
 //!
-//! With M = Lᵀ D L, the rows of Y = J L⁻¹ have entries only where J has entries, or nearer to the root. J M⁻¹ Jᵀ = Y
-//! D⁻¹ Yᵀ needs only the slots that two constraints share. It is factorised as C E Cᵀ with C unit lower triangular. If
-//! a row depends on earlier rows, its pivot is only rounding, and its force is set to zero. Each [island](Island) is
-//! factorised separately, in its own columns and rows of the common arrays. Source: Featherstone, *Exploiting sparsity
-//! in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
+//! With M = Lᵀ D L, a row of Y = J L⁻¹ has entries only in the slots of the same row of J and in slots between these
+//! slots and the root. An entry of J M⁻¹ Jᵀ = Y D⁻¹ Yᵀ needs only the slots that two constraints share. J M⁻¹ Jᵀ is
+//! factorised as C E Cᵀ with unit lower triangular C. If a row depends on earlier rows, its pivot is only a rounding
+//! error, and its force is set to zero. Each [island](Island) is factorised separately, in its own columns and rows of
+//! the common arrays. Source: Featherstone, *Exploiting sparsity in operational-space dynamics* (2010); Golub and Van
+//! Loan, *Matrix Computations* (4th edition), section 4.1.
 
 use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, ProximalSettings};
@@ -14,40 +16,42 @@ use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::{Array, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
-/// Minimum pivot, in rounding errors of its diagonal entry; smaller pivots count as zero.
+/// Minimum pivot, as a multiple of the rounding error of the pivot's diagonal entry. Smaller pivots count as zero.
 const ROUNDINGS: f64 = 1e3;
 
-/// Returns the step (in numbers) to which columns are padded, so that loops over them have no remainder. Entries above
-/// the diagonal, or after the last row, have no meaning.
+/// Returns the step: columns are padded to multiples of this number of entries, so that loops over columns have no
+/// remainder. Entries above the diagonal, and entries after the last row, have no meaning.
 pub(crate) const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { STEP } else { 1 }
 }
 
-/// Step of single numbers.
+/// Step for scalars without lanes.
 const STEP: usize = 8;
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Delassus<S> {
-    /// J L⁻¹, and J L⁻¹ D⁻¹, in the slots of each constraint. Shape: entries of all rows. Written by: `multiply`.
+    /// Matrices Y = J L⁻¹ and Z = J L⁻¹ D⁻¹, in the slots of each constraint. Shape: entries of all rows. Written by:
+    /// `multiply`.
     Y: Array<S>,
     Z: Array<S>,
-    /// Stride of the columns of `CE` and of the rows of `rows`: one row more than needed, rounded up to whole steps.
+    /// Distance between the columns of `CE` and between the rows of `rows`: the number of rows plus 1, rounded up to
+    /// whole steps.
     pub stride: usize,
-    /// J M⁻¹ Jᵀ from the diagonal on, column by column; later C E. Shape: stride × rows, plus one step. Written by:
+    /// Lower triangle of J M⁻¹ Jᵀ, then of C E, column by column. Shape: stride × rows, plus one step. Written by:
     /// `multiply`, or in lanes by `limbs`; then by `decompose`.
     pub CE: Array<S>,
-    /// C E row by row, up to the diagonal. Shape: as `CE`. Written by: `decompose`.
+    /// Lower triangle of C E, row by row. Shape: stride × rows, plus one step. Written by: `decompose`.
     rows: Array<S>,
-    /// 1/E, or 0 for a row without a pivot. Shape: rows. Written by: `decompose`.
+    /// 1/E of each row, or 0 for a row without a pivot. Shape: rows. Written by: `decompose`.
     E_inv: Array<S>,
     /// Number of rows without a pivot. Written by: `decompose`.
     pub redundant: S,
-    /// Right-hand side, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
+    /// Right-hand side b, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
     x: Array<S>,
-    /// C⁻¹ b. Shape: rows. Written by: `substitute`.
+    /// Result C⁻¹ b of the forward substitution. Shape: rows. Written by: `substitute`.
     y: Array<S>,
-    /// Λ. Shape: rows × rows. Written by: `invert`.
+    /// Inverse Λ. Shape: rows × rows. Written by: `invert`.
     pub inverse: Matrix<S>,
 }
 
@@ -78,7 +82,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Computes J M⁻¹ Jᵀ from the rows of J in their slots.
+    /// Computes J M⁻¹ Jᵀ of an island from the rows of J, which are stored in the slots of their constraints.
     #[inline(always)]
     pub(crate) fn multiply(&mut self, plans: &[Plan], island: &Island, J: &[S], M: &Ltdl<S>) {
         let D_inv = M.inverse_diagonal();
@@ -117,7 +121,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Sets J M⁻¹ Jᵀ of an island, and the row after it, to zero.
+    /// Sets J M⁻¹ Jᵀ of an island, and the row after its last row, to zero.
     #[inline(always)]
     pub(crate) fn clear(&mut self, Island { rows, .. }: &Island) {
         for j in rows.clone() {
@@ -125,8 +129,9 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island and solves for λ, as `solve` does. `CE` holds J M⁻¹ Jᵀ on entry,
-    /// and `lambda` holds b. b is processed as one more row. Adds the number of rows without a pivot to `redundant`.
+    /// Factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island and solves J M⁻¹ Jᵀ λ = b, as `solve` does. On entry `CE`
+    /// contains J M⁻¹ Jᵀ, and `lambda` contains b. b is eliminated like one more row of the matrix. Adds the number of
+    /// rows without a pivot to `redundant`.
     #[inline(always)]
     pub(crate) fn decompose(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let Self { CE, rows, E_inv, stride, .. } = self;
@@ -156,7 +161,7 @@ impl<S: Scalar> Delassus<S> {
         self.repeat(island, proximal, lambda);
     }
 
-    /// Solves J M⁻¹ Jᵀ λ = b of an island, by proximal iterations if there are any. `lambda` holds b on entry.
+    /// Solves J M⁻¹ Jᵀ λ = b of an island, by proximal iterations if μ > 0. `lambda` contains b on entry.
     #[inline(always)]
     pub(crate) fn solve(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         self.x[island.rows.clone()].copy_from_slice(&lambda[island.rows.clone()]);
@@ -165,7 +170,8 @@ impl<S: Scalar> Delassus<S> {
         self.repeat(island, proximal, lambda);
     }
 
-    /// Runs the remaining proximal iterations. `lambda` holds b on entry, and x holds the first solution.
+    /// Runs all proximal iterations except the first. On entry `lambda` contains b, and `x` contains the solution of
+    /// the first iteration.
     #[inline(always)]
     fn repeat(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let mu = S::splat(proximal.mu);
@@ -179,7 +185,7 @@ impl<S: Scalar> Delassus<S> {
         lambda[rows.clone()].copy_from_slice(&self.x[rows.clone()]);
     }
 
-    /// Computes Λ of an island, the map from b to λ. Entries outside of the island are zero.
+    /// Computes Λ of an island: the matrix that maps b to λ. Entries outside the island stay zero.
     #[inline(always)]
     pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings) {
         let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
@@ -201,7 +207,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Replaces x = b by y = C⁻¹ b in some rows. b is zero before `start`.
+    /// Replaces x = b by y = C⁻¹ b in the given rows. b is zero before the row `start`.
     #[inline(always)]
     fn substitute(&mut self, rows: &Range<usize>, start: usize) {
         let Self { CE, E_inv, x, y, stride, .. } = self;
@@ -215,7 +221,7 @@ impl<S: Scalar> Delassus<S> {
         x[rows.clone()].copy_from_slice(&y[rows.clone()]);
     }
 
-    /// Replaces x = y by C⁻ᵀ E⁻¹ y in some rows.
+    /// Replaces x = y by C⁻ᵀ E⁻¹ y in the given rows.
     #[inline(always)]
     fn back_substitute(&mut self, range: &Range<usize>) {
         let Self { rows, E_inv, x, stride, .. } = self;
@@ -228,13 +234,13 @@ impl<S: Scalar> Delassus<S> {
     }
 }
 
-/// Returns the length of column j from its first step, for rows that end with these and one more, in whole steps.
+/// Returns the length of column j, from the step of its diagonal entry to the step of the row after the last row.
 #[inline(always)]
 fn room<S: Scalar>(rows: &Range<usize>, j: usize) -> usize {
     (rows.end + 1).next_multiple_of(step::<S>()) - (j - j % step::<S>())
 }
 
-/// Computes y += x s, in whole steps.
+/// Computes y += x s for a number s, in whole steps.
 #[inline(always)]
 fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -247,7 +253,7 @@ fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// Computes y −= Σ xₖ sₖ Eₖ⁻¹ for the columns x of a matrix, from a row on, in whole steps.
+/// Computes y −= Σ xₖ sₖ Eₖ⁻¹ in whole steps, where xₖ is column k of a matrix from the row `first` on.
 #[inline(always)]
 fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_inv: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -268,7 +274,7 @@ fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_in
     }
 }
 
-/// Returns the number of solves: without μ, one solve is exact.
+/// Returns the number of proximal iterations. It is 1 if μ is 0, because one solve is then exact.
 fn rounds(proximal: ProximalSettings) -> usize {
     if proximal.mu > 0.0 { proximal.iterations.max(1) } else { 1 }
 }

@@ -1,15 +1,15 @@
-//! Impacts: jumps of the velocity when constraints become active, and their analytical derivatives.
+//! Impacts: jumps of the velocity when constraints become active, and the analytical derivatives of the jumps.
 //!
-//! The constraints exert an impulse Λ in an infinitesimal time, in which nothing else acts and no body moves. The
-//! restitution ε determines how they separate, from 0 (they stick) to 1 (no energy is lost):
+//! The constraints exert an impulse Λ in an infinitesimal time, in which other forces have no effect and no body moves.
+//! The restitution ε determines the velocity after the impact, from 0 (the frames stick) to 1 (no energy is lost):
 //!
 //! ```text
 //! M (v⁺ − v) = Jᵀ Λ,   J v⁺ = −ε J v          (A Newtonian restitution: Featherstone 2008, section 11.7)
 //! ```
 //!
 //! These are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ = (1 + ε) J v. The
-//! same holds for their derivatives, with r = ∂(M Δ − Jᵀ Λ)/∂q and c = ∂(J w)/∂q, w = v⁺ + ε v. Here r is inverse
-//! dynamics of a robot at rest without gravity, with acceleration Δ:
+//! derivatives have the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ Λ)/∂q, w = v⁺ + ε v and c = ∂(J
+//! w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without gravity, with acceleration Δ:
 //!
 //! ```text
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
@@ -28,21 +28,21 @@ use condyle_spatial::{Array, Cross, Matrix, Motion};
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// v⁺. Written by: `pass`.
+        /// Velocity v⁺ after the impact. Written by: `part`.
         pub v_after: Array<S> = filled(S::zero, size.nv),
-        /// w = v⁺ + ε v. Written by: `pass`.
+        /// w = v⁺ + ε v, with the velocity v before the impact. Written by: `approach`, `part`.
         pub w: Array<S> = filled(S::zero, size.nv),
-        /// Velocities of the bodies for w, in the world's frame. Written by: `spread`.
+        /// Velocities of the bodies when the joints move with velocity w, in the world's frame. Written by: `spread`.
         pub velocity: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Ψ̇ for w. Written by: `spread`.
+        /// Ψ̇ = v_λ × S when the joints move with velocity w. Written by: `spread`.
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Zeros, never overwritten.
+        /// Zeros that are never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 
 kernel! {
-    /// Computes J and γ = (1 + ε) J v, for bodies whose placements are known.
+    /// Computes J and γ = (1 + ε) J v with the restitution ε, for bodies whose placements are known.
     pub(crate) fn approach<S>(
         world: &World<S>,
         set: &mut ConstraintSet<S>,
@@ -64,7 +64,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes v⁺ = v + Δ and w = v⁺ + ε v.
+    /// Computes the velocity after the impact, v⁺ = v + Δ, and w = v⁺ + ε v.
     pub(crate) fn part<S>(d: &mut Workspace<S>, v: &[S], change: &[S], restitution: S) {
         for k in 0..v.len() {
             d.v_after[k] = v[k] + change[k];
@@ -74,7 +74,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c, for bodies whose placements are known.
+    /// Computes c = ∂(J w)/∂q, for bodies whose placements are known.
     pub(crate) fn differentiate_motion<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -92,8 +92,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the derivatives with respect to the velocity before the impact: ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1
-    /// + ε) (J M⁻¹ Jᵀ)⁻¹ J.
+    /// Computes the derivatives with respect to the velocity v before the impact: ∂v⁺/∂v is 1 − (1 + ε) J̄ J, and ∂Λ/∂v
+    /// is −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
     pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut Matrix<S>) {
         let (n, rows) = (set.nv, set.lambda.len());
         let (Jbar, inertia) = (set.Jbar.as_slice(), set.delassus.inverse.as_slice());
@@ -119,7 +119,8 @@ kernel! {
     }
 }
 
-/// Computes the velocities of all bodies for w, and Ψ̇ = v_λ × S, for bodies whose placements are known.
+/// Computes the velocities of all bodies and Ψ̇ = v_λ × S for the joint velocity w. The placements of the bodies must
+/// be known.
 #[inline(always)]
 fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { w, velocity, Psid, .. } = d;

@@ -1,9 +1,9 @@
-//! Islands: independent parts of a robot and of its constraints.
+//! Islands: groups of trees and constraints that are independent of each other.
 //!
-//! M has one block for each tree that is attached to the world. J M⁻¹ Jᵀ has entries for two constraints only if both
-//! act on one tree, or on trees that other constraints connect. So constraints that share no body except the world are
-//! factorised separately, and the results are zero elsewhere. An island is a range of coordinates with a range of rows,
-//! which is empty for a tree without constraints. Islands with overlapping ranges are merged.
+//! M has one block for each tree that is attached to the world. J M⁻¹ Jᵀ has an entry for two constraints only if both
+//! act on the same tree. An island consists of all trees that constraints connect. Each island is factorised
+//! separately, and entries for two islands are zero. An island has a range of coordinates and a range of rows. The
+//! range of rows is empty for a tree without constraints. Islands with overlapping ranges are merged.
 
 use crate::constraints::plan::Plan;
 use alloc::vec;
@@ -13,16 +13,16 @@ use condyle_model::Model;
 use condyle_spatial::{Matrix, Scalar};
 use core::ops::Range;
 
-/// Part that is computed independently of all others.
+/// Island: trees and constraints that are computed independently of all other trees and constraints.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Island {
     pub coordinates: Range<usize>,
-    /// Indices of its constraints, and their rows.
+    /// Indices of the island's constraints (`constraints`), and the rows of these constraints (`rows`).
     pub constraints: Range<usize>,
     pub rows: Range<usize>,
 }
 
-/// Returns the smallest range that contains two ranges, each of which may be empty.
+/// Returns the smallest range that contains the ranges a and b. Each of them may be empty.
 fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     match (a.is_empty(), b.is_empty()) {
         (true, _) => b.clone(),
@@ -48,10 +48,11 @@ impl Island {
         overlap(&self.coordinates, &other.coordinates) || overlap(&self.rows, &other.rows)
     }
 
-    /// Returns the islands of a model with some constraints. Their coordinates are the model's, each once and in order.
+    /// Returns the islands of a model with planned constraints. Each coordinate of the model is in one island, and the
+    /// islands are sorted by coordinates.
     pub(crate) fn of<R>(model: &Model<R>, plans: &[Plan]) -> Vec<Self> {
         let (nv, tree) = (model.nv(), EliminationTree::new(model, 1));
-        // If joints share coordinates, slots of the factor are not coordinates.
+        // If joints share coordinates, the slots of M's factor are not the coordinates. Then all trees form one island.
         let roots: Vec<usize> = match tree.swaps.is_empty() {
             true => (0..nv).filter(|&k| tree.parent[k] == NONE).collect(),
             false => vec![0],
@@ -75,20 +76,22 @@ impl Island {
         islands
     }
 
-    /// Returns the range of its entries in column j of a matrix with n rows, one per coordinate.
+    /// Returns the range of the island's entries in column j of a matrix that is stored by columns. The matrix has n
+    /// rows, one per coordinate.
     #[inline(always)]
     pub(crate) fn of_column(&self, j: usize, n: usize) -> Range<usize> {
         j * n + self.coordinates.start..j * n + self.coordinates.end
     }
 
-    /// Returns the range of its entries in column j of a matrix with one row per row of J.
+    /// Returns the range of the island's entries in column j of a matrix that is stored by columns. The matrix has one
+    /// row per row of J.
     #[inline(always)]
     pub(crate) fn rows_of_column(&self, j: usize, rows: usize) -> Range<usize> {
         j * rows + self.rows.start..j * rows + self.rows.end
     }
 
-    /// Sets the columns of its coordinates to zero outside of its own rows, in a matrix with n rows, one per
-    /// coordinate.
+    /// Sets the entries in the island's columns that are not in the island's rows to zero. The matrix has n rows, one
+    /// per coordinate.
     #[inline(always)]
     pub(crate) fn clear_beside<T: Copy>(&self, matrix: &mut [T], n: usize, zero: T) {
         if self.coordinates.len() == n {

@@ -1,16 +1,17 @@
 //! Linearised equations of motion under constraints.
 //!
-//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. So small changes of them satisfy
+//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. So small changes of q, v, τ, q̈ and λ satisfy
 //!
 //! ```text
 //! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at fixed q̈ and λ
 //! J δq̈         + c_q δq + c_v δv = 0,         c = ∂(J q̈ + γ)
 //! ```
 //!
-//! r comes from the derivatives of inverse dynamics, in which the constraints' forces are external forces fixed in
-//! their bodies. Two corrections are added. Along the world's axes, λ does not turn with frame 1. And frame 1 carries
-//! the force on the other body (for a point, frame 1 turns the force, and body 2 carries its point). Source: Carpentier
-//! and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
+//! r comes from the derivatives of inverse dynamics, in which the forces of the constraints are external forces that
+//! move with their bodies. Two corrections are added. First, a force along the world's axes does not turn with frame 1.
+//! Second, the force on the other body moves with frame 1, not with this body. For a point constraint, this force turns
+//! with frame 1, but its point of action moves with body 2. Source: Carpentier and Mansard, *Analytical derivatives of
+//! rigid body dynamics algorithms* (2018).
 
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::{Columns, FramePair};
@@ -24,7 +25,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Cross, Force, Matrix, Motion, Scalar};
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Returns the force λ of constraint i along the axes of its frame.
+    /// Returns the force λ of constraint i along the axes of the constraint's frame.
     #[inline(always)]
     fn local_force(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
         let f = self.force(i);
@@ -35,7 +36,7 @@ impl<S: Scalar> ConstraintSet<S> {
         f
     }
 
-    /// Returns the negative of the force on the other body, in the world's frame.
+    /// Returns the negative of the force that constraint i exerts on the other body, in the world's frame.
     #[inline(always)]
     fn reaction(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
         let f = self.local_force(i, ends);
@@ -50,7 +51,8 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes all forces on the bodies, external and of the constraints, for bodies whose placements are known.
+    /// Computes the sum of external forces and forces of the constraints on each body. The placements of the bodies
+    /// must be known.
     pub(crate) fn load<S, R>(
         model: &Model<R>,
         set: &ConstraintSet<S>,
@@ -70,7 +72,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes r_q: the derivative for forces that are fixed in their bodies, plus the corrections.
+    /// Computes r_q = ∂(M q̈ + h − Jᵀ λ)/∂q: the derivative `fixed` for forces that move with their bodies, plus two
+    /// corrections.
     pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &Matrix<S>, r: &mut Matrix<S>) {
         r.as_mut_slice().copy_from_slice(fixed.as_slice());
         for (i, plan) in set.plans.iter().enumerate() {
@@ -111,7 +114,8 @@ kernel! {
                         continue;
                     }
                     let w = world.S[e.column].angular.scale(S::splat(e.ratio));
-                    // The turned force leaves the axes of a line or a plane, so all rows of the point are needed.
+                    // The turned force is not along the held axes of a line or a plane, so all three rows of the point
+                    // are needed.
                     if let Some(ends) = &ends {
                         let turned = w.cross(f.linear); // ω × λ
                         for j in &plan.touches {
@@ -134,7 +138,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c_q and c_v, for bodies whose motion is known.
+    /// Computes c_q and c_v, the derivatives of J q̈ + γ, for bodies whose velocities and accelerations are known.
     pub(crate) fn differentiate_motion<S>(
         set: &mut ConstraintSet<S>,
         world: &World<S>,

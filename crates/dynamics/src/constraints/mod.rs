@@ -1,4 +1,4 @@
-//! Constraints: contacts and loops, their plans for a model, and the passes of dynamics under constraints.
+//! Constraints: contacts and loops, the plans of constraints in a model, and the passes of dynamics under constraints.
 
 pub(crate) mod constrained_derivatives;
 pub(crate) mod constrained_dynamics;

@@ -1,9 +1,10 @@
-//! Plan of a constraint in a model: the coordinates that move its frames, and the offset of its rows among all rows.
+//! Plan of a constraint in a model: the coordinates that move the constraint's frames, and the index of the
+//! constraint's first row.
 //!
 //! The coordinates that move a constraint's frames are on the paths from the frames to the root, in the elimination
-//! tree of M's factor. A slot is a position of a coordinate in the order of that factor. Sorted, the slots form at most
-//! three runs: the shared part of both paths, then the rest of one path, then the rest of the other. Rows of J are
-//! stored for these coordinates only.
+//! tree of M's factor. A slot is the position of a coordinate in the order of this factor. The sorted slots of a
+//! constraint form at most three runs: the part that both paths share, then the rest of one path, then the rest of the
+//! other path. Rows of J are stored for the coordinates of these slots only.
 
 use crate::constraints::constraint::{ConstraintKind, ContactConstraint};
 use crate::passes::frames::ReferenceFrame;
@@ -15,16 +16,18 @@ use condyle_model::{Error, Model};
 use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
 
-/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ, which makes redundant constraints share their forces.
+/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ. It makes redundant constraints share their forces.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with λ' the last solution. Each
-/// iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
-/// Redundant forces stay the smallest possible. With μ = 0 one iteration is exact, and rows that depend on earlier rows
-/// get no force. The number of iterations is fixed, so that all lanes and dual numbers do the same. Source: Carpentier,
-/// Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic equations* (2021).
+/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with the last solution as λ'.
+/// Each iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
+/// Of all forces that give the same motion, the smallest are found. With μ = 0 one iteration is exact, and rows that
+/// depend on earlier rows get no force. The number of iterations is fixed, so that all lanes and dual numbers run the
+/// same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic
+/// equations* (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProximalSettings {
-    /// μ (1/kg): small compared with the Delassus matrix, large compared with its rounding errors, for example 1e-8.
+    /// μ (1/kg): small compared with the entries of the Delassus matrix, large compared with their rounding errors, for
+    /// example 1e-8.
     pub mu: f64,
     /// Number of iterations; 0 counts as 1.
     pub iterations: usize,
@@ -37,22 +40,22 @@ impl Default for ProximalSettings {
     }
 }
 
-/// Degree of freedom that moves a frame of a constraint.
+/// Degree of freedom that moves at least one frame of a constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct SupportColumn {
-    /// Index of the joint's column.
+    /// Index of the joint column among all columns of the model.
     pub column: usize,
-    /// Index of its coordinate among the constraint's slots.
+    /// Index of the column's coordinate among the constraint's slots.
     pub at: usize,
     pub coordinate: usize,
     pub ratio: f64,
-    /// Whether it moves the constraint's frame.
+    /// Whether this degree of freedom moves the constraint's first frame.
     pub first: bool,
-    /// Whether it moves the other frame.
+    /// Whether this degree of freedom moves the other frame.
     pub second: bool,
 }
 
-/// Constraint as the algorithms use it.
+/// Plan of a constraint: the form in which the algorithms use the constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub kind: ConstraintKind,
@@ -62,26 +65,29 @@ pub(crate) struct Plan {
     pub kp: f64,
     pub kd: f64,
     pub bodies: [usize; 2],
-    /// Placements bXf in the bodies' public frames, and in their turned frames.
+    /// Placements bXf of both frames, in the bodies' frames as users see them (`placements`), and in the bodies' turned
+    /// frames (`turned`).
     pub placements: [Se3<f64>; 2],
     pub turned: [Se3<f64>; 2],
-    /// Index of its first row.
+    /// Index of the constraint's first row in J.
     pub row: usize,
-    /// Slots of the coordinates that move its frames, the root's slots first, and their coordinates.
+    /// Slots of the coordinates that move the constraint's frames, beginning at the root (`places`), and the coordinate
+    /// of each slot (`coordinates`).
     pub places: Vec<usize>,
     pub coordinates: Vec<usize>,
-    /// Number of slots that both paths share, and the index at which the second path continues.
+    /// Number of slots that both paths share (`shared`), and index of the first slot of the last run (`second`).
     pub shared: usize,
     pub second: usize,
     pub touches: Vec<SupportColumn>,
-    /// Offset of its rows in an array with one entry per slot of each row.
+    /// Offset of the constraint's rows in the array of all rows, which has one entry per slot of each row.
     pub start: usize,
-    /// Runs of slots that are shared with each constraint up to this one: index here, index there, length.
+    /// Runs of slots that this constraint shares with each constraint up to and including itself. A run is (index in
+    /// this constraint, index in the other constraint, length).
     pub common: Vec<Vec<[usize; 3]>>,
 }
 
 impl Plan {
-    /// Plans some constraints, one after the other.
+    /// Makes a plan for each constraint, in order.
     ///
     /// # Errors
     /// [`Error::Constraint`] for the first constraint that is invalid for the model.
@@ -155,7 +161,7 @@ impl Plan {
         self.kind.rows()
     }
 
-    /// Returns the range of row r (counted from the constraint's first) in the array of all rows.
+    /// Returns the range of the constraint's row r in the array of all rows. Row 0 is the first row of the constraint.
     #[inline(always)]
     pub(crate) fn range(&self, r: usize) -> Range<usize> {
         let n = self.places.len();
@@ -167,23 +173,23 @@ impl Plan {
         self.start + self.rows() * self.places.len()
     }
 
-    /// Returns whether the rows use the world's axes instead of the frame's axes.
+    /// Returns whether the rows are along the world's axes instead of the frame's axes.
     #[inline(always)]
     pub(crate) fn aligned(&self) -> bool {
         self.reference == ReferenceFrame::LocalWorldAligned
     }
 }
 
-/// Returns the rows of J in which coordinate k may be nonzero.
+/// Returns the rows of J that may be nonzero in column k.
 pub(crate) fn touching(plans: &[Plan], k: usize) -> Vec<usize> {
     let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
     touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
 }
 
-/// Returns, for each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero.
+/// Returns the rows in which each column of ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero.
 pub(crate) fn nonzero_rows<R>(model: &Model<R>, plans: &[Plan]) -> Vec<NonzeroRows> {
     let rows = |k: usize| {
-        // The joints that carry a frame move the force on the other frame.
+        // The force on the other frame depends on all joints that carry one of the two frames.
         let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
         let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
         model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
@@ -191,7 +197,7 @@ pub(crate) fn nonzero_rows<R>(model: &Model<R>, plans: &[Plan]) -> Vec<NonzeroRo
     NonzeroRows::of_columns((0..model.nv()).map(rows).collect())
 }
 
-/// Returns the slots common to two sorted lists, as runs.
+/// Returns the runs of slots that two sorted lists have in common.
 pub(crate) fn common(a: &[usize], b: &[usize]) -> Vec<[usize; 3]> {
     let mut runs: Vec<[usize; 3]> = Vec::new();
     for (i, place) in a.iter().enumerate() {

@@ -1,16 +1,17 @@
 //! Analytical derivatives of forward dynamics.
 //!
-//! M(q) q̈ + h(q, v) = τ holds for every q and v. So the derivatives of inverse dynamics at that q̈ give (Carpentier
-//! and Mansard, *Analytical derivatives of rigid body dynamics algorithms*, 2018, equation 18)
+//! M(q) q̈ + h(q, v) = τ holds for every q and v. So the derivatives of forward dynamics follow from the derivatives of
+//! inverse dynamics, τ(q, v, q̈), at this q̈. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
+//! dynamics algorithms* (2018), equation 18.
 //!
 //! ```text
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 //!
 //! The dynamics of a floating body, and of the bodies that it carries, do not depend on position or common velocity.
-//! Gravity accelerates all of them equally. So some derivatives for the linear and angular coordinates of its free
-//! joint are known without any product. With the velocities v₀ and ω, the rotation R and the acceleration of free fall
-//! g:
+//! Gravity accelerates all of these bodies equally. So some derivatives with respect to the linear and angular
+//! coordinates of the free joint are known in advance. With the position p₀, velocities v₀ and ω, rotation R and turn
+//! θ₀ of the floating body, and the acceleration of free fall g:
 //!
 //! ```text
 //! ∂q̈/∂p₀ = 0,   ∂v̇₀/∂v₀ = −ω×,   ∂v̇₀/∂θ₀ = (Rᵀ g)×,   and zeros in all other rows
@@ -35,14 +36,16 @@ workspace! {
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub solve: tree_solve::Workspace<S> = tree_solve::Workspace::new(model.columns(), size.nv),
     } same {
-        /// First coordinate of each floating body. Written by: `new`.
+        /// Index of the first coordinate of each floating body. Written by: `new`.
         pub floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect(),
-        /// Rows of ∂τ that M⁻¹ multiplies, none for linear coordinates of floating bodies. Written by: `new`.
+        /// Rows of each column of ∂τ that M⁻¹ multiplies. The list is empty for the linear coordinates of floating
+        /// bodies. Written by: `new`.
         pub nonzero_rows: Vec<NonzeroRows> = NonzeroRows::of_columns(rows_that_count(model, &floating)),
     }
 }
 
-/// Returns the rows of each column of ∂τ that may be nonzero; none for the linear coordinates of floating bodies.
+/// Returns the rows of each column of ∂τ that may be nonzero. The list is empty for the linear coordinates of floating
+/// bodies.
 fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
     let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
     for &first in floating {
@@ -52,8 +55,8 @@ fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Returns whether there are floating bodies and none of their linear coordinates has armature. Only models of
-    /// `f64` are checked; for others it returns `false`.
+    /// Returns `true` if the model has floating bodies, and no linear coordinate of these bodies has armature. Returns
+    /// `false` for models whose numbers are not `f64`.
     pub(crate) fn float_freely<R: 'static>(&self, model: &Model<R>) -> bool {
         let model = (model as &dyn Any).downcast_ref::<Model>();
         let is_free = |model: &Model| self.floating.iter().all(|&first| model.armature()[first..first + 3] == [0.0; 3]);
@@ -62,7 +65,7 @@ impl<S: Scalar> Workspace<S> {
 }
 
 kernel! {
-    /// Writes ∂v̇₀/∂v₀ of floating bodies. All other entries of these columns are zero.
+    /// Writes ∂v̇₀/∂v₀ = −ω× of each floating body into ∂q̈/∂v. All other entries of the columns of v₀ are zero.
     pub(crate) fn set_floating_columns<S>(d: &mut Workspace<S>, v: &[S]) {
         let n = v.len();
         for &first in &d.floating {
@@ -75,7 +78,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes ∂q̈ = −M⁻¹ ∂τ with the factors of the articulated bodies.
+    /// Computes ∂q̈ = −M⁻¹ ∂τ with respect to q and v, with the factors of the articulated-body algorithm.
     pub(crate) fn solves<S>(world: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>, dtau: [&[S]; 2]) {
         let Workspace { da_dq, da_dv, solve, .. } = d;
         minus_solve(world, f, solve, dtau, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);

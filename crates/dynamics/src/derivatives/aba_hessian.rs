@@ -1,7 +1,7 @@
 //! Second derivatives of forward dynamics, contracted with a vector, by analytical formulas.
 //!
-//! τ(q, v, q̈(q, v, τ)) = τ holds for every q, v and τ. It is differentiated twice and multiplied by μᵀ = λᵀ M⁻¹. With
-//! the Hessian of φ = μᵀ rnea(q, v, a) at a = q̈ (`rnea_hessian.rs`) and G = ∂²φ/∂a∂q, this gives
+//! τ(q, v, q̈(q, v, τ)) = τ holds for every q, v and τ. This equation is differentiated twice and multiplied by μᵀ = λᵀ
+//! M⁻¹. `rnea_hessian.rs` computes the Hessian of φ = μᵀ rnea(q, v, a) at a = q̈. With G = ∂²φ/∂a∂q, the result is
 //!
 //! ```text
 //! λᵀ ∂²q̈/∂q∂q = −∂²φ/∂q∂q − (∂q̈/∂q)ᵀ G − Gᵀ ∂q̈/∂q     λᵀ ∂²q̈/∂v∂q = −∂²φ/∂v∂q − (∂q̈/∂v)ᵀ G
@@ -19,7 +19,7 @@ use condyle_linalg::tree_product::neg_product;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
 
-/// Computes Bᵀ of a square matrix B.
+/// Computes the transpose Bᵀ of an n × n matrix B.
 #[inline(always)]
 fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
     for j in 0..n {
@@ -33,9 +33,9 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// μ = M⁻¹ λ. Written by: `aba_hessian`.
         pub mu: Array<S> = filled(S::zero, size.nv),
-        /// Transpose of a matrix. Written by: `run`.
+        /// Scratch for the transpose of ∂q̈/∂q, then of ∂q̈/∂v. Written by: `run`.
         pub transpose: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Product of two matrices. Written by: `run`.
+        /// Scratch for the product −(∂q̈/∂q)ᵀ G. Written by: `run`.
         pub product: Array<S> = filled(S::zero, size.nv * size.nv),
         /// λᵀ ∂²q̈/∂q∂q. Written by: `run`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -64,7 +64,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the Hessian, after `aba_derivatives` and the Hessian of φ.
+    /// Computes the four matrices λᵀ ∂²q̈ of second derivatives. Runs after `aba_derivatives` and the Hessian of φ.
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,

@@ -1,18 +1,19 @@
-//! Derivatives of the centre of mass, the centroidal momentum and its rate with respect to position, velocity and
-//! acceleration.
+//! Derivatives of the centre of mass, of the centroidal momentum and of the rate of this momentum, with respect to
+//! position, velocity and acceleration.
 //!
-//! About the world's origin, let the momentum be h = Σ I v and the rate F = Σ (I a + v ×* I v). Their changes with
-//! coordinate e come from the bodies that its joint carries (Ψ̇, Ψ̈, B of `rnea_derivatives.rs`, Y = Ψ̇ + Ṡ):
+//! About the world's origin, let the momentum be h = Σ I v and its rate F = Σ (I a + v ×* I v). When coordinate e
+//! changes, only the terms of the bodies that its joint carries change. hᶜ, Fᶜ, Iᶜ and Bᶜ are sums over these bodies.
+//! Ψ̇, Ψ̈ and B are as in `rnea_derivatives`, and Y = Ψ̇ + Ṡ:
 //!
 //! ```text
 //! ∂h/∂q_e = S ×* hᶜ + Iᶜ Ψ̇     ∂F/∂q_e = S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇     ∂F/∂q̇_e = Iᶜ Y + 2Bᶜ S     ∂F/∂q̈_e = Iᶜ S
 //! ```
 //!
-//! Shifted to the centre of mass, f becomes [f; n − c × f], and its derivative gains −∂c × f. The linear rows divided
-//! by the mass are the derivatives of ċ and c̈.
+//! Shifted to the centre of mass c, a force [f; n] becomes [f; n − c × f], and the derivative of its moment gains −∂c ×
+//! f. The linear rows, divided by the mass, are the derivatives of ċ and c̈.
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the
-//! root.
+//! root of the tree.
 
 use crate::passes::centroidal::{about, add};
 use crate::passes::coriolis::Coriolis;
@@ -23,7 +24,8 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, same_layout};
 
-/// Derivatives with respect to the coordinate of a column, about the world's origin.
+/// Derivatives of h and F, about the world's origin, with respect to the position q, velocity v and acceleration a of
+/// one joint column.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 struct Column<S> {
@@ -43,22 +45,24 @@ impl<S: Scalar> Column<S> {
 }
 
 workspace! {
-    /// Quantities in the world's frame about its origin, unless they are marked "about the centre of mass".
+    /// Quantities in the world's frame, about the world's origin unless a field says "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
-        /// Iᶜ; at index 0 the sum over all moving bodies. Written by: `pass`.
+        /// Composite inertias Iᶜ. Index 0 holds the sum over all moving bodies. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// hᶜ and 2Bᶜ; at index 0 the sum over all moving bodies. Written by: `pass`.
+        /// Momentum hᶜ and 2Bᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
+        /// Written by: `pass`.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Fᶜ; at index 0 the sum over all moving bodies. Written by: `pass`.
+        /// Rate of momentum Fᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
+        /// Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Derivatives of each column. Written by: `pass`.
+        /// Derivatives of h and F with respect to each joint column. Written by: `pass`.
         columns: Array<Column<S>> = filled(Column::zero, size.columns),
-        /// Derivatives of momentum and rate, about the centre of mass. Written by: `shift`.
+        /// Derivatives of the centroidal momentum and of its rate, about the centre of mass. Written by: `shift`.
         pub dh_dq: Matrix<S> = zero_matrix(6, size.nv),
         pub drate_dq: Matrix<S> = zero_matrix(6, size.nv),
         pub drate_dv: Matrix<S> = zero_matrix(6, size.nv),
         pub drate_da: Matrix<S> = zero_matrix(6, size.nv),
-        /// Derivatives of the centre of mass, its velocity and its acceleration. Written by: `shift`.
+        /// Derivatives of the position, velocity and acceleration of the centre of mass. Written by: `shift`.
         pub dcom_dq: Matrix<S> = zero_matrix(3, size.nv),
         pub dvcom_dq: Matrix<S> = zero_matrix(3, size.nv),
         pub dacom_dq: Matrix<S> = zero_matrix(3, size.nv),
@@ -83,7 +87,8 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Computes the derivatives about the world's origin, for bodies whose velocities and accelerations are known.
+/// Computes the derivatives of h and F about the world's origin, for bodies whose velocities and accelerations are
+/// known.
 #[inline(always)]
 fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, columns, .. } = d;
@@ -119,7 +124,8 @@ fn moved<S: Scalar>(dcom: Vec3<S>, f: Vec3<S>) -> Force<S> {
     Force::new(Vec3::zero(), -dcom.cross(f))
 }
 
-/// Computes the derivatives about the centre of mass, after `pass`.
+/// Computes the derivatives of momentum and rate about the centre of mass, and of the centre of mass itself. Runs after
+/// `pass`.
 #[inline(always)]
 fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let per_mass = d.IC[0].mass.recip();
@@ -145,7 +151,8 @@ fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     }
 }
 
-/// Derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. The axes are the world's.
+/// Derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. All quantities are along the axes
+/// of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalDerivatives<'d, S> {
     /// ∂hg/∂q, 6 × nv, linear rows first.
@@ -169,7 +176,7 @@ pub struct CentroidalDerivatives<'d, S> {
 }
 
 kernel! {
-    /// Computes the derivatives, for bodies whose accelerations are known.
+    /// Computes all derivatives of hg, dhg and c, for bodies whose accelerations are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         shift(model, d);

@@ -1,25 +1,25 @@
 //! Derivatives of the velocity and the acceleration of bodies and frames with respect to position and velocity.
 //!
-//! When coordinate e changes, the bodies that its joint carries turn rigidly about S_e. Their velocities and
-//! accelerations also change because the joint's own parent moves (`rnea_derivatives.rs`):
+//! When coordinate e changes, the bodies that its joint carries turn rigidly about S_e. The velocities and
+//! accelerations of these bodies also change because the joint's parent λ moves (see `rnea_derivatives`):
 //!
 //! ```text
 //! Ψ̇_e = v_λ × S_e                          ∂v/∂q_e = S_e × v + Ψ̇_e                ∂v/∂q̇_e = S_e
 //! Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e             ∂a/∂q_e = S_e × a + Ψ̈_e + Ψ̇_e × v     ∂a/∂q̇_e = Ψ̇_e + Ṡ_e + S_e × v
 //! ```
 //!
-//! These are the changes as seen from the world. Let m be the six numbers of a motion in a frame r at oXr, and let r
-//! move by r_e per unit of q_e. Then m changes by oXr⁻¹ (∂m/∂q_e − r_e × m).
+//! These derivatives are changes as seen from the world. Let r be a frame with pose oXr that moves by r_e per unit of
+//! q_e. Then the six numbers of a motion m (v or a) in frame r have the derivative oXr⁻¹ (∂m/∂q_e − r_e × m).
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), section IV. A
-//! derivative costs O(depth + nv). Derivatives do not allocate.
+//! derivative costs O(depth + nv) and does not allocate.
 
 use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, check_frame, columns};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Motion, Scalar, Se3, kernel};
 
 kernel! {
-    /// Computes ∂v/∂q of a frame at oXf on a body.
+    /// Computes ∂v/∂q of the velocity v of a frame with pose oXf that is on the body `body`.
     fn velocity_derivative<S, R>(
         of: Velocities<'_, S, R>,
         body: usize,
@@ -44,11 +44,11 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// Computes ∂v/∂q of a body's velocity, as [`frame_velocity_derivative`](Self::frame_velocity_derivative) does for
-    /// a frame.
+    /// Computes ∂v/∂q of a body's velocity v, like [`frame_velocity_derivative`](Self::frame_velocity_derivative) for a
+    /// frame's velocity.
     ///
     /// # Panics
-    /// If there is no such body, or `dv_dq` is not 6 × nv.
+    /// If the body does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_velocity_derivative(
@@ -61,7 +61,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     }
 
     /// Computes ∂v/∂q of the six numbers v of a [frame's velocity](Self::frame_velocity), 6 × nv, linear rows first.
-    /// Overwrites dv_dq. ∂v/∂(velocity) is the frame's Jacobian.
+    /// Overwrites dv_dq. The derivative of v with respect to the joint velocities is the frame's Jacobian.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::Local, forward_velocities, robots};
@@ -74,7 +74,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or `dv_dq` is not 6 × nv.
+    /// If the frame does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_velocity_derivative(
@@ -103,8 +103,8 @@ struct Column<S> {
 }
 
 kernel! {
-    /// Computes ∂a/∂q and ∂a/∂v of a frame at oXf on a body. If the frame's velocity is given, a is the classical
-    /// acceleration.
+    /// Computes ∂a/∂q and ∂a/∂v of the acceleration a of a frame with pose oXf that is on the body `body`. a is the
+    /// classical acceleration if the frame's `velocity` is given, otherwise the spatial acceleration.
     fn acceleration_derivatives<S, R>(
         of: Accelerations<'_, S, R>,
         body: usize,
@@ -134,11 +134,11 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
-    /// Computes ∂a/∂q and ∂a/∂v of a body's spatial acceleration, as
-    /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives) does for a frame.
+    /// Computes ∂a/∂q and ∂a/∂v of a body's spatial acceleration a, like
+    /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives) for a frame's acceleration.
     ///
     /// # Panics
-    /// If there is no such body, or a matrix is not 6 × nv.
+    /// If the body does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_acceleration_derivatives(
@@ -152,10 +152,11 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     }
 
     /// Computes ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's spatial acceleration](Self::frame_acceleration),
-    /// each 6 × nv, linear rows first. Overwrites both. ∂a/∂(acceleration) is the frame's Jacobian.
+    /// each 6 × nv, linear rows first. Overwrites both matrices. The derivative of a with respect to the joint
+    /// accelerations is the frame's Jacobian.
     ///
     /// # Panics
-    /// If there is no such frame, or a matrix is not 6 × nv.
+    /// If the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_acceleration_derivatives(
@@ -171,8 +172,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     }
 
     /// Computes ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's classical
-    /// acceleration](Self::frame_classical_acceleration), each 6 × nv, linear rows first. Overwrites both.
-    /// ∂a/∂(acceleration) is the frame's Jacobian.
+    /// acceleration](Self::frame_classical_acceleration), each 6 × nv, linear rows first. Overwrites both matrices. The
+    /// derivative of a with respect to the joint accelerations is the frame's Jacobian.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};
@@ -189,7 +190,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or a matrix is not 6 × nv.
+    /// If the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_classical_acceleration_derivatives(
@@ -204,7 +205,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         self.differentiate(body, &self.frame(frame), reference, Some(&v), da_dq, da_dv);
     }
 
-    /// Computes ∂a/∂q and ∂a/∂v of a frame at oXf on a body, as [`acceleration_derivatives`] does.
+    /// Checks the shapes of both matrices and calls [`acceleration_derivatives`].
     #[inline(always)]
     #[track_caller]
     fn differentiate(
@@ -221,8 +222,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         acceleration_derivatives(*self, body, oXf, reference, velocity, da_dq, da_dv);
     }
 
-    /// Returns the derivatives of a body's motion with respect to the coordinate of column c, whose joint is attached
-    /// to `parent`.
+    /// Returns the derivatives of a body's velocity and acceleration with respect to the coordinate of joint column c.
+    /// The joint of column c is attached to the body `parent`.
     #[inline(always)]
     fn column(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, c: usize, parent: usize) -> Column<S> {
         let oXr = reference.pose(oXf);

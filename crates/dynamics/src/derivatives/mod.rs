@@ -1,4 +1,4 @@
-//! Analytical derivatives of the passes: each file holds one algorithm, written like a pass.
+//! Analytical derivatives of the passes. Each file contains one algorithm in the form of a pass.
 
 pub(crate) mod aba_derivatives;
 pub(crate) mod aba_hessian;

@@ -1,17 +1,18 @@
 //! Second derivatives of inverse dynamics, contracted with a vector, by analytical formulas.
 //!
-//! φ = λᵀ τ(q, v, a) is the power of the efforts at the velocity λ: φ = Σ ⟨w_i, F_i⟩, where w_i is the velocity of body
-//! i when the joints move with λ. When coordinate e changes, the bodies that its joint carries turn rigidly about S_e,
-//! which does not change the power. In addition, each of these bodies has the following changes (see
-//! `rnea_derivatives.rs`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
+//! φ = λᵀ τ(q, v, a) is the power of the efforts when the joints move with velocity λ: φ = Σ ⟨w_i, F_i⟩, where w_i is
+//! then the velocity of body i. When coordinate e changes, the bodies that its joint carries turn rigidly about S_e,
+//! which does not change the power. In addition, the w, v and a of each of these bodies change as follows (see
+//! `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
 //!
 //! ```text
 //! by q_e:  δw = W_e,  δv = Ψ̇_e,  δa = Ψ̈_e + Ψ̇_e × v        by q̇_e:  δv = S_e,  δa = Y_e + S_e × v
 //! ```
 //!
-//! This is applied twice, to a column d and an earlier column e. All terms that depend on the bodies then become sums
-//! over the bodies that joint d carries. They are Iᶜ, 2Bᶜ, F as in the first derivatives, the momentum P = Σ I w, the
-//! rate of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. Six forces of column d serve all earlier columns e:
+//! These changes are applied twice, for a column d and an earlier column e. All terms that depend on single bodies then
+//! become sums over the bodies that the joint of d carries. These sums are Iᶜ, 2Bᶜ and F as in the first derivatives,
+//! the momentum P = Σ I w, the rate of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. The six forces A₁ to C of
+//! column d are computed once for all earlier columns e:
 //!
 //! ```text
 //! A₁ = Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F     A₂ = Iᶜ W_d + S_d ×* P     A₃ = 2Bᵀ W_d + S_d ×* Q + Ψ̇_d ×* P − D Ψ̇_d
@@ -22,14 +23,15 @@
 //! ∂²φ/∂q̈_e∂q_d = ⟨S_e, A₂⟩                  ∂²φ/∂q̈_d∂q_e = ⟨W_e, C⟩
 //! ```
 //!
-//! For two columns of one joint, B₁ and C are as above, and ∂²φ/∂q̇_d∂q̇_e = −⟨S_e, D S_d⟩. ∂²φ/∂q_d∂q_e is the mean of
-//! the line above and the same line with d and e exchanged, because q ⊕ δ is an exponential of δ. So it costs as much
-//! as a few first derivatives, O(n · depth), whereas the tensors have n³ entries.
+//! For two columns d and e of the same joint, the formulas with B₁ and C do not change, and ∂²φ/∂q̇_d∂q̇_e is −⟨S_e, D
+//! S_d⟩. ∂²φ/∂q_d∂q_e is the mean of the formula above and the same formula with d and e exchanged, because q ⊕ δ is an
+//! exponential of δ. The contracted second derivatives cost as much as a few first derivatives, O(n · depth), whereas
+//! the tensors of second derivatives have n³ entries.
 //!
 //! Sources: Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and implementation*
 //! (2024), for the tensors; Nganga and Wensing, *Accelerating second-order differential dynamic programming for
-//! rigid-body systems* (2021), for the contracted form. The sums above are the sums of the first paper, contracted
-//! before they are expanded.
+//! rigid-body systems* (2021), for the contracted form. The sums above are the sums of the first paper, but are
+//! contracted with λ before they are expanded.
 
 use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
@@ -42,15 +44,15 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the second derivatives of φ, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// w, the bodies' velocity for λ. Written by: `pass`.
+        /// Velocity w of each body when the joints move with velocity λ. Written by: `pass`.
         pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// W = w_λ × S. Written by: `pass`.
+        /// W = w_λ × S of each column S, with the velocity w_λ of the parent. Written by: `pass`.
         pub W: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// P and D. Written by: `pass`.
+        /// Momentum P = Σ I w and rate of inertia D, over all bodies that a joint carries. Written by: `pass`.
         pub PD: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Q; only its angular part is nonzero. Written by: `pass`.
+        /// Angular part of Q = Σ 2Bᵀ w; the linear part is zero. Written by: `pass`.
         pub Q: Array<Vec3<S>> = filled(Vec3::zero, size.bodies),
         /// ∂²φ/∂q∂q. Written by: `pass`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -63,7 +65,8 @@ workspace! {
     }
 }
 
-/// Runs the whole algorithm, after `rnea_derivatives::pass`, whose sums over carried bodies it reads.
+/// Computes all second derivatives of φ = λᵀ τ except the armature of free joints. Reads the sums over carried bodies
+/// that `rnea_derivatives::pass` has computed.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -141,7 +144,7 @@ fn pass<L: Pairs>(
 }
 
 kernel! {
-    /// Computes the Hessian, after `rnea_derivatives::pass`.
+    /// Computes all second derivatives of φ = λᵀ τ. Runs after `rnea_derivatives::pass`.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,

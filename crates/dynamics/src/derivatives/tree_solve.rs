@@ -1,8 +1,9 @@
-//! Products −M⁻¹ B without M⁻¹, which on long chains are faster than a product with M⁻¹.
+//! Products −M⁻¹ B that do not need M⁻¹. On long chains they are faster than a product with M⁻¹.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity, with
-//! the columns of B as efforts. It works in the world's frame with the factors of the articulated bodies. Each column
-//! of B costs O(n), whereas the product costs O(n) for each entry. Several columns are processed together.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity. The
+//! efforts are the columns of B. The algorithm works in the world's frame with the factors of the articulated-body
+//! algorithm. Each column of B costs O(n), whereas each entry of a product with M⁻¹ costs O(n). Several columns of B
+//! are processed together.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
@@ -15,33 +16,33 @@ use condyle_spatial::{Array, Scalar, same_layout};
 /// Number of columns of B that are processed together.
 const SIDE: usize = 16;
 
-/// Number of columns of B that are processed together, for a scalar with lanes.
+/// Number of columns of B that are processed together if the scalar has lanes.
 const SIDE_OF_LANES: usize = 2;
 
-/// Chain of columns: each column except the last has exactly one child, the next column. A path stores its sums in a
-/// slot. The last path attached to it reuses this slot.
+/// Path of joint columns in the tree: each column except the last has exactly one child, the next column. A path stores
+/// its bias force and its acceleration in a slot. The last path that is attached to it reuses this slot.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     start: usize,
-    /// One past the index of its last column.
+    /// Index of the path's last column, plus 1.
     end: usize,
-    /// Slot of the path to which it is attached, and its own slot.
+    /// Slot of the path to which this path is attached (`from`), and slot of this path (`place`).
     from: usize,
     place: usize,
-    /// Whether no path is attached to it.
+    /// Whether no other path is attached to this path.
     tip: bool,
 }
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
-    /// Paths of the tree; empty if this method is not used. Written by: `new`.
+    /// Paths of the tree. Empty if M⁻¹ B is not computed by these paths. Written by: `new`.
     paths: Vec<Path>,
-    /// Efforts, then accelerations. Shape: columns × `SIDE`. Written by: `minus_solve`.
+    /// Joint efforts, then joint accelerations. Shape: columns × `SIDE`. Written by: `minus_solve`.
     pub x: Array<S>,
-    /// Bias forces. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
+    /// Bias force of each slot. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
     pub P: Array<S>,
-    /// Accelerations. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
+    /// Spatial acceleration of each slot. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
     pub A: Array<S>,
 }
 
@@ -76,7 +77,7 @@ fn paths(columns: &[Column]) -> Vec<Path> {
     paths
 }
 
-/// Computes X = −M⁻¹ B for each of two square matrices B, after `aba::factorize`.
+/// Computes X = −M⁻¹ B for each of two square matrices B. Runs after `aba::factorize`.
 #[inline(always)]
 pub(crate) fn minus_solve<S: Scalar>(
     w: &World<S>,
@@ -123,7 +124,7 @@ fn by_sides<S: Scalar, const N: usize>(
     }
 }
 
-/// Replaces efforts by accelerations.
+/// Replaces the joint efforts `x` by the joint accelerations that they cause.
 #[inline(always)]
 fn sweep<S: Scalar, const N: usize>(
     paths: &[Path],

@@ -1,18 +1,19 @@
-//! Articulated piece of a robot with two handles: the body to which the piece is attached, and the piece's last body.
+//! Piece of a robot with two handles. The upper handle is the body to which the piece is attached; the lower handle is
+//! the last body of the piece.
 //!
-//! Source: Featherstone (1999), part 1, describes an articulated body with two handles by its inverse inertias, so that
-//! forces determine accelerations. Here the upper handle is described by the acceleration a of the body to which the
-//! piece's first joint is attached. The lower handle is described by the force f that acts on it:
+//! Source: Featherstone (1999), part 1, describes an articulated body with two handles by inverse inertias, so that
+//! forces determine accelerations. Here the inputs are the acceleration a of the upper handle and the force f on the
+//! lower handle. The outputs are the force f' at the upper handle and the acceleration a' of the lower handle:
 //!
 //! ```text
 //! f' = K a + p − Lᵀ f      force through the joint above: K and p are Iᵃ and pᵃ of the articulated-body algorithm
 //! a' = L a + b + Y f       acceleration of the body below
 //! ```
 //!
-//! This needs only the inverses of the articulated-body algorithm and no inverse of an inertia, so bodies may be
-//! massless. (In scattering theory, Redheffer's star product joins two such pieces.) If the second piece is attached to
-//! the last body of the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f). For the second
-//! piece, the first one is a joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
+//! These relations need only the inverses of the articulated-body algorithm and no inverse of an inertia, so bodies may
+//! be massless. (In scattering theory, Redheffer's star product joins two such pieces.) If piece 2 is attached to the
+//! last body of piece 1, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f). For piece 2, piece 1 acts
+//! like a joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric matrix G = E Y₁,
 //!
 //! ```text
 //! a₂ = N a + e + G L₂ᵀ f,      N = E L₁,              e = E (b₁ − Y₁ p₂)
@@ -20,27 +21,28 @@
 //! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
 //! ```
 //!
-//! 1 + Y₁ K₂ has no eigenvalue below 1, because Y₁ and K₂ have no negative eigenvalues. It is eliminated without making
-//! it symmetric. A square root of Y₁ would make it symmetric, but the rank of Y₁ is only the number of its piece's
-//! degrees of freedom. Rounding errors of pivots that should be zero would then spoil the result.
+//! 1 + Y₁ K₂ has no eigenvalue below 1, because Y₁ and K₂ have no negative eigenvalues. The matrix is eliminated in
+//! this form, which is not symmetric. A square root of Y₁ would make it symmetric, but the rank of Y₁ is at most the
+//! number of degrees of freedom of piece 1. Then some pivots of the square root should be zero, and their rounding
+//! errors would spoil the result.
 //!
-//! Each handle is described at its own origin, along the world's axes. So the rotations and translations in Y have the
-//! size of the piece, not of its distance from the world's origin.
+//! Forces and accelerations of a handle are expressed at the handle's own origin, along the world's axes. So the
+//! lengths in Y are lengths within the piece, not distances from the world's origin.
 
 use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// 6 × 6 matrix, stored by columns, each with its linear part first.
+/// 6 × 6 matrix, stored by columns. The linear part of each column comes first.
 type Matrix<S> = [[S; 6]; 6];
 
-/// Width of the matrix [1 + Y₁ K₂, L₁, b₁ − Y₁ p₂, Y₁].
+/// Number of columns of the matrix [1 + Y₁ K₂, L₁, b₁ − Y₁ p₂, Y₁], which is eliminated when two pieces are joined.
 const WIDTH: usize = 6 + 6 + 1 + 6;
 
-/// Piece between two handles.
+/// Relation between the two handles of a piece.
 #[derive(Clone, Debug)]
 pub(crate) struct ArticulatedPair<S> {
     /// Pose of the lower body in the frame of the upper body.
     pub X: Se3<S>,
-    /// Velocity of the lower body relative to the upper body, in that frame.
+    /// Velocity of the lower body relative to the upper body, in the frame of the upper body.
     pub w: Motion<S>,
     /// Force at the upper handle per acceleration of the upper handle.
     pub K: ArticulatedInertia<S>,
@@ -52,11 +54,11 @@ pub(crate) struct ArticulatedPair<S> {
     Y: Matrix<S>,
     /// Acceleration of the lower handle when the upper handle is at rest.
     b: Motion<S>,
-    /// Acceleration between the two pieces of which it consists, per acceleration of the upper handle.
+    /// Acceleration of the body between the two parts of a joined piece, per acceleration of the upper handle.
     N: Matrix<S>,
-    /// Acceleration between the two pieces, per force between them.
+    /// Acceleration of the body between the two parts of a joined piece, per force on this body.
     G: Matrix<S>,
-    /// Acceleration between the two pieces, when the upper handle is at rest.
+    /// Acceleration of the body between the two parts of a joined piece, when the upper handle is at rest.
     e: Motion<S>,
 }
 
@@ -77,8 +79,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         }
     }
 
-    /// Starts a piece without joints between the handles: Y = 0, b = 0, and L moves the origin to the lower handle, at
-    /// r.
+    /// Starts a piece without joints between the handles: Y = 0, b = 0, and L moves a motion from the origin to the
+    /// point r of the lower handle.
     #[inline(always)]
     pub(crate) fn begin(&mut self, r: Vec3<S>) {
         let skew = r.skew(); // a' = [v + ω × r; ω]
@@ -90,7 +92,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b = Motion::zero();
     }
 
-    /// Adds a degree of freedom above: S, U = Iᴬ S, 1/D, and its acceleration x = u/D when the upper handle is at rest.
+    /// Adds a degree of freedom above the piece, with column S (`axis`), U = Iᴬ S and 1/D. x = u/D is its acceleration
+    /// when the upper handle is at rest.
     #[inline(always)]
     pub(crate) fn extend(&mut self, axis: Motion<S>, U: Force<S>, D_inv: S, x: S) {
         let s = times(&self.L, &axis.to_array()); // s = L S
@@ -108,8 +111,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b += Motion::from(times(&self.L, &c.to_array())); // b ← b + L c
     }
 
-    /// Joins `upper` and `lower`, which is attached to the last body of `upper`. L, b and Y are computed only if it is
-    /// `open`.
+    /// Joins `upper` and `lower`; `lower` is attached to the last body of `upper`. L, b and Y are computed only if the
+    /// joined piece is `open`.
     #[inline(always)]
     pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
         let (L1, Y1, K2, p2) = (&upper.L, &upper.Y, full(lower.K), lower.p);
@@ -151,8 +154,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.G = G;
     }
 
-    /// Returns the acceleration a₂ between the two pieces of which this consists, and the force f₁ on the upper piece
-    /// there.
+    /// Returns the acceleration a₂ of the body between the two parts of this piece, and the force f₁ on the upper part
+    /// at this body.
     #[inline(always)]
     pub(crate) fn between(&self, lower: &Self, a: Motion<S>, f: Option<Force<S>>) -> (Motion<S>, Force<S>) {
         let mut a2 = self.e + Motion::from(times(&self.N, &a.to_array()));
@@ -166,8 +169,8 @@ impl<S: Scalar> ArticulatedPair<S> {
     }
 }
 
-/// Converts the rows of [A, B] to the rows of [·, A⁻¹ B], by Gaussian elimination with the largest pivot of the
-/// remaining rows.
+/// Replaces B by A⁻¹ B in the rows of [A, B], by Gaussian elimination. The pivot of a step is the largest entry of its
+/// column in the remaining rows.
 #[inline(always)]
 fn eliminate<S: Scalar>(rows: &mut [[S; WIDTH]; 6]) {
     for k in 0..6 {
@@ -216,7 +219,7 @@ fn identity<S: Scalar>() -> Matrix<S> {
     one
 }
 
-/// Computes y += x s.
+/// Computes y += x s for a number s.
 #[inline(always)]
 fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
     for i in 0..6 {
@@ -268,7 +271,7 @@ fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     product(&T, B)
 }
 
-/// Returns an articulated inertia as a matrix.
+/// Returns the 6 × 6 matrix of an articulated inertia.
 #[inline(always)]
 fn full<S: Scalar>(K: ArticulatedInertia<S>) -> Matrix<S> {
     let (linear, coupling, rotational) = (K.linear.full(), K.coupling, K.rotational.full());
@@ -284,7 +287,7 @@ fn full<S: Scalar>(K: ArticulatedInertia<S>) -> Matrix<S> {
     ]
 }
 
-/// Returns the symmetric part of a matrix.
+/// Returns the symmetric part of a matrix as an articulated inertia.
 #[inline(always)]
 fn symmetric<S: Scalar>(A: &Matrix<S>) -> ArticulatedInertia<S> {
     let half = S::splat(0.5);

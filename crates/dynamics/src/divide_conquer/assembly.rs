@@ -1,69 +1,72 @@
 //! Plan of the divide-and-conquer algorithm: the pieces of a tree of bodies, and the order in which they are assembled.
 //!
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
-//! rigid-body dynamics*, part 2: trees, loops and accuracy (1999), who leaves the choice of the assembly tree open.
+//! rigid-body dynamics*, part 2: trees, loops and accuracy (1999). The paper leaves the choice of the assembly tree
+//! open.
 //!
-//! Here a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983): from each
-//! body the path continues to the child that carries most bodies. A path is cut so that both halves, including the
-//! bodies that they carry, have nearly the same weight. The halves are cut in the same way. The other subtrees attached
-//! to a body are separate paths. So a chain of n bodies has joins nested ⌈log₂ n⌉ deep, and any tree O(log n).
+//! Here a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983). From each
+//! body, a heavy path continues to the child that carries the most bodies. The other children begin separate paths. The
+//! weight of a part of a path is the number of its bodies, plus the number of bodies in the other subtrees attached to
+//! them. A path is cut so that both halves have nearly the same weight, and the halves are cut in the same way. So
+//! joins are nested ⌈log₂ n⌉ deep for a chain of n bodies, and O(log n) deep for any tree.
 //!
-//! No cut is made below a body whose own inertia would not resist its joint, such as a massless body. The piece above
-//! such a cut could not be solved separately.
+//! No cut is made directly below a body whose own inertia does not resist the motion of its joint, such as a massless
+//! body. The piece above such a cut could not be solved separately.
 
 use alloc::vec::Vec;
 use condyle_model::{Body, Model};
 use condyle_spatial::{Act, ArticulatedInertia, Se3, Vec3};
 
 /// Minimum inertia along a degree of freedom, as a fraction of the body's mass (kg) and rotational inertia (kg m²). A
-/// joint with less inertia counts as having none.
+/// joint with less inertia counts as a joint without inertia.
 const FREE: f64 = 1e-9;
 
-/// Parent index in a piece's links that denotes the handle above the piece.
+/// Value of [`Link::parent`] for a body that is attached to the handle above its piece.
 pub(crate) const HANDLE: usize = usize::MAX;
 
 /// Kind of a piece, which determines how it is assembled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Bodies that are connected with each other or with the body above, eliminated one after the other.
+    /// Bodies that are eliminated one after the other. Each is attached to another body of the run or to the body above
+    /// the run.
     Run,
-    /// One body, and the following piece, which assembles the subtrees attached to it.
+    /// One body, and the next piece in the list. The next piece assembles the subtrees that are attached to this body.
     Hub,
-    /// Join of the following piece and the piece after it, which is attached below.
+    /// Join of the next two pieces in the list. The second is attached to the last body of the first.
     Join,
-    /// Sum of the following piece and the piece after it, both attached to the same body.
+    /// Sum of the next two pieces in the list. Both are attached to the same body.
     Gather,
 }
 
-/// Piece of the tree. Its parts and its bodies follow it.
+/// Piece of the tree. In the list of pieces, the parts of a piece follow the piece.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     pub kind: Kind,
-    /// Whether another piece is attached to its last body, so that it has two handles.
+    /// Whether another piece is attached to the last body of this piece. Then this piece has two handles.
     pub open: bool,
-    /// Number of its bodies.
+    /// Number of bodies in this piece.
     pub links: usize,
-    /// Number of degrees of freedom of their joints.
+    /// Number of degrees of freedom of the joints in this piece.
     pub dofs: usize,
-    /// Number of pieces of which it consists, including itself.
+    /// Number of pieces in this piece: its parts, the parts of its parts and so on, and the piece itself.
     pub pieces: usize,
-    /// Number of pieces on the longest path from it to a run, including itself.
+    /// Number of pieces on the longest path from this piece to a run, including both.
     depth: usize,
 }
 
-/// Body in the order of the pieces.
+/// Body of a piece.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub body: usize,
-    /// Index of the first of its degrees of freedom, counted from the piece's first.
+    /// Index of the body's first degree of freedom among the degrees of freedom of the piece.
     pub dof: usize,
-    /// Index of its parent in the run, or [`HANDLE`].
+    /// Index of the body's parent among the bodies of the run, or [`HANDLE`].
     pub parent: usize,
-    /// Whether it is on the path from the upper handle to the lower one.
+    /// Whether the body is on the path from the upper handle to the lower handle of the piece.
     pub spine: bool,
 }
 
-/// Cost of an assembly, in counts.
+/// Numbers of bodies, pieces and levels in an assembly, which determine its cost.
 ///
 /// ```
 /// use condyle_dynamics::{AssemblySize, DivideConquer, robots};
@@ -72,21 +75,21 @@ pub(crate) struct Link {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssemblySize {
-    /// Number of moving bodies; each is eliminated once.
+    /// Number of moving bodies. Each body is eliminated once.
     pub bodies: usize,
-    /// Number of pieces within which bodies are eliminated one after the other.
+    /// Number of runs: pieces within which bodies are eliminated one after the other.
     pub runs: usize,
-    /// Number of bodies in the largest of these pieces.
+    /// Number of bodies in the largest run.
     pub longest_run: usize,
-    /// Number of pairs of pieces that are joined, one below the other.
+    /// Number of joins of two pieces, of which the second is attached to the last body of the first.
     pub joins: usize,
-    /// Number of pairs of pieces that are added, both on one body.
+    /// Number of sums of two pieces that are attached to the same body.
     pub gathers: usize,
-    /// Number of pieces that must be assembled one after the other, from a run to the whole.
+    /// Number of pieces on the longest path from a run to the whole robot; they must be assembled one after the other.
     pub depth: usize,
 }
 
-/// All pieces, beginning with the whole.
+/// All pieces of a robot. The first piece is the whole robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Assembly {
     pub pieces: Vec<Piece>,
@@ -94,7 +97,7 @@ pub(crate) struct Assembly {
 }
 
 impl Assembly {
-    /// Plans the pieces of a model. Runs have at most `grain` bodies, or more where no cut can be made.
+    /// Plans the pieces of a model. A run has at most `grain` bodies, but more if no cut is allowed in it.
     pub(crate) fn new<R>(model: &Model<R>, grain: usize) -> Self {
         let bodies = model.bodies().len();
         let mut children = vec![Vec::new(); bodies];
@@ -133,7 +136,7 @@ impl Assembly {
 
 struct Planner {
     children: Vec<Vec<usize>>,
-    /// Number of bodies that each body carries, including itself.
+    /// Number of bodies that each body carries, including the body itself.
     weight: Vec<usize>,
     nv: Vec<usize>,
     /// Whether the body's own inertia resists each degree of freedom of its joint.
@@ -144,7 +147,7 @@ struct Planner {
 }
 
 impl Planner {
-    /// Adds a piece with the parts that `parts` appends.
+    /// Adds a piece, and then the bodies and pieces that `parts` appends.
     fn piece(&mut self, kind: Kind, open: bool, parts: impl FnOnce(&mut Self)) {
         let (at, first) = (self.pieces.len(), self.links.len());
         self.pieces.push(Piece { kind, open, links: 0, dofs: 0, pieces: 0, depth: 0 });
@@ -155,7 +158,7 @@ impl Planner {
         self.pieces[at] = Piece { kind, open, links: links.len(), dofs, pieces: self.pieces.len() - at, depth };
     }
 
-    /// Adds the subtrees attached to one body.
+    /// Adds the pieces of all subtrees with the given roots. The roots are attached to the same body.
     fn gather(&mut self, roots: &[usize]) {
         let weights: Vec<usize> = roots.iter().map(|&i| self.weight[i]).collect();
         if weights.iter().sum::<usize>() <= self.grain {
@@ -172,7 +175,7 @@ impl Planner {
         }
     }
 
-    /// Adds a part of a heavy path.
+    /// Adds the pieces of a part of a heavy path.
     fn path(&mut self, path: &[usize], open: bool) {
         let heavy = |i: usize| self.children[i].first().map_or(0, |&child| self.weight[child]);
         let weights: Vec<usize> = path.iter().map(|&i| self.weight[i] - heavy(i)).collect();
@@ -195,7 +198,8 @@ impl Planner {
         }
     }
 
-    /// Adds all bodies that the roots carry, except the heaviest child of the spine's last body, if there is a spine.
+    /// Adds all bodies that the roots carry to a run. If there is a spine, the subtree of the heaviest child of the
+    /// spine's last body is left out.
     fn run(&mut self, roots: &[usize], spine: &[usize]) {
         let first = self.links.len();
         let mut stack: Vec<(usize, usize)> = roots.iter().rev().map(|&i| (i, HANDLE)).collect();
@@ -210,8 +214,8 @@ impl Planner {
     }
 }
 
-/// Returns the best cut of a row of weights, if a cut is allowed: the heavier part is as light as possible. Both parts
-/// have at least one weight.
+/// Returns the best allowed cut of a list of weights, or `None` if no cut is allowed. With the best cut, the heavier
+/// part is as light as possible. Both parts have at least one weight.
 fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> {
     let total: usize = weights.iter().sum();
     let (mut left, mut best) = (0, None);
@@ -225,7 +229,8 @@ fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> 
     best.map(|(_, cut)| cut)
 }
 
-/// Returns whether each D of the body's joint is positive for the body alone, in the body's frame, where S is constant.
+/// Returns whether the inertia of the body alone resists each degree of freedom of its joint: all D are greater than
+/// zero. D is computed in the body's frame, where S is constant.
 fn firm(body: &Body) -> bool {
     let inertia = Se3::new(body.joint.axis_rotation(), Vec3::zero()).act_inv(body.inertia);
     let rotational = inertia.rotational;

@@ -1,9 +1,10 @@
-//! Ties between joints that share a coordinate (mimic). The accelerations of the robot follow from the accelerations
-//! that it would have if all of its joints were free.
+//! Ties between joints that share a coordinate (mimic joints and their leaders). First the accelerations of the free
+//! robot are computed, in which all joints move independently. The accelerations of the tied robot follow from them.
 //!
-//! Let Z be the joints that share coordinates. G maps the shared coordinates y to Z (1 for a leader, the ratio for a
-//! mimic joint). Let w be the efforts at Z that tie the joints, and σ a rotor that each of them has in the free robot
-//! only. M_σ is the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ, and a its accelerations without w. Then:
+//! Let Z be the joints that share coordinates. G maps the shared coordinates y to positions of the joints Z (1 for a
+//! leader, the ratio for a mimic joint). Let w be the efforts at the joints Z that tie the joints. In the free robot
+//! only, each joint of Z has a rotor with inertia σ. Let M_σ be the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ,
+//! and a the accelerations of the free robot without w. Then:
 //!
 //! ```text
 //! a_Z + A w = G ÿ                          joints that share a coordinate move with it
@@ -12,10 +13,10 @@
 //! q̈ = a + (M_σ⁻¹)_Z w,    w = A⁻¹ (G ÿ − a_Z)
 //! ```
 //!
-//! The columns of M_σ⁻¹ are the accelerations, at rest and without gravity, for a unit effort at one joint of Z. With
-//! the rotors, M_σ is regular wherever M of the tied robot is: a motion that M_σ does not resist has no velocity in Z,
-//! so M would not resist it either. Without rotors M_σ may be singular, because a mimic joint may have no inertia of
-//! its own.
+//! The columns of (M_σ⁻¹)_Z are the accelerations of the free robot, at rest and without gravity, for a unit effort at
+//! one joint of Z. With the rotors, M_σ is regular if M of the tied robot is regular: a motion that M_σ does not resist
+//! has no velocity in Z, so M would not resist this motion either. Without rotors M_σ may be singular, because the
+//! bodies that a mimic joint moves may have no inertia.
 
 use crate::calls::inertia::crba;
 use crate::data::Data;
@@ -30,40 +31,41 @@ use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, rngs::StdRng};
 
-/// Joint that shares its coordinate with others.
+/// Joint that shares its coordinate with other joints.
 #[derive(Clone, Debug)]
 struct Member {
     body: usize,
-    /// Index of its degree of freedom, in the order of the assembly.
+    /// Index of the joint's degree of freedom, in the order of the assembly.
     dof: usize,
-    /// Index of its shared coordinate.
+    /// Index of the joint's coordinate among the shared coordinates.
     shared: usize,
 }
 
-/// Shared coordinates of a robot, and quantities that tie the joints that share them.
+/// Joints that share coordinates, and the quantities that tie these joints.
 #[derive(Clone, Debug)]
 pub(crate) struct Ties<S> {
-    /// Joints Z, in the order of the assembly.
+    /// Joints Z that share coordinates, in the order of the assembly.
     members: Vec<Member>,
-    /// σ. Shape: Z. Written by: `choose_rotors`.
+    /// Inertias σ of the rotors. Shape: Z. Written by: `choose_rotors`.
     rotors: Vec<S>,
-    /// G. Shape: Z × y. Written by: `prepare`.
+    /// Matrix G of the ratios. Shape: Z × y. Written by: `prepare`.
     G: DMatrix<S>,
-    /// a. Shape: degrees of freedom. Written by: `keep_free` and `solve`.
+    /// Accelerations a of the free robot, then accelerations of the tied robot. Shape: degrees of freedom. Written by:
+    /// `keep_free` and `solve`.
     free: Vec<S>,
-    /// (M_σ⁻¹)_Z, stored by columns. Shape: degrees of freedom × Z. Written by: `keep_response`.
+    /// Columns (M_σ⁻¹)_Z of the inverse inertia matrix. Shape: degrees of freedom × Z. Written by: `keep_response`.
     response: DMatrix<S>,
-    /// A. Shape: Z × Z. Written by: `solve`.
+    /// Matrix A = (M_σ⁻¹)_ZZ. Shape: Z × Z. Written by: `solve`.
     A: DMatrix<S>,
-    /// A⁻¹ G. Shape: Z × y. Written by: `solve`.
+    /// Matrix A⁻¹ G. Shape: Z × y. Written by: `solve`.
     X: DMatrix<S>,
-    /// Gᵀ A⁻¹ G − Gᵀ σ G. Shape: y × y. Written by: `solve`.
+    /// Matrix Gᵀ A⁻¹ G − Gᵀ σ G. Shape: y × y. Written by: `solve`.
     H: DMatrix<S>,
     factor_A: Cholesky<S>,
     factor_H: Cholesky<S>,
-    /// ÿ. Shape: y. Written by: `solve`.
+    /// Accelerations ÿ of the shared coordinates. Shape: y. Written by: `solve`.
     ydd: Vec<S>,
-    /// G ÿ − a_Z, then w. Shape: Z. Written by: `solve`.
+    /// G ÿ − a_Z, then the tying efforts w. Shape: Z. Written by: `solve`.
     w: Vec<S>,
 }
 
@@ -101,8 +103,8 @@ impl<S: Scalar> Ties<S> {
         ties
     }
 
-    /// Chooses rotors with about the same inertia as the bodies that they turn, so that rounding hides neither. Gᵀ σ G
-    /// is the diagonal of M at a random position.
+    /// Chooses rotors with about the same inertia as the bodies that the joints move, so that rounding errors hide
+    /// neither inertia. Gᵀ σ G is the diagonal of M at a random position.
     fn choose_rotors<R: Constant<S>>(&mut self, model: &Model<R>, shared: &[usize]) {
         if shared.is_empty() {
             return;
@@ -118,7 +120,7 @@ impl<S: Scalar> Ties<S> {
         }
     }
 
-    /// Reads the ratios of the mimic joints.
+    /// Copies the ratios of the mimic joints to G.
     pub(crate) fn prepare<R>(&mut self, model: &Model<R>) {
         for (z, member) in self.members.iter().enumerate() {
             let ratio = model.nodes()[member.body].mimic.map_or(1.0, |mimic| mimic.ratio);
@@ -131,12 +133,12 @@ impl<S: Scalar> Ties<S> {
         self.members.len()
     }
 
-    /// Returns the index of one of these joints among the degrees of freedom.
+    /// Returns the index of joint z of Z among the degrees of freedom.
     pub(crate) fn dof(&self, z: usize) -> usize {
         self.members[z].dof
     }
 
-    /// Adds the rotors to the joints.
+    /// Adds the rotors' inertias σ to the degrees of freedom of the joints Z.
     pub(crate) fn add_rotors(&self, dofs: &mut [Dof<S>]) {
         for (member, &rotor) in self.members.iter().zip(&self.rotors) {
             dofs[member.dof].rotor += rotor;
@@ -148,7 +150,7 @@ impl<S: Scalar> Ties<S> {
         self.free.iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
     }
 
-    /// Stores the accelerations for a unit effort at one of the joints.
+    /// Stores the accelerations for a unit effort at joint z of Z.
     pub(crate) fn keep_response(&mut self, z: usize, dofs: &[Dof<S>]) {
         self.response.column_mut(z).iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
     }
@@ -191,7 +193,7 @@ impl<S: Scalar> Ties<S> {
         }
         free.iter().zip(&mut *dofs).for_each(|(&a, dof)| dof.qdd = a);
         for (k, member) in members.iter().enumerate() {
-            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // satisfies the ties exactly
+            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // so that the ties hold exactly
         }
     }
 }

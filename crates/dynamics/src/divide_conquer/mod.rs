@@ -3,11 +3,12 @@
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
 //! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999).
 //!
-//! The robot is cut in two at a joint, then each half again (`assembly.rs`). Two pieces that are known at their handles
-//! combine into one such piece (`articulated_pair.rs`). From the whole, the accelerations and forces at the cuts are
-//! computed, down to each joint. Positions and velocities are found in the same way, so no pass waits for a chain of
-//! bodies. All joints may have armature and any number of degrees of freedom. Joints that share a coordinate are first
-//! treated as free, and are tied afterwards (`mimic.rs`).
+//! The robot is cut in two at a joint, and each half is cut again (`assembly.rs`). A piece is described only by forces
+//! and accelerations at its handles, and two such pieces are joined to one such piece (`articulated_pair.rs`). When the
+//! whole robot is assembled, the accelerations and forces at the cuts are computed, from the first cut down to each
+//! joint. Positions and velocities are computed in the same way, so no pass waits for a chain of bodies. All joints may
+//! have armature and any number of degrees of freedom. Joints that share a coordinate are first treated as free and
+//! then tied (`mimic.rs`).
 
 mod articulated_pair;
 pub(crate) mod assembly;
@@ -27,18 +28,19 @@ use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Motion, Scalar, Se3, Vec3};
 
-/// Forward dynamics by divide and conquer: the plan for one model, and its scratch.
+/// Forward dynamics by divide and conquer: the plan of the assembly for one model, and the scratch of the algorithm.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
 /// depth of ⌈log₂ n⌉ + 1 for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
-/// of a body. A body of a run between two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with
-/// few processors the runs must be long (n divided by the number of threads). On two threads this is faster than `aba`
-/// from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). If joints share
-/// coordinates (mimic), the passes run once with all joints free, and once more for each of those joints.
+/// of a body. A body in a run with two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with few
+/// processors the runs must be long (n divided by the number of threads). On two threads, divide and conquer is faster
+/// than `aba` from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). If joints share
+/// coordinates (mimic), the passes run once with all joints free, and once more for each joint that shares a
+/// coordinate.
 ///
-/// Runs in the rayon pool in which it is called, otherwise in the global pool. The bits do not depend on the number of
-/// threads. [`new`](Self::new) allocates all memory, except what rayon allocates. Source: Featherstone (1999), parts 1
-/// and 2.
+/// Runs in the rayon pool of the calling thread, or in the global pool if the calling thread is in no pool. The bits of
+/// the results do not depend on the number of threads. [`new`](Self::new) allocates all memory, except what rayon
+/// allocates. Source: Featherstone (1999), parts 1 and 2.
 ///
 /// ```
 /// use condyle_dynamics::{Data, DivideConquer, aba, robots};
@@ -52,17 +54,17 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// ```
 #[derive(Clone, Debug)]
 pub struct DivideConquer<S> {
-    /// Hash of the robot for which it was planned.
+    /// Geometry hash of the model for which the assembly was planned.
     geometry: u64,
     assembly: Assembly,
     /// Bodies in the order of the assembly. Shape: moving bodies.
     bodies: Vec<Body<S>>,
     /// Degrees of freedom in the order of the assembly. Shape: degrees of freedom of all joints.
     dofs: Vec<Dof<S>>,
-    /// Pieces between their handles. Shape: pieces. Written by: `relate`, `assemble`.
+    /// Relation between the handles of each piece. Shape: pieces. Written by: `relate`, `assemble`.
     handles: Vec<ArticulatedPair<S>>,
     ties: Ties<S>,
-    /// Zeros, never overwritten. Shape: nv.
+    /// Zeros that are never overwritten. Shape: nv.
     zero: Vec<S>,
     /// Joint accelerations. Shape: nv. Written by: `aba`.
     qdd: Vec<S>,
@@ -102,7 +104,7 @@ impl<S: Scalar> DivideConquer<S> {
         }
     }
 
-    /// Returns the cost of the assembly, and its depth, the number of pieces that must be computed one after the other.
+    /// Returns the numbers of bodies, pieces and levels in the assembly, which determine its cost.
     pub fn size(&self) -> AssemblySize {
         self.assembly.size()
     }
@@ -110,9 +112,9 @@ impl<S: Scalar> DivideConquer<S> {
     /// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), as [`aba`](crate::aba()) does up to rounding, in O(n) work
     /// and O(log n + grain) steps.
     ///
-    /// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame, or empty for none. Returns nv numbers.
-    /// Allocates nothing, except what rayon allocates. If z joints share coordinates (mimic), it takes 1 + z times the
-    /// work and steps, and O(n z + z³) for the ties.
+    /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body in the frame of the body, or an empty slice
+    /// for no forces. Returns nv numbers. Allocates nothing, except what rayon allocates. If z joints share coordinates
+    /// (mimic), the passes take 1 + z times the work and steps, and the ties take O(n z + z³).
     ///
     /// # Panics
     /// If an argument has the wrong length, M is singular ([`Model::singular_joints`]), or `model` has joints or frames
@@ -159,19 +161,20 @@ impl<S: Scalar> DivideConquer<S> {
     }
 }
 
-/// Arguments of a call.
+/// Arguments of one run of all passes.
 struct Job<'d, L: Layout> {
     l: &'d L,
     q: &'d [L::S],
     qd: &'d [L::S],
     f_ext: &'d [Force<L::S>],
-    /// Acceleration of the world.
+    /// Acceleration of the world: −g for gravity g, or 0 without gravity.
     world: Motion<L::S>,
     parallel: bool,
 }
 
 impl<L: Layout + Sync> Job<'_, L> {
-    /// Runs the whole algorithm. The degrees of freedom must have their efforts and armature.
+    /// Computes the accelerations of all degrees of freedom, with ties. The efforts and armatures in `all.dofs` must be
+    /// set.
     fn run(&self, mut all: Part<'_, L::S>, ties: &mut Ties<L::S>, zero: &[L::S]) {
         ties.add_rotors(all.dofs);
         self.passes(all.again());
@@ -202,7 +205,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         self.accelerate(all, self.world, None);
     }
 
-    /// Runs two halves of the work, concurrently if threads are available.
+    /// Runs two closures, concurrently if `parallel` is set.
     #[inline(always)]
     fn both(&self, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
         if self.parallel {
@@ -213,8 +216,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Computes the placements of bodies relative to their parents. For an open piece, also computes the placement of
-    /// its last body relative to the body above the piece.
+    /// Computes the placements of bodies relative to their parents. For an open piece, also computes the placement and
+    /// velocity of the piece's last body relative to the body above the piece.
     fn relate(&self, part: Part<'_, L::S>) {
         let (piece, rest) = part.open();
         let (handle, open) = (piece.handle, piece.open);
@@ -249,8 +252,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Computes the placements of a piece in the world and reduces the piece to its handles. The pose and velocity of
-    /// the body to which it is attached are given.
+    /// Computes the placements of the bodies of a piece and the relation between the handles of the piece. oX and v are
+    /// the pose and velocity of the body to which the piece is attached.
     fn assemble(&self, part: Part<'_, L::S>, oX: Se3<L::S>, v: Motion<L::S>) {
         let (piece, mut rest) = part.open();
         let handle = piece.handle;
@@ -301,7 +304,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Computes pose, velocity, inertia and bias force of a body whose parent has pose oX and velocity v.
+    /// Computes the pose, velocity, inertia and bias force of a body. oX and v are the pose and velocity of its parent.
     #[inline(always)]
     fn place(&self, link: Link, body: &mut Body<L::S>, dofs: &mut [Dof<L::S>], oX: Se3<L::S>, v: Motion<L::S>) {
         let (l, i) = (self.l, link.body);
@@ -321,8 +324,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Eliminates the joint of a body and returns Iᵃ and pᵃ. On the spine, also updates the relation between the
-    /// handles.
+    /// Eliminates the joint of a body and returns the articulated inertia Iᵃ and bias force pᵃ for the parent. For a
+    /// body on the spine, also updates the relation between the handles.
     #[inline(always)]
     fn eliminate(
         &self,
@@ -350,8 +353,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         (Ia, pa + Ia * body.c) // pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
     }
 
-    /// Computes the accelerations within a piece from the acceleration of the body above it and the force on its last
-    /// body.
+    /// Computes the accelerations within a piece. a is the acceleration of the body above the piece, and f is the force
+    /// on the last body of the piece.
     fn accelerate(&self, part: Part<'_, L::S>, a: Motion<L::S>, f: Option<Force<L::S>>) {
         let l = self.l;
         let (piece, rest) = part.open();

@@ -1,50 +1,51 @@
-//! Scratch of the divide-and-conquer algorithm, in the order of the assembly. So a piece is a slice of the scratch, and
-//! two pieces are two slices, which two threads can use.
+//! Scratch of the divide-and-conquer algorithm, in the order of the assembly. So each piece uses its own slice of the
+//! scratch, and two threads can compute two pieces at the same time.
 
 use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Kind, Link, Piece};
 use condyle_spatial::{ArticulatedInertia, Force, Motion, Se3};
 
-/// Quantities of a body, along the world's axes, at the origin of the piece.
+/// Quantities of a body, along the world's axes, about a reference point that all bodies of the piece share.
 #[derive(Clone, Debug)]
 pub(crate) struct Body<S> {
-    /// λXi. Written by: `relate`.
+    /// Pose λXi of the body in its parent. Written by: `relate`.
     pub X: Se3<S>,
-    /// oXi. Written by: `place`.
+    /// Pose oXi of the body. Written by: `place`.
     pub oX: Se3<S>,
     /// Velocity. Written by: `place`.
     pub v: Motion<S>,
-    /// v × v_J. Written by: `place`.
+    /// v × v_J, with v_J the velocity of the joint. Written by: `place`.
     pub c: Motion<S>,
-    /// Iᴬ. Written by: `place`, and while its children are eliminated.
+    /// Articulated inertia Iᴬ. Written by: `place`; the elimination of each child adds to it.
     pub IA: ArticulatedInertia<S>,
-    /// pᴬ. Written by: `place`, and while its children are eliminated.
+    /// Articulated bias force pᴬ. Written by: `place`; the elimination of each child adds to it.
     pub pA: Force<S>,
     /// Acceleration. Written by: `accelerate`.
     pub a: Motion<S>,
 }
 
-/// Quantities of a degree of freedom, along the world's axes, at the origin of the piece.
+/// Quantities of a degree of freedom, along the world's axes, about a reference point that all bodies of the piece
+/// share.
 #[derive(Clone, Debug)]
 pub(crate) struct Dof<S> {
     /// Effort. Written by: `aba` and `run`.
     pub tau: S,
-    /// Armature; in a robot whose joints are treated as free, plus the rotor of `mimic.rs`. Written by: `aba` and
+    /// Armature. For joints that share a coordinate, plus the inertia of the rotor of `mimic.rs`. Written by: `aba` and
     /// `add_rotors`.
     pub rotor: S,
-    /// S. Written by: `place`.
+    /// Joint column S. Written by: `place`.
     pub S: Motion<S>,
-    /// U = Iᴬ S. Written by: `eliminate`.
+    /// U = Iᴬ S, with the articulated inertia Iᴬ. Written by: `eliminate`.
     pub U: Force<S>,
-    /// 1/D, D = Sᵀ U + armature. Written by: `eliminate`.
+    /// 1/D, where D = Sᵀ U + armature. Written by: `eliminate`.
     pub D_inv: S,
-    /// τ − Sᵀ pᴬ. Written by: `eliminate`.
+    /// τ − Sᵀ pᴬ, with the bias force pᴬ. Written by: `eliminate`, `accelerate`.
     pub u: S,
     /// Joint acceleration. Written by: `accelerate`.
     pub qdd: S,
 }
 
-/// Piece with all pieces of which it consists.
+/// Scratch of a piece, including all pieces inside this piece.
 pub(crate) struct Part<'d, S> {
     pub pieces: &'d [Piece],
     pub links: &'d [Link],
@@ -54,14 +55,14 @@ pub(crate) struct Part<'d, S> {
 }
 
 impl<'d, S> Part<'d, S> {
-    /// Borrows the same memory again, for a shorter time.
+    /// Reborrows the same memory for a shorter lifetime.
     #[inline(always)]
     pub(crate) fn again(&mut self) -> Part<'_, S> {
         let Self { pieces, links, bodies, dofs, handles } = self;
         Part { pieces, links, bodies, dofs, handles }
     }
 
-    /// Returns the piece itself, and all pieces of which it consists.
+    /// Splits the scratch into the scratch of the outermost piece alone and the scratch of the pieces inside it.
     #[inline(always)]
     pub(crate) fn open(self) -> (Own<'d, S>, Self) {
         let Piece { kind, open, .. } = self.pieces[0];
@@ -76,7 +77,8 @@ impl<'d, S> Part<'d, S> {
         (own, Self { pieces: &self.pieces[1..], links: &self.links[n..], bodies: bodies.1, dofs: dofs.1, handles })
     }
 
-    /// Splits off the first piece, with all pieces of which it consists, from the other pieces.
+    /// Splits the scratch into the scratch of the first piece, including all pieces inside it, and the scratch of the
+    /// other pieces.
     #[inline(always)]
     pub(crate) fn split(self) -> (Self, Self) {
         let Piece { links: n, dofs, pieces, .. } = self.pieces[0];
@@ -90,7 +92,7 @@ impl<'d, S> Part<'d, S> {
     }
 }
 
-/// Piece without the pieces of which it consists.
+/// Scratch of a piece, without the pieces inside this piece.
 pub(crate) struct Own<'d, S> {
     pub kind: Kind,
     pub open: bool,

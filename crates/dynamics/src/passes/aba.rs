@@ -1,10 +1,11 @@
 //! Forward dynamics by the articulated-body algorithm.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. Everything is in the world's frame, so
-//! children are added to their parent without a change of coordinates. A joint of several degrees of freedom is treated
-//! as a chain of joints of one, between massless bodies. Its columns are eliminated one by one, the last one first, so
-//! no matrix is inverted. The critical dot products, Sᵀ U towards the root and Uᵀ a' on the way back, are summed in two
-//! independent halves.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. All quantities are in the world's frame,
+//! so a child's inertia and force are added to its parent's without a change of coordinates. A joint with several
+//! degrees of freedom is treated as a chain of joints with one degree of freedom, between massless bodies. The columns
+//! of such a joint are eliminated one by one, the last one first, so no matrix is inverted. Each pass waits for its dot
+//! products: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. So the linear and the angular half of such a
+//! product are computed independently.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};
@@ -14,32 +15,33 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch of the articulated-body algorithm, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// Articulated inertia. Written by: `factorize`, `inward`.
+        /// Articulated inertia of each body. Written by: `factorize`, `inward`.
         pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.body_depth),
-        /// U = Iᴬ S of each column. Written by: `factorize`, `inward`.
+        /// U = Iᴬ S of each column S, with the articulated inertia Iᴬ. Written by: `factorize`, `inward`.
         pub U: Array<Force<S>> = filled(Force::zero, size.columns),
-        /// 1/D, D = Sᵀ U + armature. Written by: `factorize`, `inward`.
+        /// 1/D of each column, where D = Sᵀ U + armature. Written by: `factorize`, `inward`.
         pub D_inv: Array<S> = filled(S::zero, size.columns),
-        /// Velocity; the world's velocity stays 0. Written by: `inward`.
+        /// Velocity of each body; the world's velocity stays 0. Written by: `inward`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
-        /// Acceleration, including gravity as the world's acceleration. Written by: `outward`.
+        /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `outward`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
-        /// v × v_J. Written by: `inward`.
+        /// v × v_J of each body, with v_J the velocity of its joint. Written by: `inward`.
         pub c: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Articulated bias force. Written by: `inward`.
+        /// Articulated bias force pᴬ of each body. Written by: `inward`.
         pub pA: Array<Force<S>> = filled(Force::zero, size.body_depth),
-        /// τ − Sᵀ pᴬ. Written by: `inward`.
+        /// τ − Sᵀ pᴬ of each column, with the bias force pᴬ. Written by: `inward`.
         pub u: Array<S> = filled(S::zero, size.columns),
         /// Joint accelerations. Written by: `outward`, `forward_dynamics`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
-        /// τ without the bias of free joints with armature. Written by: `aba`.
+        /// Joint efforts τ minus the bias efforts of free joints with armature. Written by: `aba`.
         pub effort: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Eliminates the degrees of freedom of joint i. Returns Iᵃ, the part of Iᴬ that acts on the parent.
+/// Eliminates the degrees of freedom of joint i. Returns Iᵃ, the part of the articulated inertia Iᴬ that acts on the
+/// parent.
 #[inline(always)]
 fn eliminate<L: Layout>(
     l: &L,
@@ -61,7 +63,7 @@ fn eliminate<L: Layout>(
     Ia
 }
 
-/// Computes U and D⁻¹ of all columns, which depend only on q, for bodies whose placements are known.
+/// Computes U = Iᴬ S and 1/D for all columns S of bodies whose placements are known. U and D depend only on q.
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;
@@ -75,7 +77,7 @@ pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::
     }
 }
 
-/// Runs the whole algorithm.
+/// Runs the articulated-body algorithm: the inward pass, then the outward pass.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -89,7 +91,7 @@ pub(crate) fn pass<L: Layout>(
     outward(l, w, d);
 }
 
-/// Computes the articulated inertia and bias force of each joint, going down and up each branch in turn.
+/// Computes the articulated inertia and bias force of each body, branch by branch, to the tip of the branch and back.
 #[inline(always)]
 pub(crate) fn inward<L: Layout>(
     l: &L,
@@ -136,7 +138,7 @@ pub(crate) fn inward<L: Layout>(
     }
 }
 
-/// Computes the accelerations from the root to the tips.
+/// Computes the accelerations of bodies and joints, from the root to the tips.
 #[inline(always)]
 pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { U, D_inv, a, c, u, qdd, .. } = d;
@@ -158,7 +160,7 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
 }
 
 kernel! {
-    /// Runs the algorithm body by body, for bodies whose placements are known.
+    /// Runs the articulated-body algorithm body by body. The placements of the bodies must be known.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -172,7 +174,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes only the factors, for bodies whose placements are known.
+    /// Computes only the factors U and 1/D, for bodies whose placements are known.
     pub(crate) fn factors<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         factorize(&Single::new(model), world, d);
     }

@@ -1,7 +1,8 @@
-//! All terms of the equations of motion, from one pass to the tips and one back.
+//! All terms of the equations of motion, computed in one pass to the tips and one pass back to the root.
 //!
-//! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects share four
-//! quantities: the placements, the velocities, the bodies' inertias in the world's frame, and the columns Iᶜ S.
+//! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects need the same four
+//! quantities: the placements, the velocities, the bodies' inertias in the world's frame, and the columns Iᶜ S
+//! (composite inertia times joint column).
 
 use crate::passes::answers::answers;
 use crate::passes::centroidal::{self, CentroidalMapRate};
@@ -18,11 +19,13 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame. The workspaces of kinematics and of the centroidal map hold the rest.
+    /// Quantities in the world's frame. Other intermediate results are in the workspaces of kinematics and of the
+    /// centroidal map.
     pub(crate) struct Workspace<S>(size) {
-        /// Acceleration for q̈ = 0, including gravity as the world's acceleration. Written by: `pass`.
+        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
+        /// `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Force through the joint for q̈ = 0. Written by: `pass`.
+        /// Force that each joint transmits for q̈ = 0. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// M. Written by: `pass`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -36,7 +39,8 @@ workspace! {
     }
 }
 
-/// Runs the whole algorithm, for bodies whose velocities are known.
+/// Computes M, h, the kinetic energy of the bodies and the columns of the centroidal map. The velocities of the bodies
+/// must be known.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -91,20 +95,21 @@ fn pass<L: Pairs>(
 /// Results of [`compute_all_terms`](crate::compute_all_terms()).
 #[derive(Clone, Copy, Debug)]
 pub struct AllTerms<'d, S, R = f64> {
-    /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
+    /// Queries for the placements and velocities of bodies and frames, and for the Jacobians J and dJ/dt of bodies and
+    /// frames.
     pub kinematics: Velocities<'d, S, R>,
-    /// M(q), the full symmetric nv × nv matrix, as returned by [`crba`](crate::crba).
+    /// Inertia matrix M(q), the full symmetric nv × nv matrix, as returned by [`crba`](crate::crba).
     pub M: &'d Matrix<S>,
-    /// h(q, v), nv numbers (N m, N), as returned by [`nonlinear_effects`](crate::nonlinear_effects).
+    /// Bias efforts h(q, v), nv numbers (N m, N), as returned by [`nonlinear_effects`](crate::nonlinear_effects).
     pub h: &'d [S],
-    /// Momentum, its map and the map's rate, centre of mass and its Jacobian, as returned by
-    /// [`centroidal_map_rate`](crate::centroidal_map_rate).
+    /// Centroidal momentum hg, its map Ag, the rate dAg/dt, the centre of mass and the Jacobian of the centre of mass,
+    /// as returned by [`centroidal_map_rate`](crate::centroidal_map_rate).
     pub centroidal: CentroidalMapRate<'d, S>,
-    /// T = ½ vᵀ M v (J).
+    /// Kinetic energy T = ½ vᵀ M v (J).
     pub kinetic_energy: S,
-    /// V = −m gᵀ c (J).
+    /// Potential energy V = −m gᵀ c (J), with the total mass m and its centre c.
     pub potential_energy: S,
-    /// Accelerations of the bodies for q̈ = 0, including gravity as the world's acceleration.
+    /// Accelerations of the bodies for q̈ = 0. The world's acceleration is −g, which includes gravity.
     pub(crate) a: &'d [Motion<S>],
 }
 
@@ -133,9 +138,9 @@ impl<'d, S, R> AllTerms<'d, S, R> {
 }
 
 answers! {
-    /// Returns the drift J̇ v of a frame along the world's axes, in O(1): p̈ of its origin and ω̇ at q̈ = 0 (m/s²,
-    /// rad/s²). With J of [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's
-    /// classical acceleration.
+    /// Returns the drift J̇ v of a frame along the world's axes, in O(1). The drift is p̈ of the frame's origin and ω̇
+    /// of the frame, both for q̈ = 0 (m/s², rad/s²). With the Jacobian J in
+    /// [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.
     ///
     /// ```
     /// use condyle_dynamics::ReferenceFrame::LocalWorldAligned;
@@ -150,7 +155,7 @@ answers! {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     fn frame_drift(of: AllTerms, frame: usize) -> Motion = Motion::zero(); {
         let reference = ReferenceFrame::LocalWorldAligned;
         let origin = reference.pose(of.kinematics.frame(frame));
@@ -161,7 +166,7 @@ answers! {
 }
 
 kernel! {
-    /// Runs the algorithm for bodies whose velocities are known.
+    /// Computes all terms, for bodies whose velocities are known.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,

@@ -1,13 +1,14 @@
-//! Queries on bodies whose placements are known, with answers of a few numbers.
+//! Macro for queries on bodies whose placements are known. The answer to such a query is a few numbers.
 //!
-//! For a single `f64`, the answer is computed in a kernel with the kernel's fused products. So it has the same bits as
-//! a state in lanes. For other scalars, the answer is computed directly, because such queries already run inside
-//! kernels.
+//! For a single `f64`, the answer is computed in a kernel with the kernel's fused products. So the answer has the same
+//! bits as for a state in lanes. For other scalars, the answer is computed directly, because queries with these scalars
+//! already run inside kernels.
 
 /// One number.
 pub(crate) type Number<S> = S;
 
-/// Defines methods of [`Placements`](crate::Placements) and similar types. Each method is a function of its receiver.
+/// Defines methods of [`Placements`](crate::Placements) and similar types. Each method computes its answer from `self`
+/// and its arguments only.
 macro_rules! answers {
     ($(
         $(#[$doc:meta])*
@@ -39,7 +40,7 @@ macro_rules! answers {
             }
         }
     )*};
-    // An invalid body or frame index is reported at the caller's line.
+    // These arms report an invalid index of a body or frame at the caller's line.
     (@check $of:ident, body $body:ident) => {
         $crate::passes::frames::check_body($of.robot(), $body)
     };

@@ -1,11 +1,12 @@
-//! Momentum of the whole robot about its centre of mass, and the matrices that map velocities to it.
+//! Momentum of the whole robot about its centre of mass, and the matrix that maps joint velocities to this momentum.
 //!
 //! About the world's origin the momentum is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all bodies that
-//! joint k carries. So column k of the map is Iᶜ S, and its rate is İᶜ S + Iᶜ Ṡ. Finally everything is shifted to the
-//! centre of mass.
+//! joint k carries. So column k of the map is Iᶜ_k S_k, and the rate of the column is İᶜ_k S_k + Iᶜ_k Ṡ_k. Finally the
+//! map and its rate are shifted to the centre of mass.
 //!
 //! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved
-//! computation of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
+//! computation of the humanoid centroidal dynamics* (2016). All quantities are along the axes of the world; linear rows
+//! come first.
 
 use crate::passes::answers::answers;
 use crate::passes::coriolis::Coriolis;
@@ -19,19 +20,21 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame about its origin, unless they are marked "about the centre of mass".
+    /// Quantities in the world's frame, about the world's origin unless a field says "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
-        /// Iᶜ; at index 0 the sum over all moving bodies. Written by: `map`, `map_rate`, all terms.
+        /// Composite inertias Iᶜ. Index 0 holds the sum over all moving bodies. Written by: `map`, `map_rate`, all
+        /// terms.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Iᶜ v and İᶜ; at index 0 the sum over all moving bodies. Written by: `map_rate`, all terms.
+        /// Momentum and rate of inertia İᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving
+        /// bodies. Written by: `map_rate`, all terms.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Iᶜ S. Written by: `map`, `map_rate`, all terms.
+        /// Iᶜ S of each column S, with the composite inertia Iᶜ. Written by: `map`, `map_rate`, all terms.
         pub F: Array<Force<S>> = filled(Force::zero, size.columns),
-        /// İᶜ S + Iᶜ Ṡ. Written by: `map_rate`, all terms.
+        /// İᶜ S + Iᶜ Ṡ, the rate of `F`. Written by: `map_rate`, all terms.
         pub dF: Array<Force<S>> = filled(Force::zero, size.columns),
-        /// Ag about the centre of mass. Written by: `shift_map`.
+        /// Centroidal map Ag about the centre of mass. Written by: `shift_map`.
         pub Ag: Matrix<S> = zero_matrix(6, size.nv),
-        /// dAg/dt about the centre of mass. Written by: `shift_rate`.
+        /// Rate dAg/dt of the centroidal map about the centre of mass. Written by: `shift_rate`.
         pub dAg: Matrix<S> = zero_matrix(6, size.nv),
         /// Jacobian of the centre of mass. Written by: `shift_map`.
         pub Jcom: Matrix<S> = zero_matrix(3, size.nv),
@@ -41,7 +44,8 @@ workspace! {
 }
 
 workspace! {
-    /// Quantities of the robot as if it were one body. The last two are written only with the map's rate.
+    /// Quantities of the robot as if it were one body. `hg` and `com_velocity` are written only together with the map's
+    /// rate.
     pub(crate) struct Whole<S>(_size) {
         pub Ig: Inertia<S> = Inertia::zero(),
         pub com: Vec3<S> = Vec3::zero(),
@@ -64,7 +68,7 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// Computes Iᶜ S of all columns, for bodies whose placements are known.
+/// Computes Iᶜ S of all columns S, with the composite inertia Iᶜ, for bodies whose placements are known.
 #[inline(always)]
 fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, F, .. } = d;
@@ -82,7 +86,7 @@ fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     }
 }
 
-/// Computes Iᶜ S and its rate for all columns, for bodies whose velocities are known.
+/// Computes Iᶜ S and its rate for all columns S, with the composite inertia Iᶜ, for bodies whose velocities are known.
 #[inline(always)]
 fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, dF, .. } = d;
@@ -104,7 +108,7 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
     }
 }
 
-/// Adds a column to the column of the coordinate that drives it.
+/// Adds `f`, times the ratio of column c, to the column of the coordinate that drives column c.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usize, f: Force<S>) {
     let column = &model.columns()[c];
@@ -114,13 +118,13 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usi
     }
 }
 
-/// Returns f about the point c: [f; n − c × f].
+/// Returns a force [f; n] about the point c instead of the origin: [f; n − c × f].
 #[inline(always)]
 pub(crate) fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
     Force::new(f.linear, f.angular - c.cross(f.linear))
 }
 
-/// Shifts the map to the centre of mass, after `map` or `map_rate`.
+/// Shifts the centroidal map to the centre of mass. Runs after `map` or `map_rate`.
 #[inline(always)]
 fn shift_map<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let I = d.IC[0];
@@ -140,7 +144,7 @@ fn shift_map<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     d.whole.com = com;
 }
 
-/// Shifts the map and its rate to the centre of mass, after `map_rate`.
+/// Shifts the centroidal map and its rate to the centre of mass. Runs after `map_rate`.
 #[inline(always)]
 pub(crate) fn shift_rate<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let (I, momentum) = (d.IC[0], d.BC[0].momentum);
@@ -157,35 +161,36 @@ pub(crate) fn shift_rate<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     d.whole.com_velocity = com_velocity;
 }
 
-/// Centroidal map and the other parts of hg = Ag(q) v that depend on the position only. The axes are the world's.
+/// Centroidal map Ag of the momentum hg = Ag(q) v, and other centroidal quantities that depend only on the position.
+/// All are along the axes of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMap<'d, S> {
     /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d Matrix<S>,
     /// Inertia of all moving bodies about their centre of mass, as if they were one body.
     pub Ig: Inertia<S>,
-    /// c, the centre of mass in the world's frame (m).
+    /// Centre of mass c in the world's frame (m).
     pub com: Vec3<S>,
-    /// Jacobian of c, 3 × nv: ċ = Jcom v.
+    /// Jacobian of the centre of mass c, 3 × nv: ċ = Jcom v.
     pub Jcom: &'d Matrix<S>,
 }
 
-/// Centroidal momentum hg = Ag(q) v, and the terms of its rate dhg = Ag a + dAg v. The axes are the world's.
+/// Centroidal momentum hg = Ag(q) v, and the terms of its rate dhg = Ag a + dAg v. All are along the axes of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMapRate<'d, S> {
     /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d Matrix<S>,
-    /// dAg/dt, 6 × nv, along the velocity v.
+    /// dAg/dt, 6 × nv: the rate of Ag when the robot moves with velocity v.
     pub dAg: &'d Matrix<S>,
     /// Momentum about the centre of mass (kg m/s, kg m²/s).
     pub hg: Force<S>,
     /// Inertia of all moving bodies about their centre of mass, as if they were one body.
     pub Ig: Inertia<S>,
-    /// c, the centre of mass in the world's frame (m).
+    /// Centre of mass c in the world's frame (m).
     pub com: Vec3<S>,
-    /// ċ, the velocity of the centre of mass (m/s).
+    /// Velocity ċ of the centre of mass (m/s).
     pub com_velocity: Vec3<S>,
-    /// Jacobian of c, 3 × nv: ċ = Jcom v.
+    /// Jacobian of the centre of mass c, 3 × nv: ċ = Jcom v.
     pub Jcom: &'d Matrix<S>,
 }
 
@@ -206,7 +211,7 @@ impl<'d> Rename<CentroidalMapRate<'d, FusedF64>> for CentroidalMapRate<'d, f64> 
 }
 
 kernel! {
-    /// Computes the map, for bodies whose placements are known.
+    /// Computes the centroidal map, for bodies whose placements are known.
     pub(crate) fn run_map<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         map(&Single::new(model), world, d);
         shift_map(model, d);
@@ -214,7 +219,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the map and its rate, for bodies whose velocities are known.
+    /// Computes the centroidal map and its rate, for bodies whose velocities are known.
     pub(crate) fn run_map_rate<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         map_rate(&Single::new(model), world, moving, d);
         shift_rate(model, d);
@@ -237,7 +242,7 @@ answers! {
     }
 
     /// Returns dhg = Σ (I_i a_i + v_i ×* I_i v_i), the rate of the centroidal momentum, along the world's axes (N, N
-    /// m), in O(n). It equals the sum of weight and external forces about the centre of mass.
+    /// m), in O(n). The rate equals the sum of the weight and the external forces, about the centre of mass.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum_rate(of: Accelerations) -> Force = Force::zero(); {

@@ -1,4 +1,4 @@
-//! Centre of mass and its motion, as sums over the moving bodies.
+//! Position, velocity and acceleration of the centre of mass, as sums over the moving bodies.
 //!
 //! In the world's frame, a body has mass m and first moment h = m c about the world's origin:
 //!
@@ -6,8 +6,8 @@
 //! m ċ = m v + ω × h     m c̈ = m a + α × h + ω × (m v + ω × h)
 //! ```
 //!
-//! where (v, ω) and (a, α) are its spatial velocity and acceleration. Bodies fixed to the world are ignored. The
-//! Jacobian is part of [`centroidal_map`](crate::centroidal_map).
+//! where (v, ω) and (a, α) are the spatial velocity and acceleration of the body. Bodies fixed to the world are
+//! ignored. The Jacobian of the centre of mass is a result of [`centroidal_map`](crate::centroidal_map).
 
 use crate::passes::answers::answers;
 use crate::passes::frames::{Accelerations, Placements, Velocities};
@@ -15,14 +15,14 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Scalar, Vec3};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
-    /// Returns m and h = m c of a body, about the world's origin.
+    /// Returns the mass m of a body and its first moment h = m c about the world's origin.
     #[inline(always)]
     fn first_moment(&self, l: &Single<'_, S, R>, i: usize) -> (S, Vec3<S>) {
         let (I, oX) = (l.inertia(i), &self.world.oX[i]);
         (I.mass, oX.translation.scale_add(I.mass, oX.rotation * I.mass_com))
     }
 
-    /// Returns Σ m and Σ m c over the moving bodies.
+    /// Returns the total mass Σ m and the total first moment Σ m c of the moving bodies.
     #[inline(always)]
     pub(crate) fn mass_and_moment(&self) -> (S, Vec3<S>) {
         let l = Single::<S, R>::new(self.model);

@@ -1,16 +1,17 @@
 //! Coriolis matrix.
 //!
 //! Source: Echeandia and Wensing, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for
-//! rigid-body systems* (2021), algorithm 1, in the world's frame. Let Iᶜ and Bᶜ sum over all bodies that the joint of
-//! column d carries, with 2B m = v ×* I m − I (v × m) + m ×* I v. Let e be an earlier column on the path to the root,
-//! or one of the same joint. Then
+//! rigid-body systems* (2021), algorithm 1, in the world's frame. For a body with velocity v and inertia I, the matrix
+//! B is defined by 2B m = v ×* I m − I (v × m) + m ×* I v for all m. Let Iᶜ and Bᶜ be the sums of I and B over all
+//! bodies that the joint of column d carries. Let e be a column of the same joint, or of a joint on its path to the
+//! root. Then
 //!
 //! ```text
 //! C_de = S_dᵀ (Iᶜ Ṡ_e + Bᶜ S_e)     C_ed = S_eᵀ (Iᶜ Ṡ_d + Bᶜ S_d)
 //! ```
 //!
-//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 nonzero numbers, given by the momentum (p, l) = I v
-//! and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
+//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B is determined by the momentum (p, l) = I v and the rate Σ
+//! of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
 use crate::passes::free_armature;
 use crate::passes::kinematics::{Moving, World};
@@ -20,7 +21,7 @@ use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, Vec3, same_layout};
 
-/// Matrix 2B of a body, or summed over all bodies that a joint carries.
+/// Matrix 2B of one body, or the sum of these matrices over all bodies that a joint carries.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Coriolis<S> {
@@ -41,12 +42,13 @@ impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
 }
 
 impl<S: Scalar> Coriolis<S> {
-    /// Returns the terms of a body at rest.
+    /// Returns the matrix 2B of a body at rest, which is zero.
     pub(crate) fn zero() -> Self {
         Self { momentum: Force::zero(), rate: Sym3::zero() }
     }
 
-    /// Returns the terms of a moving body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
+    /// Returns the matrix 2B of a body with velocity (v, ω), first moment h and rotational inertia Ī. The rate of Ī is
+    /// Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
     #[inline(always)]
     pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
         let turning = v.angular.skew() * I.rotational.full();
@@ -68,15 +70,15 @@ impl<S: Scalar> Coriolis<S> {
         }
     }
 
-    /// Returns the angular part of 2Bᵀ m; the linear part is zero.
+    /// Returns the angular part of 2Bᵀ m. The linear part of 2Bᵀ m is zero.
     #[inline(always)]
     pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
         self.rate.mul_add(m.angular, l.cross_add(m.angular, p.cross(m.linear).scale(S::splat(2.0))))
     }
 
-    /// Returns the rate of the inertia, İ m = v ×* I m − I (v × m). Its mass is 0 and its first moment is the linear
-    /// momentum.
+    /// Returns the rate İ of the inertia: İ m = v ×* I m − I (v × m). In the form of an inertia, İ has mass 0, and its
+    /// first moment is the linear momentum.
     #[inline(always)]
     pub(crate) fn inertia_rate(self) -> Inertia<S> {
         Inertia { mass: S::zero(), mass_com: self.momentum.linear, rotational: self.rate }
@@ -84,7 +86,7 @@ impl<S: Scalar> Coriolis<S> {
 }
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the Coriolis matrix, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Iᶜ. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -95,7 +97,7 @@ workspace! {
     }
 }
 
-/// Runs the whole algorithm, for bodies whose velocities are known.
+/// Computes C without the armature of free joints, for bodies whose velocities are known.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let (S, dS, half) = (&w.S, &m.dS, L::S::splat(0.5));
@@ -133,7 +135,7 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// Computes C, for bodies whose velocities are known.
+    /// Computes the Coriolis matrix C, for bodies whose velocities are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         free_armature::add_coriolis(model, &moving.qd, d.C.as_mut_slice());

@@ -1,7 +1,7 @@
 //! Joint-space inertia matrix by the composite-rigid-body algorithm.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2; in the world's frame, where a composite
-//! inertia is a plain sum.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2. All inertias are in the world's frame,
+//! where the composite inertia of several bodies is the sum of their inertias.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace, zero_matrix};
@@ -12,14 +12,15 @@ use condyle_spatial::{Act, Array, Inertia, Matrix};
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// Inertia of the body and all bodies that it carries, in the world's frame. Written by: `pass`.
+        /// Composite inertia in the world's frame: the sum over a body and all bodies that it carries. Written by:
+        /// `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// M. Written by: `pass`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// Runs the whole algorithm, for bodies whose placements are known.
+/// Computes M by the composite-rigid-body algorithm, for bodies whose placements are known.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
     let oX = &w.oX[..];
@@ -29,7 +30,7 @@ pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>],
     carry(l, w, IC, M);
 }
 
-/// Computes M from the inertias IC of the bodies. IC is overwritten with the composite inertias.
+/// Computes M from the inertias `IC` of the bodies, and overwrites `IC` with the composite inertias.
 #[inline(always)]
 pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
     l.clear(M);
@@ -55,7 +56,7 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
 }
 
 kernel! {
-    /// Runs the algorithm body by body, for bodies whose placements are known.
+    /// Computes M body by body, for bodies whose placements are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let Workspace { IC, M } = d;
         pass(&Single::new(model), world, IC, M.as_mut_slice());

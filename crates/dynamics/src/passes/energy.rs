@@ -1,4 +1,4 @@
-//! Kinetic and potential energy, and their derivatives: sums over the moving bodies.
+//! Kinetic and potential energy and the derivatives of both energies, as sums over the moving bodies.
 
 use crate::passes::answers::{Number, answers};
 use crate::passes::frames::{Placements, Velocities};
@@ -10,8 +10,8 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 answers! {
-    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), in O(n). Its
-    /// zero is at the world's origin.
+    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), in O(n). V
+    /// is zero for a mass at the world's origin.
     ///
     /// Allocates nothing.
     fn potential_energy(of: Placements) -> Number = S::zero(); {
@@ -43,8 +43,8 @@ answers! {
         twice * S::splat(0.5)
     }
 
-    /// Returns E = T + V, the mechanical energy (J), in O(n). Its rate is the power of the efforts and the external
-    /// forces.
+    /// Returns E = T + V, the mechanical energy (J), in O(n). The rate of E is the power of the joint efforts and the
+    /// external forces.
     ///
     /// Allocates nothing.
     fn mechanical_energy(of: Velocities) -> Number = S::zero(); {
@@ -63,7 +63,7 @@ pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S
 }
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the derivatives of the energies, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Inertia of all bodies that a joint carries. Written by: `derivatives`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -85,7 +85,7 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Computes the derivatives, for bodies whose velocities are known.
+/// Computes the derivatives of the energies, for bodies whose velocities are known.
 #[inline(always)]
 fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, h, dT_dq, dT_dv, dV_dq } = d;
@@ -102,7 +102,7 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
             let S = S[l.column(i) + k];
             l.add_joint_effort(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
             l.add_joint_effort(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
-            // ∂(m c)/∂q = m S_v + S_ω × m c
+            // ∂(m c)/∂q = m S_v + S_ω × m c is the derivative of the first moment.
             let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com));
             l.add_joint_effort(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
         }
@@ -113,19 +113,19 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
     l.add_armature_torque(&m.qd, dT_dv);
 }
 
-/// Derivatives of the energies, nv numbers each.
+/// Derivatives of the kinetic and potential energy; each has nv numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct EnergyDerivatives<'d, S> {
-    /// ∂T/∂q, with T the kinetic energy.
+    /// ∂T/∂q of the kinetic energy T.
     pub dT_dq: &'d [S],
     /// ∂T/∂v = M v, the generalised momentum.
     pub dT_dv: &'d [S],
-    /// ∂V/∂q = g(q), with V the potential energy.
+    /// ∂V/∂q of the potential energy V: the gravity efforts g(q).
     pub dV_dq: &'d [S],
 }
 
 kernel! {
-    /// Computes the derivatives, for bodies whose velocities are known.
+    /// Computes the derivatives of the energies, for bodies whose velocities are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         derivatives(&Single::new(model), world, moving, d);
     }

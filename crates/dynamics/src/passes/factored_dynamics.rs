@@ -1,4 +1,4 @@
-//! Forward dynamics with a factor of M, and the choice of the method.
+//! Forward dynamics that solves M q̈ = τ − h with a factor of M, and the enum of all methods of forward dynamics.
 
 use crate::selection::SHORT_CHAIN;
 use crate::workspace::{filled, workspace};
@@ -27,12 +27,12 @@ workspace! {
         pub sparse: Ltdl<S> = Ltdl::new(model),
         /// Dense factor of M. Written by: `forward_dynamics`.
         pub dense: Cholesky<S> = Cholesky::new(size.nv),
-        /// Zeros, never overwritten.
+        /// Zeros that are never overwritten.
         pub zero: Array<S> = filled(S::zero, model.nv()),
     }
 }
 
-/// Computes τ − h for a known h.
+/// Computes τ − h for given h.
 #[inline(always)]
 fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
     for k in 0..tau.len() {

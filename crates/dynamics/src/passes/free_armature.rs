@@ -1,38 +1,40 @@
-//! Armature of free joints: an apparent mass without weight, in the axes of the joint's parent.
+//! Armature of free joints: an apparent mass without weight, along the axes of the joint's parent.
 //!
 //! The armature a along the linear coordinates of a free joint resists the acceleration of the body's origin, as in
-//! MuJoCo. This acceleration is in the axes of the parent (for a floating base, the world's). In the body's axes, which
-//! v and ω use, it is v̇ + ω × v. The kinetic energy T = ½ a vᵀ v of this mass gives
+//! MuJoCo. MuJoCo expresses this acceleration along the axes of the parent (for a floating base, the axes of the
+//! world). The velocities v and ω of the joint are along the axes of the body, where the same acceleration is v̇ + ω ×
+//! v. The kinetic energy T = ½ a vᵀ v of this mass gives
 //!
 //! ```text
 //! τ_v = a (v̇ + ω × v)     ∂τ_v/∂v = a ω×     ∂τ_v/∂ω = −a v×
 //! ```
 //!
-//! The first term is on the diagonal of M together with all other armature. This file adds the second term, the bias.
-//! It depends only on the joint's velocity and does no work: v · (ω × v) = 0. Its matrix a ω× is skew, as required by Ṁ
-//! = C + Cᵀ for a constant M. Armature of the angular coordinates gives a ω̇ without a bias.
+//! The diagonal of M contains the first term, a v̇, together with all other armature. This file adds the second term,
+//! the bias a (ω × v). The bias depends only on the joint's velocity and does no work: v · (ω × v) = 0. The matrix a ω×
+//! of the bias is skew, as required by Ṁ = C + Cᵀ for a constant M. Armature of the angular coordinates gives a ω̇
+//! without a bias.
 //!
-//! A model lists these joints ([`free_armature`](Model::free_armature)). If the list is empty, nothing is computed
-//! here. The model checks that the three numbers a are equal. Each row still uses its own number, so that recorded code
-//! can take them as arguments.
+//! [`Model::free_armature`] lists the free joints with armature. If the list is empty, nothing is computed here. The
+//! model checks that the three armatures a of a joint are equal. Each row still uses its own armature, so that recorded
+//! code can take the three armatures as arguments.
 
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar, Vec3, kernel};
 
-/// Returns three consecutive numbers as a vector.
+/// Returns the three numbers of `x` from index `first` on as a vector.
 #[inline(always)]
 fn three<S: Scalar>(x: &[S], first: usize) -> Vec3<S> {
     Vec3::new(x[first], x[first + 1], x[first + 2])
 }
 
-/// Multiplies each component of a vector with its armature.
+/// Multiplies each component of `x` with the armature of its coordinate. The first coordinate is `first`.
 #[inline(always)]
 fn times<S: Scalar, R: Constant<S>>(model: &Model<R>, first: usize, x: Vec3<S>) -> Vec3<S> {
     let a = model.armature();
     Vec3::new(a[first].lift() * x.x, a[first + 1].lift() * x.y, a[first + 2].lift() * x.z)
 }
 
-/// Returns a (ω × v) of the free joint whose first coordinate is `first`.
+/// Returns the bias a (ω × v) of the free joint whose first coordinate is `first`.
 #[inline(always)]
 fn bias<S: Scalar, R: Constant<S>>(model: &Model<R>, first: usize, qd: &[S]) -> [S; 3] {
     times(model, first, three(qd, first + 3).cross(three(qd, first))).to_array() // a (ω × v)
@@ -50,7 +52,8 @@ pub fn add_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], 
     }
 }
 
-/// Subtracts the bias from the efforts. The remaining efforts accelerate the joint.
+/// Subtracts the bias a (ω × v) of each free joint with armature from its efforts. The remaining efforts accelerate the
+/// joint.
 #[doc(hidden)]
 #[inline(always)]
 pub fn subtract_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], tau: &mut [S]) {
@@ -62,8 +65,8 @@ pub fn subtract_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &
     }
 }
 
-/// Multiplies the rows of a 3-row matrix with their armature, and adds its columns to a block of an nv × nv matrix,
-/// stored by columns.
+/// Multiplies the rows of the 3 × 3 matrix `skew` with the armatures of the joint, and adds the product to a block of
+/// an nv × nv matrix. The block begins at row `first` and column `column`. Both matrices are stored by columns.
 #[inline(always)]
 fn add_block<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -80,7 +83,7 @@ fn add_block<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Adds ∂τ/∂v of the bias to an nv × nv matrix, stored by columns.
+/// Adds the derivative of the bias with respect to velocities to ∂τ/∂v, an nv × nv matrix stored by columns.
 #[inline(always)]
 pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], dtau_dv: &mut [S]) {
     for &first in model.free_armature() {
@@ -90,7 +93,8 @@ pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], d
     }
 }
 
-/// Adds the bias to the Coriolis matrix, nv × nv, stored by columns: a ω× in the rows and columns of v.
+/// Adds the bias to the Coriolis matrix C (nv × nv, stored by columns): a ω× in the rows and columns of the linear
+/// velocity v.
 #[inline(always)]
 pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], C: &mut [S]) {
     for &first in model.free_armature() {
@@ -98,8 +102,8 @@ pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]
     }
 }
 
-/// Adds ∂²(λᵀ τ)/∂v∂v of the bias to an nv × nv matrix, stored by columns. With μ = a λ_v, λᵀ τ = μ · (ω × v), so that
-/// ∂²/∂v∂ω = μ× and ∂²/∂ω∂v = −μ×.
+/// Adds the second derivative ∂²(λᵀ τ)/∂v∂v of the bias τ to an nv × nv matrix stored by columns. With μ = a λ_v, λᵀ τ
+/// is μ · (ω × v). So the block ∂²/∂v∂ω is μ×, and the block ∂²/∂ω∂v is −μ×.
 #[inline(always)]
 pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda: &[S], dvdv: &mut [S]) {
     let nv = model.nv();
@@ -116,7 +120,7 @@ pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda:
 }
 
 kernel! {
-    /// Computes the efforts without the bias.
+    /// Computes the efforts `tau` minus the bias of all free joints with armature.
     pub(crate) fn without_bias<S, R>(model: &Model<R>, v: &[S], tau: &[S], effort: &mut [S]) {
         effort.copy_from_slice(tau);
         subtract_armature_bias(model, v, effort);

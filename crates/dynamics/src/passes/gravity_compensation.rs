@@ -1,22 +1,24 @@
-//! Gravity compensation: efforts that carry a part of the weight of some bodies.
+//! Gravity compensation: efforts that carry a fraction of the weight of the bodies that ask for it.
 //!
-//! The force −m g acts at the point c of a body. Its efforts are the gradient of the potential energy of these masses,
-//! like the efforts of gravity. With a₀ = −g, in the frame of body i on the path from the body to the root:
+//! For each such body, a force −m g acts at a point c, where m is the carried mass. The joint efforts of these forces
+//! are the gradient of the potential energy of the carried masses. Let a₀ = −g, and let i be a body on the path to the
+//! root. In the frame of body i:
 //!
 //! ```text
 //! F = [m a₀; m c × a₀]     τ_i = S_iᵀ F     λF = λXi F
 //! ∂τ_d/∂q_e = S_e,ω · ((m S_d,v + S_d,ω × m c) × a₀)     (e on the path from d to the root)
 //! ```
 //!
-//! ∂τ_e/∂q_d is the same number, because both are second derivatives of an energy. So the cost is O(depth) per body,
-//! O(depth²) with derivatives, and no scratch is needed. Source: the weights of `statics.rs`, body by body.
+//! ∂τ_e/∂q_d equals ∂τ_d/∂q_e, because both are second derivatives of an energy. The cost per body is O(depth), and
+//! O(depth²) with derivatives. No scratch is needed. Source: the equations for weights in `statics.rs`, applied to each
+//! body.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
 use condyle_model::{GravityCompensation, Model};
 use condyle_spatial::{Act, Force, Inertia, Mat3, Se3, Vec3};
 
-/// Returns the carried mass in the turned frame of its body, and −g in that frame.
+/// Returns the carried mass and a₀ = −g, both in the turned frame of the compensated body.
 #[inline(always)]
 fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &[L::S]) -> (Inertia<L::S>, Vec3<L::S>) {
     let bRz = model.nodes()[of.body].axis_rotation;
@@ -29,7 +31,7 @@ fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &
     (turned.carried(l.inertia(of.body)), rotation.transpose_mul(l.minus_gravity())) // a₀ = −oRbᵀ g
 }
 
-/// Adds the efforts to tau.
+/// Adds the efforts of gravity compensation to `tau`.
 #[inline(always)]
 pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau: &mut [L::S]) {
     for of in model.gravity_compensation() {
@@ -44,7 +46,7 @@ pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau
     }
 }
 
-/// Adds ∂τ/∂q to an nv × nv matrix.
+/// Adds ∂τ/∂q of gravity compensation to an nv × nv matrix.
 #[inline(always)]
 pub(super) fn add_slopes<L: Pairs, R>(l: &L, model: &Model<R>, q: &[L::S], dtau_dq: &mut [L::S]) {
     let identity = Se3::identity();

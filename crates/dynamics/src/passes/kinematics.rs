@@ -1,5 +1,5 @@
-//! Kinematics: the placements and motions of all bodies, in one pass from the root to the tips. `frames.rs` holds the
-//! queries on the results.
+//! Kinematics: placements, velocities and accelerations of all bodies, each computed in one pass from the root to the
+//! tips. `frames.rs` contains the queries about single bodies and frames.
 
 use crate::workspace::{filled, workspace};
 use condyle_model::Model;
@@ -12,26 +12,28 @@ use condyle_spatial::{Array, Cross, Motion, Se3};
 workspace! {
     /// Quantities that depend on the position only, in the world's frame.
     pub(crate) struct World<S>(size) {
-        /// Sines and cosines of the joints. Written by: `place`, and by `rnea`.
+        /// Sines and cosines of the joint positions. Written by: `place`, and by `rnea`.
         pub sin_cos: JointSinCos<S> = JointSinCos::new(size.bodies),
-        /// oXi, the pose of the body's turned frame in the world. Written by: `place`.
+        /// Pose oXi of each body's turned frame in the world. Written by: `place`.
         pub oX: Array<Se3<S>> = filled(Se3::identity, size.bodies),
-        /// S: motion of the body per unit velocity of each degree of freedom. Written by: `place`.
+        /// Columns S: for each degree of freedom of a joint, the velocity of the joint's body per unit velocity.
+        /// Written by: `place`.
         pub S: Array<Motion<S>> = filled(Motion::zero, size.columns),
     } same {
-        /// Array that holds the placements of the last call. Written by: `place`, by `rnea`, and by limbs.
+        /// Workspace that contains the placements of the last call. Written by: `place`, `rnea`, and the passes over
+        /// limbs.
         pub placed: PlacementCache = PlacementCache::Nowhere,
     }
 }
 
-/// Array that holds the bodies' placements, with the [geometry hash](Model::geometry_hash) of their robot.
+/// Workspace that contains the bodies' placements, and the [geometry hash](Model::geometry_hash) of the robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PlacementCache {
-    /// Placements that were not computed.
+    /// No workspace: the placements were not computed.
     Nowhere,
-    /// Placements of single bodies.
+    /// Workspace of single bodies.
     Bodies(u64),
-    /// Placements in the steps of limbs in parallel lanes.
+    /// Workspace for the steps of limbs in parallel lanes.
     Limbs(u64),
 }
 
@@ -42,7 +44,7 @@ pub(crate) fn place<L: Layout>(l: &L, world: &mut World<L::S>, q: &[L::S]) {
     place_turned(l, world, q);
 }
 
-/// Does as [`place`], for joints whose sines and cosines are known.
+/// Computes oXi and S like [`place`], for joints whose sines and cosines are known.
 #[inline(always)]
 fn place_turned<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
     *placed = PlacementCache::Bodies(l.geometry_hash());
@@ -62,21 +64,21 @@ fn place_turned<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L
 }
 
 workspace! {
-    /// Motions of the bodies, in the world's frame. They depend on the velocity and the acceleration too.
+    /// Velocities and accelerations of the bodies, in the world's frame.
     pub(crate) struct Moving<S>(size) {
-        /// Velocity of the body; the world's velocity stays 0. Written by: `advance`.
+        /// Velocity of each body; the world's velocity stays 0. Written by: `advance`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Ṡ = v × S: rate of each column of S, which turns with its body. Written by: `advance`.
+        /// Rate Ṡ = v × S of each column S, which is fixed in a body with velocity v. Written by: `advance`.
         pub dS: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Velocity coordinates. Written by: `advance`.
+        /// Joint velocities. Written by: `advance`.
         pub qd: Array<S> = filled(S::zero, size.nv),
-        /// Spatial acceleration of the body, without gravity; the world's acceleration stays 0. Written by:
+        /// Spatial acceleration of each body, without gravity; the world's acceleration stays 0. Written by:
         /// `accelerate`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
     }
 }
 
-/// Computes v_i and the columns of Ṡ, for bodies whose placements are known.
+/// Computes the velocity v_i of each body and the rate Ṡ of each column S, for bodies whose placements are known.
 #[inline(always)]
 fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qd: &[L::S]) {
     let Moving { v, dS, .. } = m;
@@ -93,7 +95,7 @@ fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>
     }
 }
 
-/// Computes a_i, for bodies whose velocities are known.
+/// Computes the acceleration a_i of each body, for bodies whose velocities are known.
 #[inline(always)]
 fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qdd: &[L::S]) {
     let Moving { dS, qd, a, .. } = m;
@@ -116,7 +118,7 @@ kernel! {
 }
 
 kernel! {
-    /// Places all bodies. `rnea` has computed the sines and cosines of their joints.
+    /// Computes the placements of all bodies, after `rnea` has computed the sines and cosines of all joints.
     pub(crate) fn positions_after_rnea<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
         place_turned(&Single::new(model), world, q);
     }

@@ -1,10 +1,11 @@
 //! Inverse of the joint-space inertia matrix, by one of three methods ([`InverseMethod`]).
 //!
-//! 1. Short chains: from M by Gauss–Jordan elimination, which needs no pivots if M is positive definite.
-//! 2. Short rows of the sparse factor ([`Ltdl`]): from M by that factor, in O(n d) operations per column.
+//! 1. For short chains: from M by Gauss–Jordan elimination, which needs no search for pivots if M is positive definite.
+//! 2. If the sparse factor ([`Ltdl`]) has short rows: from M by this factor, in O(n d) operations per column for a tree
+//!    of depth d.
 //! 3. Otherwise, without M: Carpentier, *Analytical inverse of the joint space inertia matrix* (2018), in O(n) per
-//!    column. This is the articulated-body algorithm for all unit efforts at once. Only the efforts in the subtree of a
-//!    joint reach that joint. In the world's frame one array of bias forces serves all bodies.
+//!    column. This is the articulated-body algorithm for all unit efforts at once. In the inward pass, a joint needs
+//!    only the efforts in its subtree. In the world's frame, one array of bias forces is enough for all bodies.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
@@ -20,10 +21,11 @@ use condyle_spatial::{Array, Matrix, Scalar};
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Bias force for each unit effort: six rows, one for each component. Shape: 6 × columns. Written by: `sweep`.
+        /// Bias force for each unit effort: one row for each of its six components. Shape: 6 × columns. Written by:
+        /// `sweep`.
         pub P: Array<S> = filled(S::zero, 6 * size.columns),
-        /// Acceleration for each unit effort: zeros for the world, then one block for each depth of the tree. Shape: (1
-        /// + depth) × 6 × columns. Written by: `sweep`.
+        /// Acceleration for each unit effort: a block of zeros for the world, then one block for each depth of the
+        /// tree. Shape: (1 + depth) × 6 × columns. Written by: `sweep`.
         pub A: Array<S> = filled(S::zero, (1 + size.depth) * 6 * size.columns),
         /// M⁻¹. Written by: `minv`.
         pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -32,7 +34,8 @@ workspace! {
     }
 }
 
-/// Computes y −= Σ sᵣ xᵣ entry by entry, for six rows xᵣ of n numbers, starting at column `from`.
+/// Computes y −= Σ sᵣ xᵣ. The six rows xᵣ have n numbers each, and entry 0 of y corresponds to column `from` of the
+/// rows.
 #[inline(always)]
 fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S]) {
     let to = from + y.len();
@@ -45,12 +48,13 @@ fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S
     }
 }
 
-/// Computes M⁻¹ from the factors of `aba::factorize`. Row c is computed for the efforts j ≥ c, then mirrored.
+/// Computes M⁻¹ from the factors of `aba::factorize`. The entries j ≥ c of each row c are computed; the others are
+/// copied by symmetry.
 #[inline(always)]
 fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
     let n = columns.len();
     let Workspace { P, A, Minv, .. } = d;
-    // Row c of M⁻¹ is stored as column c: they are the same, and a column is contiguous.
+    // Row c of M⁻¹ is written as column c, because M⁻¹ is symmetric and its columns are contiguous.
     let rows = Minv.as_mut_slice();
     P.fill(S::zero());
     for c in (0..n).rev() {
@@ -95,7 +99,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes M⁻¹ from the factors of the articulated bodies.
+    /// Computes M⁻¹ from the factors of the articulated-body algorithm.
     pub(crate) fn from_factors<S>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
         sweep(columns, w, f, d);
     }

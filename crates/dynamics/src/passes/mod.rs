@@ -1,7 +1,7 @@
 //! Passes: each file holds one recursion over the bodies.
 //!
 //! A pass depends only on its [`Layout`](condyle_model::layout::Layout) and its workspace. It does not depend on data,
-//! checks, limbs or batches. Its kernels run it on one body after the other.
+//! checks, limbs or batches. The kernels of a pass visit one body after the other.
 
 pub(crate) mod aba;
 pub(crate) mod all_terms;

@@ -4,19 +4,20 @@
 //! τ_k = −(d + d₁ |v_k| + d₂ v_k²) v_k − f tanh(v_k/ε) − (spring of the joint)_k + (gravity compensation)_k
 //! ```
 //!
-//! d and f are the model's [`damping`](Model::damping) and [`friction`](Model::friction) (a URDF's `<dynamics damping
-//! friction>`), d₁ and d₂ its [`damping_polynomial`](Model::damping_polynomial). Springs are in `springs.rs`, gravity
-//! compensation is in `gravity_compensation.rs`. No other algorithm includes these efforts: callers add them to τ.
+//! d is the model's [`damping`](Model::damping), f its [`friction`](Model::friction) (a URDF's `<dynamics damping
+//! friction>`). d₁ and d₂ are its [`damping_polynomial`](Model::damping_polynomial). Springs are in `springs.rs`,
+//! gravity compensation is in `gravity_compensation.rs`. Other algorithms do not include passive efforts: callers add
+//! them to τ.
 //!
-//! Coulomb's law jumps at v = 0. tanh replaces the jump by the slope f/ε. The relative error of the friction is below 1
-//! % from |v| = 2.65 ε on and below 1e-6 from 7.25 ε on. At rest a joint creeps instead of sticking: a load below f
-//! moves it with less than ε artanh(load/f). An explicit integrator needs steps shorter than 2 ε m/f, where m is the
-//! inertia that the joint feels.
+//! Coulomb friction jumps from −f to f at v = 0. tanh replaces this jump by a slope of f/ε. The relative error of the
+//! friction is below 1 % from |v| = 2.65 ε on and below 1e-6 from 7.25 ε on. At rest a joint creeps instead of
+//! sticking: a load below f moves the joint with a speed of at most ε artanh(load/f). An explicit integrator needs
+//! steps shorter than 2 ε m/f, where m is the inertia that the joint feels.
 //!
-//! The losses of a free joint's linear coordinates act along the axes of its parent, as in MuJoCo. With the rotation R
-//! of the joint, u = R v, and the loss L of each component of u, τ = −Rᵀ L(u). Constant damping with three equal
-//! numbers is the same along any axes. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With
-//! A = Rᵀ diag(L′) R
+//! The losses (damping and friction) of a free joint's linear coordinates act along the axes of its parent, as in
+//! MuJoCo. With the rotation R of the joint, the velocity along these axes is u = R v. With the loss L of each
+//! component of u, the effort is τ = −Rᵀ L(u). Constant damping with three equal coefficients is the same along any
+//! axes. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With A = Rᵀ diag(L′) R
 //!
 //! ```text
 //! ∂τ/∂v = −A     ∂τ/∂δ = τ× + A v×
@@ -30,24 +31,26 @@ use condyle_model::layout::Single;
 use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Scalar, Vec3, kernel};
 
-/// Computes the passive efforts of a robot: τ = −d v − f tanh(v/ε) + springs + gravity compensation.
+/// Computes the passive efforts of a robot: τ = −d v − f tanh(v/ε) + springs + gravity compensation, with damping d,
+/// friction f and smoothing ε.
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv (N m, N),
-/// overwritten.
+/// q: nq numbers; v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv
+/// numbers (N m, N), overwritten.
 ///
 /// - Damping and friction dissipate power. Damping may be a polynomial, d = d₀ + d₁ |v| + d₂ v²
 ///   ([`Model::damping_polynomial`]). The error of the smoothed friction is below 1 % from |v| = 2.65 ε on. At rest a
-///   joint creeps instead of sticking: a load below f moves it with less than ε artanh(load/f). An explicit integrator
-///   needs steps shorter than 2 ε m/f, with m the inertia that the joint feels.
-/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ from its rest: with −(k₀ + k₁ Δ + k₂ Δ²) Δ on
-///   a joint of one degree of freedom, with −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on others. For a spherical joint, Δ is a
-///   rotation vector in the body's axes. Free and planar joints have a displacement of the origin and a rotation, each
-///   with its own |Δ|. The spring of a mimic joint acts on its leader's coordinate.
-/// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a part of the weight of bodies:
-///   τ = −Σ Jᵀ m g.
+///   joint creeps instead of sticking: a load below f moves the joint with a speed of at most ε artanh(load/f). An
+///   explicit integrator needs steps shorter than 2 ε m/f, with m the inertia that the joint feels.
+/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ of the joint from the rest of the spring. Its
+///   effort is −(k₀ + k₁ Δ + k₂ Δ²) Δ on a joint with one degree of freedom, and −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on other
+///   joints. For a spherical joint, Δ is a rotation vector along the body's axes. A free or planar joint has two
+///   displacements, a translation of the origin and a rotation, each with its own |Δ|. The spring of a mimic joint acts
+///   on the coordinate of the joint's leader.
+/// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a fraction of the weight of the
+///   bodies that ask for it: τ = −Σ Jᵀ m g, with the carried masses m and the Jacobians J of their centres.
 ///
-/// Costs O(n), and O(depth) for each body whose weight is carried. Allocates nothing. The laws are MuJoCo's
-/// (`mj_passive`).
+/// The cost is O(n), plus O(depth) for each body with gravity compensation. Allocates nothing. The formulas are the
+/// same as in MuJoCo (`mj_passive`).
 ///
 /// ```
 /// use condyle_dynamics::{Joint, JointOptions, ModelBuilder, Inertia, Se3, Sym3, Vec3, WORLD, passive_torque};
@@ -76,9 +79,10 @@ pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &
 
 /// Computes the exact derivatives of [`passive_torque`] with respect to q and v.
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). dtau_dq, in the tangent space, and dtau_dv are nv × nv (N
-/// m/rad, N/m; N m s/rad, N s/m), overwritten. ∂τ/∂v is diagonal, except for free joints with friction or polynomial
-/// damping. ∂τ/∂q has a block for each spring, and couples joints where gravity is compensated. Allocates nothing.
+/// q: nq numbers; v: nv numbers; smoothing: ε > 0 (rad/s, m/s). The results are two nv × nv matrices, which are
+/// overwritten: dtau_dq, in the tangent space (N m/rad, N/m), and dtau_dv (N m s/rad, N s/m). ∂τ/∂v is diagonal, except
+/// for free joints with friction, polynomial damping or three unequal dampings. ∂τ/∂q has a diagonal block for each
+/// spring. Gravity compensation couples the joints on the path to the root. Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{passive_torque_derivatives, robots};
@@ -111,14 +115,14 @@ pub fn passive_torque_derivatives<S: Scalar, R: Constant<S>>(
     slopes(model, q, v, smoothing, dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice());
 }
 
-/// Derivatives of passive efforts, for batches.
+/// Derivatives of passive efforts; the type of a result of a batch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassiveDerivatives<'d, S> {
     pub dtau_dq: &'d Matrix<S>,
     pub dtau_dv: &'d Matrix<S>,
 }
 
-/// Loss of a coordinate: damping, its polynomial, and friction.
+/// Loss of a coordinate: its damping, the polynomial of the damping, and its friction.
 #[derive(Clone, Copy)]
 struct Loss {
     damping: f64,
@@ -134,7 +138,7 @@ impl Loss {
         Self { damping, polynomial: model.damping_polynomial()[k], friction, smoothing }
     }
 
-    /// Returns −(d + d₁ |v| + d₂ v²) v − f tanh(v/ε).
+    /// Returns the effort −(d + d₁ |v| + d₂ v²) v − f tanh(v/ε).
     #[inline(always)]
     fn effort<S: Scalar>(self, v: S) -> S {
         let friction = tanh(v * S::splat(1.0 / self.smoothing)) * S::splat(self.friction);
@@ -146,7 +150,7 @@ impl Loss {
         v.mul_add(-d, -friction)
     }
 
-    /// Returns −d − 2 d₁ |v| − 3 d₂ v² − f/ε (1 − tanh²(v/ε)).
+    /// Returns the derivative of `effort` with respect to v: −d − 2 d₁ |v| − 3 d₂ v² − f/ε (1 − tanh²(v/ε)).
     #[inline(always)]
     fn slope<S: Scalar>(self, v: S) -> S {
         let t = tanh(v * S::splat(1.0 / self.smoothing));
@@ -160,7 +164,7 @@ impl Loss {
     }
 }
 
-/// Returns whether the losses of a free joint differ between the axes of its parent and of its body.
+/// Returns whether it matters that the linear losses of a free joint act along the axes of the parent, not of the body.
 #[inline(always)]
 fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
     let (d, of) = (model.damping(), first..first + 3);
@@ -170,13 +174,14 @@ fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
         || model.damping_polynomial()[of].iter().any(|&polynomial| polynomial != [0.0; 2])
 }
 
-/// Returns the rotation of a free joint, and the velocity of its origin along the axes of the body.
+/// Returns the rotation of a free joint, and the velocity of the body's origin along the axes of the body.
 #[inline(always)]
 fn turn<S: Scalar>(q: &[S], v: &[S]) -> (Mat3<S>, Vec3<S>) {
     (Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(v[0], v[1], v[2]))
 }
 
-/// Returns the loss, or its slope, of each component of u, a free joint's velocity along the axes of its parent.
+/// Returns the effort of the loss of each component of u, or the slope of this effort if `slope` is set. u is a free
+/// joint's velocity along the axes of its parent.
 #[inline(always)]
 fn each<S: Scalar, R>(model: &Model<R>, first: usize, smoothing: f64, u: Vec3<S>, slope: bool) -> Vec3<S> {
     let mut x = u.to_array();
@@ -211,7 +216,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes all slopes as matrices stored by columns.
+    /// Computes ∂τ/∂q and ∂τ/∂v of the passive efforts, as matrices stored by columns.
     pub(crate) fn slopes<S, R>(
         model: &Model<R>,
         q: &[S],
@@ -260,7 +265,7 @@ fn stretched<S: Scalar>(R: Mat3<S>, s: [S; 3], x: Vec3<S>) -> Vec3<S> {
     R.transpose_mul(Vec3::new(s[0] * u.x, s[1] * u.y, s[2] * u.z))
 }
 
-/// Panics unless the smoothing is positive.
+/// Panics unless `smoothing` is positive.
 #[track_caller]
 pub(crate) fn check_smoothing(smoothing: f64) {
     assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");

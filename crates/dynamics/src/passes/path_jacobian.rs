@@ -1,12 +1,13 @@
-//! Jacobian of one frame at one position, which visits only the joints between the frame and the world.
+//! Jacobian of one frame at one position. The computation visits only the joints between the frame and the world.
 //!
-//! From the frame f up to the world, with the pose iXf of f in the frame of body i:
+//! The recursion goes from the frame f to the world. With the pose iXf of f in the frame of body i:
 //!
 //! ```text
 //! J_i = iXf⁻¹ S_i     λXf = λXi(q) iXf     at the world, oXf converts J to other reference frames
 //! ```
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.8 (S in any coordinates) and example 4.1.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.8 (the joint's columns S in any
+//! coordinates) and example 4.1.
 
 use super::frames::ReferenceFrame;
 use condyle_model::Model;
@@ -15,12 +16,12 @@ use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Motion, Scalar, Se3, Vec3, kernel};
 
-/// Number of joints whose sines and cosines are computed at once.
+/// Number of joints whose sines and cosines are computed together.
 const AT_ONCE: usize = 8;
 
 kernel! {
-    /// Computes J of a frame at iXf on a body, in O(depth). The strides are the distance between rows of J, and the
-    /// distance between columns.
+    /// Computes the Jacobian J of a frame on the body `body`, in O(depth). iXf is the pose of the frame in the frame of
+    /// the body. `strides` are the distances in `J` between rows and between columns.
     pub(crate) fn path_jacobian<S, R>(
         model: &Model<R>,
         q: &[S],
@@ -34,7 +35,7 @@ kernel! {
         let l = Single::new(model);
         let (mut i, mut X) = (body, iXf);
         while i > 0 {
-            // Groups of AT_ONCE joints, so that their sines and cosines are computed together.
+            // Joints are visited in groups of AT_ONCE, so that the sines and cosines of a group are computed together.
             let (mut some, mut n) = ([0; AT_ONCE], 0);
             while i > 0 && n < AT_ONCE {
                 some[n] = i;
@@ -62,7 +63,7 @@ kernel! {
             ReferenceFrame::LocalWorldAligned => Se3::new(X.rotation, Vec3::zero()),
         };
         if model.has_mimic() {
-            // Several columns may belong to one coordinate.
+            // With mimic joints, several columns may belong to one coordinate, which must be turned only once.
             for coordinate in 0..model.nv() {
                 act(turn, J, coordinate, strides);
             }
@@ -74,7 +75,7 @@ kernel! {
     }
 }
 
-/// Expresses a column in another frame.
+/// Expresses the column of one coordinate of J in another frame, whose transformation is X.
 #[inline(always)]
 fn act<S: Scalar>(X: Se3<S>, J: &mut [S], coordinate: usize, [down, along]: [usize; 2]) {
     let mut column = [S::zero(); 6];

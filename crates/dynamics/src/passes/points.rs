@@ -1,7 +1,7 @@
 //! Points of bodies and frames: velocities, Jacobians, and forces at points.
 //!
-//! A point is given in the frame of its body, or in a frame on the body, and moves with it. Let p be its position in
-//! the world, and S the columns of the body's joints in the world's frame. Then
+//! A point is given in the frame of its body, or in a frame on the body, and moves with the body. Let p be the position
+//! of the point in the world. Let S be the columns of the joints on the path to the root, in the world's frame. Then
 //!
 //! ```text
 //! ṗ = v + ω × p     J = ∂ṗ/∂v = S_v + S_ω × p
@@ -14,7 +14,8 @@ use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Force, Scalar, Vec3, kernel};
 
 kernel! {
-    /// Computes J of the point of a body that is at p in the world, 3 × nv, stored by columns.
+    /// Computes the Jacobian J of a point of a body, 3 × nv, stored by columns. p is the position of the point in the
+    /// world.
     pub(crate) fn point_jacobian<S, R>(of: Placements<'_, S, R>, body: usize, p: &Vec3<S>, J: &mut [S]) {
         J.fill(S::zero());
         for &c in Single::<S, R>::new(of.model).support(body) {
@@ -32,11 +33,11 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a point of a body, 3 × nv: the point's velocity along the axes of the world is J v
     /// (m/s). Overwrites J.
     ///
-    /// point: in the frame of the body (m). O(depth + nv); allocates nothing. Equation: see
+    /// point: position in the frame of the body (m). Costs O(depth + nv) and allocates nothing. The equation is in
     /// [`frame_point_jacobian`](Self::frame_point_jacobian).
     ///
     /// # Panics
-    /// If there is no such body, or `J` is not 3 × nv.
+    /// If the body does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_jacobian(&self, body: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -46,9 +47,9 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a point of a frame, 3 × nv: the point's velocity along the axes of the world is J v
     /// (m/s). Overwrites J.
     ///
-    /// point: in the frame (m). J = S_v + S_ω × p, with p = oXf · point and S the columns of the joints on the path to
-    /// the root. These are the linear rows of the Jacobian of a frame at the point, in `LocalWorldAligned`. O(depth +
-    /// nv); allocates nothing.
+    /// point: position in the frame (m). J = S_v + S_ω × p, with p = oXf · point and S the columns of the joints on the
+    /// path to the root. J equals the linear rows of the Jacobian, in `LocalWorldAligned`, of a frame whose origin is
+    /// the point. Costs O(depth + nv) and allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Act, Data, Vec3, forward_velocities, robots};
@@ -66,7 +67,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such frame, or `J` is not 3 × nv.
+    /// If the frame does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_jacobian(&self, frame: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -74,12 +75,12 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         point_jacobian(*self, self.model.frames()[frame].body, &p, columns(J, self.model.nv()));
     }
 
-    /// Converts a force at a point of the world to the convention of `f_ext`: in the frame of the body, about its
-    /// origin.
+    /// Converts a force at a point of the world to the convention of `f_ext`: in the frame of the body, about the
+    /// body's origin.
     ///
     /// point: position in the world at which the force acts (m); force: along the axes of the world (N). With the
-    /// body's pose (R, p): f = Rᵀ force, n = Rᵀ ((point − p) × force). For a point in the body's frame, pass
-    /// `body(body).act(point)`.
+    /// body's pose (R, p), the result is f = Rᵀ force and n = Rᵀ ((point − p) × force). If the point is given in the
+    /// body's frame, pass `body(body).act(point)`.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Force, Vec3, forward_kinematics, aba, robots};
@@ -94,7 +95,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force_on_body(&self, body: usize, point: Vec3<S>, force: Vec3<S>) -> Force<S> {
@@ -103,11 +104,11 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// Returns the velocity of a point of a body along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame
-    /// of the body (m).
+    /// Returns the velocity ṗ = v + ω × p of a point of a body, along the axes of the world (m/s). point: position in
+    /// the frame of the body (m).
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_velocity(&self, body: usize, point: Vec3<S>) -> Vec3<S> {
@@ -115,11 +116,11 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
         self.moving.v[body].velocity_at(self.body(body).act(point))
     }
 
-    /// Returns the velocity of a point of a frame along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame
-    /// (m).
+    /// Returns the velocity ṗ = v + ω × p of a point of a frame, along the axes of the world (m/s). point: position in
+    /// the frame (m).
     ///
     /// # Panics
-    /// If there is no such frame.
+    /// If the frame does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_velocity(&self, frame: usize, point: Vec3<S>) -> Vec3<S> {
@@ -128,7 +129,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     }
 }
 
-/// Returns the columns of a point's Jacobian. Panics unless it is 3 × nv.
+/// Returns the entries of a point's Jacobian, column by column. Panics unless the Jacobian is 3 × nv.
 #[inline]
 #[track_caller]
 fn columns<S>(J: &mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &mut [S] {

@@ -1,10 +1,10 @@
 //! Inverse dynamics by the recursive Newton–Euler algorithm.
 //!
-//! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980); in the bodies' own
-//! frames. Compared with Featherstone (*Rigid Body Dynamics Algorithms*, 2008, table 5.1), it uses the classical
-//! acceleration of each origin instead of the spatial one. So no linear velocity is needed. A point r of a body has
-//! acceleration a + K r with K = ω̇× + ω× ω×; this holds for the centre of mass and for the joints on the body. Line by
-//! line:
+//! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980). Quantities of a body
+//! are in the frame of the body. Featherstone (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) uses the spatial
+//! acceleration of each body; this file uses the classical acceleration a of its origin. So no linear velocity is
+//! needed. A point r of a body has the acceleration a + K r with K = ω̇× + ω× ω×. The point may be the centre of mass
+//! or the origin of a joint on the body. Line by line:
 //!
 //! ```text
 //! the book                            here
@@ -18,8 +18,8 @@
 //! ```
 //!
 //! The two loops of the book are merged into one. When the pass has visited the last body of a subtree, it adds the
-//! force of the subtree's root to the parent. The test `the_book_gives_the_same` compares this pass with the book's
-//! form.
+//! force on the subtree's root to the force on its parent. The test `the_book_gives_the_same` compares this pass with
+//! the equations of the book.
 
 use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::{PlacementCache, World};
@@ -32,24 +32,24 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Force, Inertia, Scalar, Se3, Vec3};
 
 workspace! {
-    /// Scratch in the bodies' turned frames.
+    /// Scratch of the recursive Newton–Euler algorithm, in the turned frames of the bodies.
     pub(crate) struct Workspace<S>(size) {
         /// λXi. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.body_depth),
-        /// Angular velocity and acceleration of the body, and acceleration of its origin, with gravity as the world's
-        /// acceleration. Written by: `pass`.
+        /// Angular velocity, angular acceleration and acceleration of the origin of each body. The world's acceleration
+        /// is −g, which includes gravity. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.body_depth),
-        /// Force through the joint. Written by: `pass`.
+        /// Force that each joint transmits. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.body_depth),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
-        /// Zeros, used as accelerations or velocities that are not given. Never overwritten.
+        /// Zeros that stand for accelerations or velocities that the caller does not give. Never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Runs the whole algorithm, going down and up each branch in turn.
+/// Runs the recursive Newton–Euler algorithm, branch by branch, to the tip of the branch and back.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -77,7 +77,7 @@ pub(crate) fn pass<L: Layout>(
         let aJ = Joint::motion(l, i, qdd); // S q̈
         let m = vJ.added_to(aJ, m);
         motion[here] = m;
-        // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
+        // Newton: f = m a + K h. Euler: n = I ω̇ + ω × I ω + h × a. h is the first moment.
         let Inertia { mass, mass_com, rotational } = l.inertia(i);
         let n = mass_com.cross_add(m.a, m.w.cross_add(rotational * m.w, rotational * m.dw));
         let mut fi = Force::new(m.a.scale_add(mass, m.centripetal() * mass_com), n);
@@ -97,7 +97,7 @@ pub(crate) fn pass<L: Layout>(
 }
 
 kernel! {
-    /// Runs the algorithm body by body.
+    /// Computes the joint efforts τ body by body.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &mut World<S>,

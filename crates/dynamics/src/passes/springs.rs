@@ -5,18 +5,19 @@
 //! τ = −g(|Δ|) Δ,   g(r) = k₀ + k₁ r + k₂ r²     ∂τ/∂Δ = −(g 1 + (k₁/r + 2 k₂) Δ Δᵀ)     (others)
 //! ```
 //!
-//! Δ is the displacement of the joint from the rest of its spring. For a joint of one degree of freedom and for a
-//! translation it is q − q₀; an angle of a continuous joint is mapped to (−π, π]. For a spherical joint it is the
-//! rotation vector Δ = log(R₀ᵀ R), with ∂Δ/∂q the group's Jacobian J_log(Δ). A free or planar joint has two
-//! displacements, each with its own r. They are u of the origin, along the axes of the body, and Δ of the rotation:
+//! Δ is the displacement of the joint from the rest position q₀ or R₀ of its spring. For a joint of one degree of
+//! freedom and for a translational joint, Δ = q − q₀; for a continuous joint, this angle is mapped to (−π, π]. For a
+//! spherical joint, Δ is the rotation vector log(R₀ᵀ R), and ∂Δ/∂q is the Jacobian J_log(Δ) of the logarithm. A free or
+//! planar joint has two displacements, each with its own r: u of the origin, along the axes of the body, and Δ of the
+//! rotation:
 //!
 //! ```text
 //! u = Rᵀ (p − p₀),   ∂u/∂(p, θ) = [1, u×]     Δ = log(R₀ᵀ R)
 //! ```
 //!
-//! All of these forces have a potential. The laws are MuJoCo's (`mj_passive`), where k₁ makes the spring of one degree
-//! of freedom stiffer on one side than on the other. The spring of a mimic joint uses the mimic joint's own
-//! displacement, and the layout adds its effort to the leader's coordinate.
+//! All of these forces have a potential. The formulas are the same as in MuJoCo (`mj_passive`): on a joint with one
+//! degree of freedom, k₁ makes the spring stiffer on one side than on the other. The spring of a mimic joint uses the
+//! mimic joint's own displacement, and the layout adds its effort to the leader's coordinate.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
@@ -24,10 +25,10 @@ use condyle_model::{Model, Spring};
 use condyle_spatial::lie::{jlog3, log3};
 use condyle_spatial::{Quaternion, Scalar, Vec3};
 
-/// Minimum of |Δ|² (rad², m²) before its root is taken; avoids a division by 0.
+/// Minimum of |Δ|² (rad², m²) before the square root is taken. It avoids a division by r = 0.
 const LEAST: f64 = 1e-30;
 
-/// Returns the stiffness g at a displacement, and the factor s of Δ Δᵀ in the slope.
+/// Returns the stiffness g at a displacement Δ, and the factor s = k₁/r + 2 k₂ of Δ Δᵀ in the slope.
 #[inline(always)]
 fn stiffness<S: Scalar>([k0, k1, k2]: [f64; 3], displacement: Vec3<S>) -> (S, S) {
     if k1 == 0.0 && k2 == 0.0 {
@@ -39,13 +40,13 @@ fn stiffness<S: Scalar>([k0, k1, k2]: [f64; 3], displacement: Vec3<S>) -> (S, S)
     (g, S::splat(k1) * r.recip() + S::splat(2.0 * k2)) // k₁/r + 2 k₂
 }
 
-/// Returns −g Δ.
+/// Returns the force −g Δ of a spring with stiffness g at the displacement Δ.
 #[inline(always)]
 fn pull<S: Scalar>(k: [f64; 3], displacement: Vec3<S>) -> Vec3<S> {
     displacement.scale(-stiffness(k, displacement).0)
 }
 
-/// Returns −(g 1 + s Δ Δᵀ) x.
+/// Returns −(g 1 + s Δ Δᵀ) x, the derivative of the spring's force along x.
 #[inline(always)]
 fn slope<S: Scalar>(k: [f64; 3], displacement: Vec3<S>, x: Vec3<S>) -> Vec3<S> {
     let (g, s) = stiffness(k, displacement);
@@ -67,7 +68,7 @@ fn rest_of_one<R>(model: &Model<R>, spring: &Spring) -> f64 {
     }
 }
 
-/// Returns the displacement of a joint of one degree of freedom.
+/// Returns the displacement of a joint of one degree of freedom from the rest of its spring.
 #[inline(always)]
 fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L::S]) -> L::S {
     let (i, rest) = (spring.body, rest_of_one(model, spring));
@@ -75,7 +76,7 @@ fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q
     let (node, own) = (&model.nodes()[i], model.bodies()[i].joint);
     let position = l.position(q, i, 0);
     if turns(node.joint) {
-        // The offset of a mimic joint is part of its placement.
+        // The offset of a mimic joint is part of the joint's placement, not of its position.
         let offset = node.mimic.map_or(0.0, |mimic| mimic.offset);
         let (sin0, cos0) = Scalar::sin_cos(rest - offset);
         return angle([position, l.position(q, i, 1)], [L::S::splat(cos0), L::S::splat(sin0)]);
@@ -98,8 +99,8 @@ fn quaternion<S: Scalar>(q: &[S]) -> Quaternion<S> {
     Quaternion::new(q[0], q[1], q[2], q[3])
 }
 
-/// Returns the displacements of a joint of several degrees of freedom, along the axes of the body: u of its origin, Δ
-/// of its rotation.
+/// Returns the two displacements of a joint of several degrees of freedom: u of the origin and Δ of the rotation, along
+/// the axes of the body.
 #[inline(always)]
 fn displacements<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L::S]) -> (Vec3<L::S>, Vec3<L::S>) {
     let (joint, o) = (l.joint(spring.body), L::S::zero());
@@ -124,7 +125,7 @@ fn displacements<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L:
     }
 }
 
-/// Adds the efforts to tau.
+/// Adds the efforts of all springs to `tau`.
 #[inline(always)]
 pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau: &mut [L::S]) {
     for spring in model.springs() {
@@ -143,7 +144,7 @@ pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau
     }
 }
 
-/// Adds ∂τ/∂q to an nv × nv matrix.
+/// Adds ∂τ/∂q of all springs to an nv × nv matrix.
 #[inline(always)]
 pub(super) fn add_slopes<L: Pairs, R>(l: &L, model: &Model<R>, q: &[L::S], dtau_dq: &mut [L::S]) {
     for spring in model.springs() {

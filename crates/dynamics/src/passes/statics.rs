@@ -1,9 +1,9 @@
-//! Efforts that hold a robot still, and their derivatives. Weights and external forces are summed from the tips to the
-//! root.
+//! Efforts that hold a robot still, and the derivatives of these efforts. Weights and external forces are summed from
+//! the tips to the root.
 //!
-//! When coordinate e turns the bodies that its joint carries about S_e, their weights keep their direction, while
-//! external forces turn with the bodies. In the notation of `rnea_derivatives.rs` at rest, with a₀ = −g and Ψ̈ = a₀ ×
-//! S, and F the sum of Iᶜ a₀ − f_ext,
+//! Coordinate e turns all bodies that its joint carries about S_e. The weights of these bodies keep their direction;
+//! external forces turn with the bodies. In the notation of `rnea_derivatives`, for a robot at rest, a₀ = −g and Ψ̈ =
+//! a₀ × S. Iᶜ is the inertia of all bodies that a joint carries, and F the sum of I a₀ − f_ext over these bodies. Then
 //!
 //! ```text
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
@@ -17,9 +17,9 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame.
+    /// Scratch for the efforts that hold a robot still, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// Weight and external force of all bodies that a joint carries. Written by: `pass`.
+        /// Sum of the weights and external forces of all bodies that a joint carries. Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
@@ -30,7 +30,7 @@ workspace! {
     }
 }
 
-/// Runs the whole algorithm, for bodies whose placements are known.
+/// Computes the efforts τ, for bodies whose placements are known.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, tau, .. } = d;
@@ -54,13 +54,13 @@ fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// Computes τ, for bodies whose placements are known.
+    /// Computes the efforts τ that hold a robot still, for bodies whose placements are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
         pass(&Single::new(model), world, d, f_ext);
     }
 }
 
-/// Computes the derivative, for bodies whose placements are known.
+/// Computes ∂τ/∂q of the efforts that hold a robot still, for bodies whose placements are known.
 #[inline(always)]
 fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, IC, dtau_dq, .. } = d;
@@ -98,7 +98,7 @@ fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Worksp
 }
 
 kernel! {
-    /// Computes the derivative, for bodies whose placements are known.
+    /// Computes ∂τ/∂q of the efforts that hold a robot still, for bodies whose placements are known.
     pub(crate) fn run_derivative<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
         derivative(&Single::new(model), world, d, f_ext);
     }

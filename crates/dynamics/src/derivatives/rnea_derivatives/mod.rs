@@ -2,7 +2,7 @@
 //!
 //! Source: Singh, Russell, Wensing, *Efficient analytical derivatives of rigid-body dynamics using spatial vector
 //! algebra* (2022), in the world's frame. When coordinate e of joint j changes, the bodies that joint j carries turn
-//! rigidly about S_e. Their velocities and accelerations also change because the joint's own parent moves:
+//! rigidly about S_e. The velocities and accelerations of these bodies also change because the parent of joint j moves:
 //!
 //! ```text
 //! Ψ̇_e = v_λ × S_e,   Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e          (λ: the parent of joint j)
@@ -10,16 +10,16 @@
 //! ∂v_i/∂q̇_e = S_e,              ∂a_i/∂q̇_e = Ψ̇_e + Ṡ_e + S_e × v_i       (Ṡ_e = v_j × S_e)
 //! ```
 //!
-//! Composite quantities are sums over all bodies that a joint carries: inertia Iᶜ, force F, and the matrix B of 2 B m =
-//! v ×* I m − I (v × m) + m ×* I v. With them, each pair of a column d and an earlier column e on the path to the root
-//! costs a few products:
+//! Composite quantities are sums over all bodies that a joint carries: the inertia Iᶜ, the force F, and the matrix B.
+//! For one body, B is defined by 2 B m = v ×* I m − I (v × m) + m ×* I v. Let d be a column, and e an earlier column on
+//! the path to the root. Then each pair (d, e) costs only a few dot products:
 //!
 //! ```text
 //! ∂τ_d/∂q_e = S_dᵀ (Iᶜ Ψ̈_e + 2B Ψ̇_e)               ∂τ_d/∂q̇_e = S_dᵀ (Iᶜ (Ψ̇_e + Ṡ_e) + 2B S_e)
 //! ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F)     ∂τ_e/∂q̇_d = S_eᵀ (Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d)
 //! ```
 //!
-//! (Iᶜ, B, F belong to d's joint).
+//! Here Iᶜ, B and F are the composite quantities of the joint of column d.
 
 mod vectorized;
 
@@ -39,7 +39,7 @@ workspace! {
     pub(crate) struct Bodies<S>(size) {
         /// Velocity. Written by: `pass`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration, including gravity as the world's acceleration. Written by: `pass`.
+        /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Iᶜ. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -51,9 +51,9 @@ workspace! {
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Ψ̈. Written by: `pass`.
         pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Ψ̇ + Ṡ. Written by: `pass`.
+        /// Sum Ψ̇ + Ṡ of each column. Written by: `pass`.
         pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Parts of each column for `vectorized`. Written by: `pass`.
+        /// Numbers of each column d that all pairs (d, e) need, for `vectorized`. Written by: `pass`.
         pub rows: Rows<S> = Rows::new(size.columns),
     }
 }
@@ -61,11 +61,11 @@ workspace! {
 workspace! {
     pub(crate) struct Workspace<S>(size) {
         pub bodies: Bodies<S> = Bodies::new(size),
-        /// Velocity coordinates. Written by: `run`, `aba_derivatives`, `rnea_derivatives`.
+        /// Joint velocities accelerations. Written by: `run`, `aba_derivatives`, `rnea_derivatives`.
         pub qd: Array<S> = filled(S::zero, size.nv),
         /// Acceleration coordinates that a caller gave. Written by: `rnea_derivatives`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
-        /// Zeros, used as accelerations. Written by: `new`.
+        /// Zeros that are used as joint accelerations. Written by: `new`.
         pub still: Array<S> = filled(S::zero, size.nv),
         /// ∂τ/∂q. Written by: `pass`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -77,7 +77,7 @@ workspace! {
 }
 
 impl<S> Workspace<S> {
-    /// Returns the quantities that `pass` writes: the bodies' quantities, and the three matrices.
+    /// Returns the outputs of `pass`: the quantities of the bodies, and the matrices ∂τ/∂q, ∂τ/∂v and ∂τ/∂a.
     #[inline(always)]
     pub(crate) fn parts(&mut self) -> (&mut Bodies<S>, [&mut [S]; 3]) {
         let Self { bodies, dtau_dq, dtau_dv, dtau_da, .. } = self;
@@ -85,7 +85,8 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Runs the whole algorithm, for bodies whose placements are known.
+/// Computes ∂τ/∂q, ∂τ/∂v and ∂τ/∂a, for bodies whose placements are known. If `by_rows` is set, the pairs of columns of
+/// different joints are left to `vectorized`.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(
     l: &L,
@@ -184,8 +185,8 @@ pub(crate) fn pass<L: Columns>(
 }
 
 kernel! {
-    /// Computes the derivatives for bodies whose placements are known. `world` is the world's acceleration; if it is
-    /// empty, the model's gravity is used.
+    /// Computes the derivatives of inverse dynamics, for bodies whose placements are known. `world` contains the
+    /// world's acceleration; if `world` is empty, the model's gravity is used.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         w: &World<S>,

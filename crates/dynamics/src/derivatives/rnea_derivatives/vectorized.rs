@@ -1,8 +1,8 @@
-//! ∂τ of robots with long branches, four columns at a time.
+//! Derivatives of inverse dynamics for robots with long branches, computed for four columns at a time.
 //!
-//! Source: the pairs of `rnea_derivatives.rs`. The columns d that a column e carries are contiguous, and their parts of
-//! a pair are stored component by component. So four entries of a matrix column are computed at once, with the scalar
-//! operations and bits.
+//! Source: the equations for a pair of columns (d, e) in `rnea_derivatives`. The columns d of all joints that the joint
+//! of column e carries are contiguous. The numbers of the columns d are stored component by component. So four entries
+//! of a column of a matrix are computed at once. Operations and bits are the same as without vectors.
 
 use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
@@ -15,10 +15,11 @@ use core::any::Any;
 /// Number of columns that are processed together.
 const SIDE: usize = 4;
 
-/// Number of values of a column: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
+/// Number of values that are stored for a column: Iᶜ S (6), 2Bᵀ S (3), `by_q` (6) and `by_v` (6).
 const NUMBERS: usize = 6 + 3 + 6 + 6;
 
-/// Part of each column in its pairs with earlier columns. Shape: columns / `SIDE`, rounded up, each `NUMBERS` × `SIDE`.
+/// Values of each column that its pairs with all earlier columns need. Shape: columns / `SIDE`, rounded up, blocks of
+/// `NUMBERS` × `SIDE`.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Rows<S> {
@@ -32,7 +33,7 @@ impl<S: Scalar> Rows<S> {
         Self { sides: filled(|| [[S::zero(); SIDE]; NUMBERS], columns.div_ceil(SIDE)) }
     }
 
-    /// Stores the part of a column.
+    /// Stores the values of one column.
     #[inline(always)]
     pub(crate) fn keep(&mut self, column: usize, IS: Force<S>, BS: Vec3<S>, by_q: Force<S>, by_v: Force<S>) {
         let (side, at) = (&mut self.sides[column / SIDE], column % SIDE);
@@ -46,7 +47,8 @@ impl<S: Scalar> Rows<S> {
     }
 }
 
-/// Computes all pairs of columns of different joints, from the parts stored in `Rows`.
+/// Computes the entries of the derivatives for all pairs of columns of different joints, from the values stored in
+/// `Rows`.
 #[inline(always)]
 pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Workspace<S>) {
     let w = (w as &dyn Any).downcast_ref::<World<FusedF64>>();
@@ -101,13 +103,13 @@ mod vectors {
         }
     }
 
-    /// Returns four vectors whose numbers begin at index k.
+    /// Returns the vectors of four columns, one per lane. The x components are at index k of `side`.
     #[inline(always)]
     fn vector(side: &[[FusedF64; SIDE]; NUMBERS], k: usize) -> Vec3<Four> {
         Vec3::new(Four::from_fused(&side[k]), Four::from_fused(&side[k + 1]), Four::from_fused(&side[k + 2]))
     }
 
-    /// Returns four forces whose numbers begin at index k.
+    /// Returns the forces of four columns, one per lane. The first components are at index k of `side`.
     #[inline(always)]
     fn force(side: &[[FusedF64; SIDE]; NUMBERS], k: usize) -> Force<Four> {
         Force::new(vector(side, k), vector(side, k + 3))
