@@ -24,10 +24,10 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Permission that vectors may be used at their SIMD level.
+/// Marker with which this test may name vector types.
 struct Here;
 
-// SAFETY: `each_level` runs what this processor has.
+// SAFETY: `each_level` only runs SIMD levels that this processor supports.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Here {}
 

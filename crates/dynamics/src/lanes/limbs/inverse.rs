@@ -62,7 +62,8 @@ impl Scratch {
         self.T.len() == plan.columns.support.len() && self.sizes == plan.columns.sizes
     }
 
-    /// Computes M⁻¹ from the results of `aba::factorize` or `aba::pass`.
+    /// Computes M⁻¹ from the results of `aba::factorize` or `aba::pass`. `broadcast` must already have copied `D_inv`
+    /// to the shared columns.
     #[inline(always)]
     pub(crate) fn inverse<V: Block<Number = f64>>(
         &mut self,
