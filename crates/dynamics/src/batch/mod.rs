@@ -157,8 +157,8 @@ impl<T: Real> Batch<T> {
         each!(InLanes, &self.lanes, group => group.threads())
     }
 
-    /// Returns the number of states of the arguments. The first argument whose length per state is not 0 determines it,
-    /// otherwise the forces. If the forces are empty too, it is `full`.
+    /// Returns the number of states of the arguments. The first argument whose length per state is not 0 determines
+    /// this number. Without such an argument, the forces determine it. Without forces, the number is `full`.
     #[track_caller]
     fn count(&self, model: &Model, given: &[Given<'_, T>], full: usize) -> usize {
         let length = |at: usize| [model.nq(), model.nv(), model.nv(), model.nv(), 6 * model.nodes().len()][at];

@@ -53,8 +53,8 @@ pub(super) struct Last {
 }
 
 impl Last {
-    /// Returns the number of states for which the slices have space. The first result that is not empty determines it;
-    /// if all results are empty, it is 0.
+    /// Returns the number of states for which the slices have space. The first result that is not empty determines this
+    /// number. If all results are empty, the number is 0.
     pub(super) fn room<T>(&self, places: &[&mut [T]]) -> usize {
         let first = places.iter().zip(&self.shapes).find(|(_, shape)| shape.len() > 0);
         first.map_or(0, |(place, shape)| place.len() / shape.len())

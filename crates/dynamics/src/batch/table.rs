@@ -172,7 +172,8 @@ macro_rules! batched {
                 }
             }
 
-            /// Computes all states. Results go to the caller's memory `written`, or stay in the batch if it is `None`.
+            /// Computes all states. If `written` is `None`, the results stay in the batch; otherwise they go to the
+            /// caller's memory `written`.
             #[allow(clippy::too_many_arguments)] // as many as the function has
             #[track_caller]
             pub(super) fn compute<T: condyle_spatial::block::Real>(

@@ -4,8 +4,8 @@
 //! u = G λ + b        0 ≤ λ_n ⊥ u_n ≥ 0        ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t/‖u_t‖ where u_t ≠ 0
 //! ```
 //!
-//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity that the points would have without contact; to its normal rows,
-//! terms for the gaps are added. Each point has three rows: two along the ground, then the normal one. Friction follows
+//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity that the points would have without contact, plus terms for the
+//! gaps in the normal rows. Each point has three rows: two along the ground, then the normal one. Friction follows
 //! Coulomb's disc exactly, without a pyramid or a convex relaxation. λ is a solution if and only if it is a fixed point
 //! of
 //!
@@ -64,9 +64,9 @@ pub(super) enum Outcome {
 /// Memory for contacts of up to a given number of points; matrices are stored by columns.
 #[derive(Clone, Debug)]
 pub(super) struct ContactSolver {
-    /// G. Shape: 3m × 3m. Written by: the caller.
+    /// Delassus matrix G. Shape: 3m × 3m. Written by: the caller.
     pub G: Vec<f64>,
-    /// b (m/s). Shape: 3m. Written by: the caller.
+    /// Velocities b for λ = 0, with the terms of the gaps (m/s). Shape: 3m. Written by: the caller.
     pub b: Vec<f64>,
     /// Impulses λ (N s): the first guess, then the solution. Shape: 3m.
     pub impulses: Vec<f64>,

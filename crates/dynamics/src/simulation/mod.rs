@@ -230,7 +230,7 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
 
     /// Sets the position to q, the velocity to v and the time to 0. Allocates nothing.
     ///
-    /// q: nq numbers; v: nv. The numbers are checked only for `f64`.
+    /// q: nq numbers; v: nv numbers. The numbers are checked only for `f64`.
     ///
     /// # Errors
     /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not have

@@ -49,7 +49,7 @@ workspace! {
         minus_y: Array<S> = filled(S::zero, size.nv),
         x: Array<S> = filled(S::zero, size.nv),
         minus_x: Array<S> = filled(S::zero, size.nv),
-        /// f = ∂L/∂q + τ. Written by: `evaluate`.
+        /// Force f = ∂L/∂q + τ at the midpoint. Written by: `evaluate`.
         f: Array<S> = filled(S::zero, size.nv),
         /// Passive efforts of the joints, and slopes of these efforts with respect to q and v. Written by: `evaluate`.
         passive: Array<S> = filled(S::zero, size.nv),

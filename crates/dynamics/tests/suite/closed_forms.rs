@@ -48,8 +48,8 @@ fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     builder.build().unwrap()
 }
 
-/// A planar arm with two links has these equations. Source: Spong, Hutchinson, Vidyasagar, *Robot Modeling and Control*
-/// (2006), section 7.3.2.
+/// The dynamics of a planar arm with two links equal the equations in Spong, Hutchinson, Vidyasagar, *Robot Modeling
+/// and Control* (2006), section 7.3.2.
 #[test]
 fn two_links() {
     let [a, b, _] = LINKS;

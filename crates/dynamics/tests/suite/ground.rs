@@ -237,8 +237,8 @@ fn restitution_rebounds() {
 /// Cubes tumble over their eight corners. Contacts only reduce the energy, and all cubes with friction come to rest.
 #[test]
 fn energy_never_grows() {
-    // use a cube: its spin keeps the energy without contacts, except for an error of h² ω² because the velocity is in
-    // the body's axes
+    // Without contacts, the spin of a cube keeps its energy. The energy of the linear velocity has a relative error of
+    // h² ω², because this velocity is expressed in the axes of the turning cube.
     let model = free("cube", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.02)));
     let cube: Vec<_> =
         corners().into_iter().map(|c| Vec3::from([c.x / HALF[0], c.y / HALF[1], c.z / HALF[2]]) * 0.1).collect();

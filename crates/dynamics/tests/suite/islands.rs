@@ -250,8 +250,7 @@ fn trees_and_what_ties_them() {
     assert_eq!(islands(model, &apart), [(0..7, 6..9), (7..14, 0..0), (14..32, 0..6), (32..50, 9..12)]);
     // a constraint connects two robots, which then form one island
     assert_eq!(islands(model, &[("atool", Some("btool"))])[0], (0..14, 0..3));
-    // a robot whose index is between two connected robots joins their island, and rows between the rows of one robot do
-    // too
+    // an island is a range of indices, so it includes robots and rows whose indices are between connected ones
     assert_eq!(islands(model, &[("atool", Some("cLF_foot"))]), [(0..32, 0..3), (32..50, 0..0)]);
     let mixed = [("cLF_foot", None), ("dLF_foot", None), ("cRF_foot", None)];
     assert_eq!(islands(model, &mixed), [(0..7, 0..0), (7..14, 0..0), (14..50, 0..9)]);

@@ -131,8 +131,8 @@ fn impossible_numbers_are_refused_by_name() {
     assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 0.9, expected 1");
 }
 
-/// A `chain` of joints has massless bodies between its joints. They are intended, so models made from it have no
-/// warnings.
+/// A `chain` of joints has massless bodies between its joints. These massless bodies are intended, so models that are
+/// made from the chain have no warnings.
 #[test]
 fn chains_stay_without_warnings() {
     let mut builder = ModelBuilder::new("chain");
@@ -209,7 +209,7 @@ fn plans_know_their_robot() {
     };
     assert_eq!(accepted(&longer), (false, false));
     assert_eq!(accepted(&turned), (false, false));
-    // it is accepted for the same robot with other constants, or read from a file
+    // scratch is accepted for the same robot with other constants, or read from a file
     let heavier = one.with_inertias(|_, I| I.scale(2.0)).unwrap().with_gravity(Vec3::zero()).unwrap();
     assert_eq!(accepted(&heavier), (true, true));
     assert_eq!(accepted(&read_again(&one)), (true, true));

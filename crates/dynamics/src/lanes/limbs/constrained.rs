@@ -2,9 +2,9 @@
 //!
 //! Source: Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the
 //! operational-space inertia matrix* (2012), based on Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1.
-//! Let U = Iᴬ S and D = Sᵀ U be the quantities of the articulated-body algorithm. A force f on a body causes the effort
-//! Y_d = S_dᵀ f at column d of its joint, and f − U_d D_d⁻¹ Y_d is passed on to the parent. If the unit forces of the
-//! rows of J are propagated to the root in this way, then
+//! Let U = Iᴬ S and D be quantities of the articulated-body algorithm. A force f on a body causes the effort Y_d = S_dᵀ
+//! f at column d of its joint, and f − U_d D_d⁻¹ Y_d is passed on to the parent. If the unit forces of the rows of J
+//! are propagated to the root in this way, then
 //!
 //! ```text
 //! J M⁻¹ Jᵀ = Σ Y_d D_d⁻¹ Y_dᵀ,           J q̈ + γ = Σ Y_d D_d⁻¹ u_d + Σ f_iᵀ c_i + f₀ᵀ a₀ + γ'       for λ = 0,

@@ -31,7 +31,7 @@ const SIDE: usize = 3;
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     sizes: Sizes,
-    /// T. Shape: support of all steps. Written by: `carry`.
+    /// Motions T. Shape: support of all steps. Written by: `carry`.
     T: Vec<Motion<Four>>,
     /// Z D⁻¹, row by row; each row has the columns in order from the root. Shape: `Sizes`, plus one. Written by:
     /// `carry`.
