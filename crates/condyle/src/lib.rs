@@ -125,7 +125,7 @@ pub mod divide_conquer {
     pub use condyle_dynamics::{AssemblySize, DivideConquer};
 }
 
-/// Factors of the inertia matrix, and forward dynamics that use them.
+/// Factors of the inertia matrix, and forward dynamics that use these factors.
 pub mod factors {
     pub use condyle_dynamics::{Cholesky, ColumnTree, ForwardDynamicsMethod, Ltdl, forward_dynamics};
 }

@@ -162,7 +162,7 @@ impl<S: Scalar> Clone for Data<S> {
 }
 
 impl<S> Data<S> {
-    /// Panics unless the data was made for a model of the same tree.
+    /// Panics unless the data was made for a model with the same tree.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
@@ -187,7 +187,7 @@ impl Size {
     }
 }
 
-/// Panics unless there is one force per body, including the world, or none.
+/// Panics unless there is one force per body, including the world, or no force at all.
 #[inline]
 #[track_caller]
 pub(crate) fn check_forces(found: usize, bodies: usize) {

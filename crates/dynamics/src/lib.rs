@@ -16,7 +16,7 @@
 //! not depend on earlier calls. `CONVENTIONS` below defines frames and the order of numbers.
 //!
 //! # Features
-//! All are on by default.
+//! All features are on by default.
 //!
 //! - `loaders`: readers of robot files, and the module `robots`.
 //! - `meshes`: masses and inertias of meshes in MJCF.
@@ -119,7 +119,7 @@ pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
 pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
 pub use divide_conquer::assembly::AssemblySize;
-/// Versions of the crates whose types are part of the public interface.
+/// Other crates whose types are part of the public interface, in the matching versions.
 #[cfg(feature = "std")]
 pub use num_dual;
 pub use {nalgebra, rand};

@@ -99,7 +99,7 @@ impl<T: Real> Batch<T> {
     /// Maximum number of threads of a batch; each thread has its own scratch.
     pub const MOST_THREADS: usize = 1024;
 
-    /// Maximum number of states of a batch; the memory of the machine may suffice only for fewer.
+    /// Maximum number of states of a batch; the memory of the machine may suffice only for fewer states.
     pub const MOST_STATES: usize = 1 << (usize::BITS / 2);
 
     /// Allocates a batch for up to `states` states at once, on `threads` threads.
@@ -128,12 +128,12 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// Returns a writer: it has the functions of a batch, but they write the results to the caller's memory.
+    /// Returns a writer: its functions are the functions of a batch, but write the results to the caller's memory.
     ///
     /// `to` has one slice for each result of the function that is called, in the order of the fields of the result's
     /// struct. Each slice holds the numbers of all states one after the other, matrices by rows. Results that are
     /// written directly are not copied afterwards. If no argument determines the number of states, the length of the
-    /// slices does.
+    /// slices determines it.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -187,8 +187,8 @@ impl<T: Real> Batch<T> {
         states
     }
 
-    /// Checks the arguments and runs a pass over all states. The results have the given shapes. They are written to the
-    /// caller's memory `written`, or stay in the batch if it is `None`.
+    /// Checks the arguments and runs a pass over all states. The results have the given shapes. If `written` is `None`,
+    /// the results stay in the batch; otherwise they go to the caller's memory `written`.
     #[track_caller]
     fn compute<P: Pass<T>>(
         &mut self,

@@ -60,7 +60,7 @@ impl<T> Places<'_, T> {
         self.next += 1;
     }
 
-    /// Writes a matrix of each state by rows. Its kind could also have stayed in lanes.
+    /// Writes a matrix of each state by rows. Matrices of this kind could also have stayed in lanes.
     pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &Matrix<S>) {
         // The columns of a symmetric matrix equal its rows, so the numbers are copied in order.
         let columns = if SYMMETRIC.contains(&kind) { x.len() } else { x.ncols() };

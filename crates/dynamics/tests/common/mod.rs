@@ -75,7 +75,8 @@ pub(crate) struct Part {
     pub(crate) frame: Se3<f64>,
 }
 
-/// Robot that can be described in more than one format. Part i (counted from 1) is named `b{i}`, its frame `f{i}`.
+/// Robot that can be described in more than one format. Part i (counted from 1) is named `b{i}`, and the frame on this
+/// part `f{i}`.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree {
     pub(crate) parts: Vec<Part>,

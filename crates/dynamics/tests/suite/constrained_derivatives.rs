@@ -15,7 +15,7 @@ use num_dual::Dual64;
 
 /// Tolerance between two exact methods with some thousand roundings each.
 const EXACT: f64 = 1e-11;
-/// Tolerance after a product with M or its inverse, or with Λ, whose condition numbers are up to 1e4.
+/// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
 /// Tolerance and step of central differences. The error is a rounding of 1e-16/step, plus step² times a third
 /// derivative.

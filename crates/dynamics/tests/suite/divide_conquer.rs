@@ -1,4 +1,4 @@
-//! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, on any number of
+//! Forward dynamics by divide and conquer. It gives the accelerations of `aba` in O(log n) steps, on any number of
 //! threads.
 
 use crate::common;

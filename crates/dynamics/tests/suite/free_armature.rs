@@ -1,4 +1,4 @@
-//! Armature of free joints: in free space it equals a mass at the origin of the body, in every algorithm.
+//! Armature of free joints. In free space, armature equals a mass at the origin of the body, in every algorithm.
 
 use crate::common;
 

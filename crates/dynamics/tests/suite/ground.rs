@@ -12,7 +12,7 @@ use condyle_dynamics::{
 const G: f64 = 9.81;
 /// Time step of all tests (s).
 const H: f64 = 1e-3;
-/// Half of the box's length, width and height (m), and its mass (kg).
+/// Half of the length, width and height of the box (m), and the mass of the box (kg).
 const HALF: [f64; 3] = [0.15, 0.1, 0.05];
 const MASS: f64 = 2.0;
 /// Tolerance for the errors of the contact solver (1e-9 m/s) over some thousand steps, and for rounding.
@@ -120,7 +120,8 @@ fn standing_is_still() {
     }
 }
 
-/// On a slope a box sticks below the friction angle, and slides above it with g (sin α − μ cos α).
+/// A box sticks on a slope α below the friction angle. On a steeper slope, it slides with the acceleration g (sin α − μ
+/// cos α).
 #[test]
 fn sticks_or_slides_on_a_slope() {
     let model = free_box();

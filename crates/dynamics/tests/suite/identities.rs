@@ -242,7 +242,7 @@ fn moved_as_a_whole() {
     }
 }
 
-/// The placements of bodies equal a product of textbook matrices, in the given frames.
+/// The placements of bodies equal products of matrices from textbooks, in the frames of the model.
 #[test]
 fn placements() {
     let mut worst = Worst::new("oX_i = oX_λ X_T X_J", ROUNDING);

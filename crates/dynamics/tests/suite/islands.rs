@@ -198,7 +198,7 @@ fn the_order_of_constraints_changes_nothing() {
     }
 }
 
-/// A robot with NaN does not affect the others.
+/// A robot with NaN in its state does not affect the other robots.
 #[test]
 fn a_robot_that_is_not_a_number_stays_alone() {
     let parts = parts();
@@ -218,7 +218,7 @@ fn a_robot_that_is_not_a_number_stays_alone() {
     }
 }
 
-/// Creates two arms with seven coordinates each, and two quadrupeds with eighteen.
+/// Creates one model of two arms with seven coordinates each, and two quadrupeds with eighteen coordinates each.
 fn four() -> Model {
     let mut builder = ModelBuilder::new("all");
     for (name, robot) in

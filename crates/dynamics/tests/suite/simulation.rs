@@ -249,7 +249,7 @@ fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 
     (1..model.bodies().len()).fold(Force::zero(), |sum, i| sum + of(i)).to_array()
 }
 
-/// Without gravity, the momentum of a free robot is constant, whatever its joints do.
+/// Without gravity, the momentum of a free robot is constant, for any motion of the joints.
 #[test]
 fn momentum_is_conserved() {
     let model = robots::humanoid().with_gravity(Vec3::zero()).unwrap();
@@ -275,7 +275,7 @@ fn momentum_is_conserved() {
     assert!(fine < 1e-6 && observed_order(coarse, fine) > 3.5, "{coarse:.1e} {fine:.1e}");
 }
 
-/// A falling humanoid's centre of mass follows a parabola, however its joints move.
+/// The centre of mass of a falling humanoid follows a parabola, for any motion of the joints.
 #[test]
 fn centre_of_mass_falls_along_a_parabola() {
     let model = robots::humanoid();

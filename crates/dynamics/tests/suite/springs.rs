@@ -240,7 +240,7 @@ fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     energy
 }
 
-/// Computes the energy of the compensated weights.
+/// Computes the potential energy of the compensated weights.
 fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);

@@ -176,7 +176,7 @@ fn every_state_is_a_single_call() {
     });
 }
 
-/// In each function, a state with NaN does not affect the others.
+/// In each function, a state with NaN does not affect the other states.
 #[test]
 fn a_state_that_is_not_a_number_stays_alone() {
     const STATES: usize = 9;

@@ -64,7 +64,7 @@ fn of_dynamics() {
     });
 }
 
-/// Selected columns equal the columns of the whole Jacobian, in any requested order; the others are zero.
+/// Selected columns equal the columns of the whole Jacobian, in any requested order; the other columns are zero.
 #[test]
 fn along_some_directions() {
     let models = models(TREES);
