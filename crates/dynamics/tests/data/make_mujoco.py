@@ -62,7 +62,7 @@ for name in ["arm", "quadruped"]:
         )
     (here / f"{name}_mujoco.json").write_text(json.dumps(out) + "\n")
 
-# Joints that follow other joints: positions at which MuJoCo's equality constraints hold, and results at these positions.
+# Joints that follow other joints: positions at which MuJoCo's equality constraints hold, and results at them.
 # All numbers are in the coordinates of the leaders: v = G v_leaders.
 model = mujoco.MjModel.from_xml_path(str(here / "gripper.xml"))
 data = mujoco.MjData(model)
