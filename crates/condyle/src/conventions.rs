@@ -1,11 +1,11 @@
 //! Conversions to and from the conventions of other libraries: order of components, and frames.
 //!
-//! In Rust, the parts of motions and forces have names. Only bare arrays of six numbers need conversion, and the
-//! position and velocity of a free body.
+//! In Rust, the linear and angular parts of motions and forces have names. Only plain arrays of six numbers, and the
+//! position and velocity of a free body, need conversion.
 //!
 //! Condyle and Pinocchio both use q = [x, y, z, qx, qy, qz, qw] and v = [linear, angular] along the body's axes. The
-//! book's page on conversions (`docs/conversions.md`) has the tables; `condyle.conventions` in Python does the same for
-//! whole robots.
+//! book's page `docs/conversions.md` has tables of the conventions. In Python, `condyle.conventions` converts the
+//! states of whole robots.
 #![allow(non_snake_case)] // R, as in the formulas
 
 use condyle_dynamics::{Mat3, Quaternion, Vec3};
@@ -58,22 +58,22 @@ fn joined(a: Vec3<f64>, b: Vec3<f64>) -> [f64; 6] {
 pub struct MuJoCo;
 
 impl MuJoCo {
-    /// Converts our q to MuJoCo's qpos.
+    /// Converts Condyle's q to MuJoCo's qpos.
     pub fn position([x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> [f64; 7] {
         [*x, *y, *z, *qw, *qx, *qy, *qz]
     }
 
-    /// Converts MuJoCo's qpos to our q.
+    /// Converts MuJoCo's qpos to Condyle's q.
     pub fn position_from([x, y, z, qw, qx, qy, qz]: &[f64; 7]) -> [f64; 7] {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Converts our q and v to MuJoCo's qvel: ṗ = R v, ω.
+    /// Converts Condyle's q and v to MuJoCo's qvel: the velocity R v of the origin in the world, then ω.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         joined(rotation(q) * vec3(&v[..3]), vec3(&v[3..]))
     }
 
-    /// Converts MuJoCo's qpos and qvel to our v: v = Rᵀ ṗ, ω.
+    /// Converts MuJoCo's qpos and qvel to Condyle's v: Rᵀ ṗ, with ṗ from the world's axes to the body's, then ω.
     pub fn velocity_from(qpos: &[f64; 7], qvel: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(qpos));
         joined(R.transpose() * vec3(&qvel[..3]), vec3(&qvel[3..]))
@@ -94,23 +94,23 @@ impl MuJoCo {
 pub struct Drake;
 
 impl Drake {
-    /// Converts our q to Drake's q.
+    /// Converts Condyle's q to Drake's q.
     pub fn position([x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> [f64; 7] {
         [*qw, *qx, *qy, *qz, *x, *y, *z]
     }
 
-    /// Converts Drake's q to our q.
+    /// Converts Drake's q to Condyle's q.
     pub fn position_from([qw, qx, qy, qz, x, y, z]: &[f64; 7]) -> [f64; 7] {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Converts our q and v to Drake's v: R ω, R v.
+    /// Converts Condyle's q and v to Drake's v: R ω, then R v, along the world's axes.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(q);
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))
     }
 
-    /// Converts Drake's q and v to our v: Rᵀ ṗ, Rᵀ ω.
+    /// Converts Drake's q and v to Condyle's v: Rᵀ ṗ, then Rᵀ ω, along the body's axes.
     pub fn velocity_from(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(q)).transpose();
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))

@@ -1,9 +1,11 @@
-//! Error type of the façade. The errors of all its crates convert to it.
+//! Error type of this crate. The errors of all re-exported crates convert to this type.
 
-/// Error of this library. The errors of all its crates convert to it, so that `?` works across them in one function.
+/// Error of this library. The errors of all re-exported crates convert to this type, so that one function can use `?`
+/// on all of them.
 ///
-/// Each part keeps its own error type: [`ModelError`](crate::ModelError) for models and dynamics, `optimal::Error`,
-/// `wholebody::Error` and `wholebody::Status`. Message and source are passed on unchanged.
+/// Each re-exported crate keeps its own error type: [`ModelError`](crate::ModelError) for models and dynamics,
+/// `optimal::Error`, `wholebody::Error` and `wholebody::Status`. The message and the source of an error are passed on
+/// unchanged.
 ///
 #[cfg_attr(all(feature = "loaders", feature = "optimal", feature = "wholebody"), doc = "```")]
 #[cfg_attr(not(all(feature = "loaders", feature = "optimal", feature = "wholebody")), doc = "```ignore")]
@@ -37,7 +39,7 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Error in a robot's description, in a name that is looked up in it, or in a state.
+    /// Error in a robot's description, in a state, or in the name of an element of the robot.
     #[error(transparent)]
     Model(#[from] condyle_dynamics::Error),
     /// Inertia that no body of positive density can have.

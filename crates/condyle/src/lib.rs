@@ -3,7 +3,7 @@
 //! # Where to begin
 //!
 //! A [`Model`] is a robot: it is read from a file or built, and never changes. A [`Data`] is the memory in which one
-//! thread computes. Every algorithm is a function of both and of the state:
+//! thread computes. Every algorithm is a function of a `Model`, a `Data` and the state:
 //!
 //! ```
 //! use condyle::{Data, aba, aba_derivatives, robots};
@@ -60,7 +60,7 @@ pub use condyle_optimal as optimal;
 #[cfg(feature = "wholebody")]
 pub use condyle_wholebody as wholebody;
 
-/// Versions of other crates whose types are part of the public interface.
+/// Other crates whose types are part of the public interface, in the matching versions.
 #[doc(no_inline)]
 pub use condyle_dynamics::{nalgebra, num_dual, rand};
 
@@ -85,7 +85,7 @@ pub mod batch {
     };
 }
 
-/// Centroidal momentum, its map and their derivatives.
+/// Centroidal momentum, the map from velocities to this momentum, and derivatives of both.
 pub mod centroidal {
     pub use condyle_dynamics::{
         CentroidalDerivatives, CentroidalMap, CentroidalMapRate, centroidal_derivatives, centroidal_map,
@@ -93,7 +93,7 @@ pub mod centroidal {
     };
 }
 
-/// Positions on the joints' groups: Jacobians of ⊕ and ⊖, distances, interpolation.
+/// Positions as elements of the joints' Lie groups: Jacobians of ⊕ and ⊖, distances, and interpolation.
 pub mod configuration {
     pub use condyle_dynamics::{
         DifferenceArgument, IntegrateArgument, difference_jacobian, distance, integrate_jacobian, interpolate,
@@ -101,7 +101,7 @@ pub mod configuration {
     };
 }
 
-/// Impacts, inverse dynamics under constraints, and the types of constraints and of their results.
+/// Impacts, inverse dynamics under constraints, and the types of constraints and of results under constraints.
 pub mod constraints {
     pub use condyle_dynamics::{
         Constrained, ConstrainedDerivatives, ConstrainedEquations, ConstrainedInverse, ConstrainedInverseDerivatives,
@@ -111,7 +111,7 @@ pub mod constraints {
     };
 }
 
-/// Results of first and second derivatives, and derivatives of further terms.
+/// Types of first and second derivatives, and functions that differentiate further terms.
 pub mod derivatives {
     pub use condyle_dynamics::{
         AbaDerivatives, AbaHessian, CoriolisDerivatives, EnergyDerivatives, Input, LaneJacobian, RneaDerivatives,
@@ -125,7 +125,7 @@ pub mod divide_conquer {
     pub use condyle_dynamics::{AssemblySize, DivideConquer};
 }
 
-/// Factors of the inertia matrix, and forward dynamics that use them.
+/// Factors of the inertia matrix, and forward dynamics that use these factors.
 pub mod factors {
     pub use condyle_dynamics::{Cholesky, ColumnTree, ForwardDynamicsMethod, Ltdl, forward_dynamics};
 }
@@ -147,7 +147,7 @@ pub mod spatial {
     pub use condyle_dynamics::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Matrix, Quaternion, lie};
 }
 
-/// Coriolis, gravity and passive efforts, and all terms in one pass.
+/// Coriolis, gravity and passive efforts, and all terms of the equations of motion in one pass.
 pub mod terms {
     pub use condyle_dynamics::{AllTerms, compute_all_terms, coriolis_matrix, gravity, passive_torque, static_torque};
 }

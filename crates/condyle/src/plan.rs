@@ -7,7 +7,8 @@ use condyle_wholebody::{Error, Plan, PlanData};
 /// Returns the plan of a solution, for [`WholeBodyController::track`](condyle_wholebody::WholeBodyController::track).
 ///
 /// - `times`: times of the N + 1 knots (s); the two knots of an impact have the same time.
-/// - `touches`: whether each contact of the controller touches between one knot and the next. Length: N·contacts.
+/// - `touches`: for each interval between two knots, whether each contact of the controller touches. Length: N · number
+///   of contacts.
 /// - `fade`: duration over which contacts are loaded and unloaded (s).
 ///
 /// Controls and gains are copied from knots that have one control per actuated coordinate. Impacts have no controls.

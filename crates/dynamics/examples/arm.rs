@@ -1,4 +1,4 @@
-//! Prints the numbers of `examples/embedded` on this machine, to compare them.
+//! Prints the efforts that `examples/embedded` computes, as computed on this machine, for comparison.
 
 #[path = "../../../examples/embedded/src/arm.rs"]
 mod arm;

@@ -15,8 +15,8 @@ use condyle_model::Model;
 use condyle_spatial::gate::{is, same};
 use condyle_spatial::{Scalar, same_layout};
 
-/// Defines [`Data`] from its workspaces and their arguments: the struct, its construction and cloning, and the check
-/// that it may be read under both names of `f64` ([`same_layout!`]).
+/// Defines [`Data`] from a list of workspaces and the arguments of each. The macro writes the struct, the constructor,
+/// the clone, and the check that numbers may be read as `f64` or as `FusedF64` ([`same_layout!`]).
 macro_rules! data {
     (
         $(#[$doc:meta])* ($size:ident, $model:ident, $minv:ident)
@@ -57,8 +57,9 @@ macro_rules! data {
 data! {
     /// Scratch and results of every algorithm, for one model and one type of scalar.
     ///
-    /// Each algorithm has its own workspace, defined in its file, and does not read results of other algorithms. So
-    /// calls may come in any order. All memory is allocated here. Use one `Data` per thread.
+    /// Each algorithm has its own workspace, defined in the file of the algorithm, and does not read results of other
+    /// algorithms. So calls may come in any order. A `Data` allocates all memory when it is made. Use one `Data` per
+    /// thread.
     ///
     /// ```
     /// use condyle_dynamics::{Data, robots};
@@ -111,7 +112,7 @@ impl<S: Scalar> Data<S> {
     }
 }
 
-/// Constructors of [`Data`] and their clones, compiled in this crate.
+/// Functions that create and clone a [`Data`], compiled in this crate for common scalars.
 fn new_single(model: &Model) -> Data<f64> {
     Data::allocate(model)
 }
@@ -137,8 +138,8 @@ fn clone_wide(data: &Data<Wide>) -> Data<Wide> {
     data.copy()
 }
 
-/// Clones a workspace. It is a separate function for each type of workspace; one function for all would be the
-/// library's largest.
+/// Clones a workspace. Each type of workspace has a separate function; one function for all types would be the largest
+/// function of the library.
 #[inline(never)]
 fn copied<W: Clone>(workspace: &W) -> W {
     workspace.clone()
@@ -165,7 +166,7 @@ impl<S: Scalar> Clone for Data<S> {
 }
 
 impl<S> Data<S> {
-    /// Panics unless the data was made for a model of the same tree.
+    /// Panics unless the data was made for a model with the same tree.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
@@ -177,7 +178,8 @@ impl<S> Data<S> {
 }
 
 impl Size {
-    /// Panics on behalf of [`Data::check`]; not inlined, because every call checks its data.
+    /// Panics with the message of [`Data::check`]. The function is not inlined, because every algorithm calls the
+    /// check.
     #[cold]
     #[inline(never)]
     #[track_caller]
@@ -189,7 +191,7 @@ impl Size {
     }
 }
 
-/// Panics unless there is one force per body, including the world, or none.
+/// Panics unless there is one force per body, including the world, or no force at all.
 #[inline]
 #[track_caller]
 pub(crate) fn check_forces(found: usize, bodies: usize) {
@@ -198,7 +200,7 @@ pub(crate) fn check_forces(found: usize, bodies: usize) {
     }
 }
 
-/// Panics on behalf of [`check_forces`].
+/// Panics with the message of [`check_forces`].
 #[cold]
 #[inline(never)]
 #[track_caller]

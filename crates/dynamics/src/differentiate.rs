@@ -1,13 +1,13 @@
 //! Derivatives of user-defined functions of the state, by dual numbers.
 //!
-//! A state x begins with a position q of nq numbers, which moves to q ⊕ δ. All other numbers (velocity, effort, …) move
-//! by addition. So a state of n numbers has n − nq + nv directions, and derivatives are with respect to these: the
-//! derivatives of f(x ⊕ δ) at δ = 0.
+//! A state x begins with a position q of nq numbers. A step δ moves q to q ⊕ δ and is added to all other numbers
+//! (velocity, effort, …). So a state of n numbers has n − nq + nv directions. A derivative of f means the derivative of
+//! f(x ⊕ δ) with respect to δ, at δ = 0.
 //!
 //! A function written for any scalar can be evaluated for eight or four directions at once, in vector registers
-//! ([`LaneJacobian`]). One direction is a dual number, two are a hyper-dual number (Fike and Alonso, *The development
-//! of hyper-dual numbers for exact second-derivative calculations*, 2011). Derivatives are exact and cost one
-//! evaluation of f per direction or pair of directions. Where this crate has an analytical derivative, it is many times
+//! ([`LaneJacobian`]). A dual number carries one direction, and a hyper-dual number carries two (Fike and Alonso, *The
+//! development of hyper-dual numbers for exact second-derivative calculations*, 2011). Derivatives are exact and cost
+//! one evaluation of f per direction or pair of directions. The analytical derivatives of this crate are many times
 //! faster.
 
 use crate::data::Data;
@@ -25,7 +25,7 @@ use condyle_spatial::{Constant, Scalar};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, HyperDual64};
 
-/// Returns x ⊕ δ, for numbers that carry derivatives along δ.
+/// Returns x ⊕ δ, where the numbers of δ carry derivatives.
 fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     let mut out: Vec<S> = x.iter().map(|&x| S::splat(x)).collect();
     let (q, rest) = out.split_at_mut(model.nq());
@@ -44,7 +44,8 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 
 /// Computes f(x) and its exact Jacobian ∂f(x ⊕ δ)/∂δ, in one evaluation of f per direction.
 ///
-/// x: a position of nq numbers, then any other numbers. Returns f(x), m numbers, and an m × (nv + others) matrix.
+/// x: n numbers, the first nq of which are a position. Returns the m numbers of f(x), and a matrix of m × (n − nq +
+/// nv).
 ///
 /// ```
 /// use condyle_dynamics::{Data, forward_kinematics, jacobian, robots};
@@ -58,7 +59,7 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, or f returns different numbers of results.
+/// If x has fewer than nq numbers, or two evaluations of f give different numbers of results.
 #[track_caller]
 pub fn jacobian<R>(
     model: &Model<R>,
@@ -79,7 +80,7 @@ pub fn jacobian<R>(
     (DVector::from_iterator(value.len(), value.iter().map(|x| x.re)), J)
 }
 
-/// Function of a robot's state, for any scalar, which [`LaneJacobian`] can differentiate.
+/// Function of a robot's state, written for any scalar type, so that [`LaneJacobian`] can differentiate it.
 pub trait StateFunction {
     /// Returns the number of results.
     fn len(&self) -> usize;
@@ -93,8 +94,8 @@ pub trait StateFunction {
     fn call<S: Scalar>(&mut self, data: &mut Data<S>, x: &[S], y: &mut [S]);
 }
 
-/// Exact Jacobians of functions of one robot's state. Compared with [`jacobian`], one evaluation of f serves eight
-/// (AVX-512) or four (AVX2, NEON, SIMD128) directions, and nothing is allocated except by f.
+/// Exact Jacobians of functions of one robot's state. Unlike in [`jacobian`], one evaluation of f computes derivatives
+/// along eight (AVX-512) or four (AVX2, NEON, SIMD128) directions. Only f may allocate.
 ///
 /// The last digits of results differ between SIMD levels ([`level`](mod@crate::level)).
 ///
@@ -132,8 +133,8 @@ enum Width {
 }
 
 impl LaneJacobian {
-    /// Allocates memory for states of n numbers, q first, and functions with `results` results. Uses the SIMD level
-    /// that is current now.
+    /// Allocates memory for states of n numbers, which begin with q, and for functions with `results` results. Uses the
+    /// SIMD level that is current now.
     ///
     /// # Panics
     /// If n is less than nq.
@@ -148,11 +149,11 @@ impl LaneJacobian {
         Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq() + model.nv()) }
     }
 
-    /// Computes f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ: m numbers, and an m × (nv + others) matrix.
+    /// Computes the m numbers of f(x), and the Jacobian ∂f(x ⊕ δ)/∂δ, a matrix of m × (n − nq + nv).
     ///
     /// # Panics
-    /// If the length of x or of f's results differs from the lengths given to [`new`](Self::new), or the robot is
-    /// another one.
+    /// If the number of entries of x or of results of f differs from the number given to [`new`](Self::new), or if the
+    /// robot is not the robot given to `new`.
     #[track_caller]
     pub fn of<R: Constant<f64>>(
         &mut self,
@@ -163,8 +164,8 @@ impl LaneJacobian {
         self.run(model, x, f, None)
     }
 
-    /// Computes f(x) and the columns of its Jacobian for the directions k of δ in `directions`. The other columns are
-    /// not written: they are zero until a call computes them.
+    /// Computes f(x) and some columns of its Jacobian: column k, the derivative along entry k of δ, for each k in
+    /// `directions`. The other columns are not written: they are zero until a call computes them.
     ///
     /// ```
     /// # use condyle_dynamics::{Data, LaneJacobian, Scalar, StateFunction, robots};
@@ -180,7 +181,7 @@ impl LaneJacobian {
     /// ```
     ///
     /// # Panics
-    /// As [`of`](Self::of), or if a direction is not below nv + others.
+    /// In the same cases as [`of`](Self::of), or if a direction is not below n − nq + nv.
     #[track_caller]
     pub fn along<R: Constant<f64>>(
         &mut self,
@@ -250,7 +251,7 @@ impl<S: Block<Number = f64>> Directions<S> {
     }
 }
 
-/// Jacobian that is to be computed.
+/// Jacobian to compute: a function, a state, and the memory for results.
 struct SideBySide<'a, S, R, F> {
     directions: &'a mut Directions<S>,
     model: &'a Model<R>,
@@ -306,7 +307,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
 
 /// Computes f(x) and its exact gradient ∂f(x ⊕ δ)/∂δ, in one evaluation of f per direction.
 ///
-/// x: a position of nq numbers, then any other numbers. Returns f(x) and nv + others numbers.
+/// x: n numbers, the first nq of which are a position. Returns f(x), and the n − nq + nv numbers of the gradient.
 ///
 /// ```
 /// use condyle_dynamics::{Data, gradient, rnea, robots};
@@ -332,7 +333,8 @@ pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> 
 /// Computes f(x), its exact gradient and its exact Hessian ∂²f(x ⊕ δ)/∂δ∂δ, in one evaluation of f per pair of
 /// directions.
 ///
-/// x: a position of nq numbers, then any other numbers. Returns f(x), n = nv + others numbers, and an n × n matrix.
+/// x: n numbers, the first nq of which are a position. Returns f(x), the d = n − nq + nv numbers of the gradient, and
+/// the d × d Hessian.
 ///
 /// ```
 /// use condyle_dynamics::{Data, forward_kinematics, hessian, robots, static_torque_derivative};

@@ -1,7 +1,7 @@
 //! Robot models, rigid-body algorithms and their exact derivatives.
 //!
-//! A [`Model`] is immutable and can be shared. A [`Data`] is the scratch of one thread. An algorithm is a function of
-//! both:
+//! A [`Model`] is immutable and can be shared. A [`Data`] is the scratch of one thread. An algorithm is a function of a
+//! `Model`, a `Data` and the state:
 //!
 //! ```
 //! use condyle_dynamics::{Data, aba, robots};
@@ -12,18 +12,18 @@
 //! assert!((a[2] + 9.81).abs() < 1e-12); // it falls
 //! ```
 //!
-//! Every function is generic over the [`Scalar`] and allocates nothing. It writes all of its results, and they do not
-//! depend on earlier calls. `CONVENTIONS` below defines frames and the order of numbers.
+//! Every function is generic over the [`Scalar`] and allocates nothing. Each call writes all of its results, which do
+//! not depend on earlier calls. `CONVENTIONS` below defines frames and the order of numbers.
 //!
 //! # Features
-//! All are on by default.
+//! All features are on by default.
 //!
-//! - `loaders`: robot files, and `robots`.
+//! - `loaders`: readers of robot files, and the module `robots`.
 //! - `meshes`: masses and inertias of meshes in MJCF.
 //! - `serde`: models and constraints in serde's formats.
-//! - `threads`: rayon's threads.
-//! - `std`: the standard library, which all other features except `serde` need, and derivatives of your own functions
-//!   (`jacobian`, `LaneJacobian`, …).
+//! - `threads`: computation on several threads, by rayon.
+//! - `std`: the standard library, which all other features except `serde` need, and derivatives of user-defined
+//!   functions (`jacobian`, `LaneJacobian`, …).
 //!
 //! Without `std` the crate needs `alloc`, and the feature `libm` for floating-point functions. So it runs without an
 //! operating system (`examples/embedded` in the repository).
@@ -119,7 +119,7 @@ pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
 pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
 pub use divide_conquer::assembly::AssemblySize;
-/// Versions of the crates whose types are part of the public interface.
+/// Other crates whose types are part of the public interface, in the matching versions.
 #[cfg(feature = "std")]
 pub use num_dual;
 pub use {nalgebra, rand};

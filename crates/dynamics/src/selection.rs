@@ -1,7 +1,7 @@
 //! Selection of algorithms: every threshold of this crate, with the measurement on which it is based.
 //!
 //! Choices that depend only on the model and the scalar are made when [`Data`](crate::Data) is created (`Methods`). The
-//! schedule of a robot's limbs is made when its model is built, if it has any (`condyle_model::limbs`).
+//! schedule of limbs is made when the model of a robot with limbs is built (`condyle_model::limbs`).
 
 use crate::passes::factored_dynamics::ForwardDynamicsMethod;
 use condyle_model::Model;
@@ -10,16 +10,17 @@ use condyle_model::tree::Column;
 use condyle_spatial::gate::{FusedF64, Level, is, level};
 use condyle_spatial::{Scalar, same_layout};
 
-/// Maximum mean length of the rows of M's factor for which M⁻¹ is computed from the factor. Measured by
-/// `benches/factorisation.rs`: both methods are equally fast at 12.5 on a chain of 24. The humanoid has 9.7, the arm 4.
+/// Maximum mean row length of the factor of M for which M⁻¹ is computed from the factor. Measured by
+/// `benches/factorisation.rs`: on a chain of 24 joints, with mean row length 12.5, both methods are equally fast. The
+/// mean row length is 9.7 for the humanoid and 4 for the arm.
 const SHORT_ROWS: usize = 12;
 
-/// Minimum mean length of the paths to the root for which −M⁻¹ B is solved by the articulated bodies instead of being
-/// multiplied out. Measured by `benches/peers/dynamics.py` on chains.
+/// Minimum mean length of the paths to the root for which −M⁻¹ B is computed by recursions over the articulated bodies,
+/// not as a matrix product. Measured by `benches/peers/dynamics.py` on chains.
 const LONG_WAY: usize = 24;
 
-/// Mean length of the paths to the root above which ∂τ is computed four columns at a time instead of pair by pair.
-/// Measured by `benches/peers/dynamics.py`.
+/// Mean length of the paths to the root above which the derivatives ∂τ are computed four columns at a time, not for one
+/// pair of columns at a time. Measured by `benches/peers/dynamics.py`.
 const LONG_SUPPORT: usize = 4;
 
 /// Methods of the functions that have several, for one model and one type of scalar.
@@ -90,8 +91,8 @@ pub(crate) fn limbs<S: 'static, R>(model: &Model<R>) -> Option<&Plan> {
     model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)
 }
 
-/// Returns whether M⁻¹ is computed from the factor of M, which has `nonzeros` entries. It is the only method for joints
-/// that share coordinates.
+/// Returns whether M⁻¹ is computed from the factor of M, which has `nonzeros` entries. Joints that share coordinates
+/// always use the factor.
 pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
@@ -100,32 +101,32 @@ pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
 /// a 7-joint arm the sparse factor takes five times the instructions.
 pub const SHORT_CHAIN: usize = 8;
 
-/// Returns whether a robot is a chain of at most [`SHORT_CHAIN`] coordinates. Its M has no zeros, so no factor of M is
-/// needed.
+/// Returns whether a robot is a chain of at most [`SHORT_CHAIN`] coordinates. The inertia matrix M of a chain has no
+/// zeros, so no sparse factor of M is needed.
 pub fn is_short_chain<R>(model: &Model<R>) -> bool {
     let chain = model.columns().iter().enumerate().all(|(k, column)| column.depth == k);
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
 }
 
-/// Returns whether −M⁻¹ B is solved by the articulated bodies. Joints must not share coordinates.
+/// Returns whether −M⁻¹ B is computed by recursions over the articulated bodies. Joints must not share coordinates.
 pub(crate) fn solve_by_tree(columns: &[Column], nv: usize) -> bool {
     let depths: usize = columns.iter().map(|c| c.depth).sum();
     columns.len() == nv && depths >= LONG_WAY * nv
 }
 
-/// Returns whether ∂τ is computed four columns at a time. This is only done for single states, if the processor has
-/// vectors of four.
+/// Returns whether the derivatives ∂τ are computed four columns at a time: only for single states, and only if the
+/// processor has vectors of four numbers.
 #[inline(always)]
 pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
     is::<S, FusedF64>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
 }
 
-/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate, for which ABA's recursion
-/// does not close.
+/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate. For such joints, the
+/// recursion of ABA is not possible.
 ///
 /// Measured by `benches/factorisation.rs` on the embedded robots, and on chains, binary trees and stars of 6 to 200
-/// joints. A factor of M never wins: h and M together take nearly as long as ABA on an arm of 7 and up to 3 times as
-/// long on the others. `docs/performance.md` has the table.
+/// joints. Methods with a factor of M are never faster: h and M alone take nearly as long as ABA on an arm with 7
+/// joints, and up to 3 times as long on the other robots. `docs/performance.md` has the table.
 pub(crate) fn forward_dynamics<R>(model: &Model<R>) -> ForwardDynamicsMethod {
     if model.has_mimic() { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody }
 }

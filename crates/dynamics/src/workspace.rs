@@ -1,8 +1,8 @@
-//! Arrays of which the workspaces of passes consist.
+//! Arrays that form the workspaces of passes.
 //!
-//! Each pass has its own workspace, defined in its file by `workspace!`, and each field documents its frame, shape and
-//! writer. A workspace consists of arrays and matrices that can be read under both names of `f64`; the compiler checks
-//! this.
+//! Each pass defines its own workspace by `workspace!`, in the file of the pass. Each field documents the frame, shape
+//! and writer of its numbers. A workspace consists of arrays and matrices that can be read as numbers of type `f64` or
+//! of type `FusedF64`; the compiler checks this.
 
 use condyle_model::Model;
 use condyle_spatial::gate::{self, SimdToken};
@@ -11,8 +11,8 @@ use condyle_spatial::{Array, Matrix, Scalar, matrix};
 /// Marker with which this crate may name vector types.
 pub(crate) struct Gate;
 
-// SAFETY: vectors are created and used in two places only: in kernels, which are entered through their entry functions,
-// and in functions that choose the vectors of the current SIMD level.
+// SAFETY: vectors are created and used only in kernels, which are called through their entry functions, and in
+// functions that choose the vectors of the current SIMD level.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Gate {}
 
@@ -49,8 +49,8 @@ impl Size {
     }
 }
 
-/// Returns an array of n equal entries. It is not inlined and makes the entry itself, because a workspace has dozens of
-/// arrays. Entries are copied whole, whereas `vec!` would clone them number by number.
+/// Returns an array of n equal entries. The function is not inlined and calls `entry` itself, because a workspace has
+/// dozens of arrays. Each entry is copied as a whole, whereas `vec!` would clone it number by number.
 #[inline(never)]
 pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Array<T> {
     let entry = entry();
@@ -63,9 +63,9 @@ pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> Matrix<S> {
     matrix(rows, columns, S::zero())
 }
 
-/// Defines a workspace. Each field has a type and an initial value, which may use the sizes of a model and the fields
-/// above it. Fields after `same` do not depend on the scalar. The macro defines the struct, its `new`, and the check
-/// that it may be read under both names of `f64` ([`same_layout!`](condyle_spatial::same_layout)).
+/// Defines a workspace. Each field has a type and an initial value. The value may use the sizes of a model and earlier
+/// fields. Fields after `same` do not depend on the scalar. The macro defines the struct, the function `new`, and the
+/// check that numbers may be read as `f64` or as `FusedF64` ([`same_layout!`](condyle_spatial::same_layout)).
 macro_rules! workspace {
     (
         $(#[$doc:meta])*

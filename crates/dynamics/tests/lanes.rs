@@ -1,4 +1,4 @@
-//! Several knots of a horizon side by side: one source also runs on lanes.
+//! Computation of several knots of a horizon side by side: generic code also runs on scalars with lanes.
 #![allow(non_snake_case)]
 
 mod common;
@@ -9,7 +9,7 @@ use condyle_dynamics::level::{Level, pin};
 use condyle_dynamics::{Data, Force, Scalar};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Two numbers side by side.
+/// Scalar with two lanes: two numbers side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lanes2([f64; 2]);
 
@@ -110,11 +110,11 @@ fn bits(x: &[f64]) -> Vec<u64> {
     x.iter().map(|x| x.to_bits()).collect()
 }
 
-/// Tolerance of Newton's method: an iteration after convergence changes rounding only.
+/// Tolerance of Newton's method. It is so small that one more iteration after convergence changes only rounding.
 const CONVERGED: f64 = 1e-12;
 
 /// Each lane has the same bits as a single call, on every joint type, even if the other lane contains NaN. Functions
-/// that step in all lanes or in none have the same numbers up to rounding.
+/// that couple the lanes (`in_step`) give the same numbers up to rounding.
 #[test]
 fn lanes_are_single_calls() {
     pin(Level::Baseline).unwrap(); // a level without fused operations, as in `Lanes2`

@@ -1,8 +1,9 @@
-//! Products of every matrix that a call or a batch returns, with vectors and with matrices, compared with plain loops.
+//! Products with every matrix that a call or a batch returns. The factors are vectors and matrices, and the results are
+//! compared with plain loops.
 //!
-//! nalgebra multiplies without checking bounds, so it must support the layout of each matrix. (Its issue 1616: a
-//! product with a view whose rows are not adjacent writes out of bounds.) This program is small: `tests/products.sh`
-//! compiles it with AddressSanitizer, and runs it at every SIMD level of the machine.
+//! nalgebra multiplies without checking bounds, so it must support the layout of each matrix. (In nalgebra's issue
+//! 1616, a product with a view whose rows are not adjacent writes out of bounds.) This program is small, because
+//! `tests/products.sh` compiles it with AddressSanitizer and runs it at every SIMD level of the machine.
 #![allow(non_snake_case)]
 
 use condyle_dynamics::level::level;
@@ -10,13 +11,13 @@ use condyle_dynamics::*;
 use nalgebra::{DMatrix, DVector, DVectorView, Dim, Dyn, Matrix, Storage};
 use std::collections::BTreeSet;
 
-/// Tolerance: some roundings of sums of few terms, relative to the largest product.
+/// Tolerance of a few roundings in sums of few terms, relative to the largest product.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of states of a batch: several groups of lanes, the last one not full.
+/// Number of states of a batch. They fill several groups of lanes, but not the last group.
 const STATES: usize = 19;
 
-/// Returns numbers without a pattern, in (−1, 1).
+/// Returns pseudo-random numbers between −1 and 1.
 fn numbers(n: usize, seed: usize) -> Vec<f64> {
     (0..n).map(|k| ((k + 1) as f64 * 12.9898 + seed as f64 * 78.233).sin()).collect()
 }
@@ -58,7 +59,7 @@ fn equal<R: Dim, C: Dim>(found: &Matrix<f64, R, C, impl Storage<f64, R, C>>, exp
     }
 }
 
-/// Multiplies one of nalgebra's matrices in all ways for which nalgebra has different code.
+/// Multiplies a matrix of nalgebra with all kinds of factors for which nalgebra has separate code.
 fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) {
     let (m, n) = M.shape();
     let copy = DMatrix::from_fn(m, n, |i, j| M[(i, j)]);
@@ -76,7 +77,7 @@ fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) 
     let mut out = x.clone();
     out.gemv_tr(1.0, M, &y, 0.0);
     equal(&out, &transposed, what);
-    equal(&(M * &few), &plain(&copy, &few), what); // nalgebra has different code for small and large products
+    equal(&(M * &few), &plain(&copy, &few), what); // nalgebra has separate code for small and large products
     equal(&(M * &many), &plain(&copy, &many), what);
     equal(&(M * many.columns(1, 7)), &plain(&copy, &many.columns(1, 7).into_owned()), what);
     let left = matrix(8, m);
@@ -91,7 +92,7 @@ fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) 
     }
 }
 
-/// Multiplies a matrix of one state of a batch by all types of operands.
+/// Multiplies the matrix of one state of a batch with operands of all types.
 fn multiply_state(what: &str, M: StateMatrix<'_, f64>) {
     let (m, n) = M.shape();
     let copy = DMatrix::from_fn(m, n, |i, j| M[(i, j)]);
@@ -160,7 +161,7 @@ fn chain(n: usize) -> Model {
     builder.build().unwrap()
 }
 
-/// Creates a floating trunk with four legs of three joints, which single calls compute side by side.
+/// Creates a floating trunk with four legs of three joints. Single calls compute the legs side by side in lanes.
 fn walker() -> Model {
     let mut builder = ModelBuilder::new("walker");
     let trunk = builder.body("trunk", WORLD, Joint::FreeFlyer, Se3::identity(), rod());
@@ -176,7 +177,7 @@ fn walker() -> Model {
     builder.build().unwrap()
 }
 
-/// Positions, velocities, accelerations or efforts, and forces of a number of states.
+/// Positions, velocities, accelerations or efforts, and forces of several states.
 struct States {
     q: Vec<f64>,
     v: Vec<f64>,
@@ -200,7 +201,7 @@ fn contacts(model: &Model) -> Vec<ContactConstraint> {
     if model.nv() < 6 { Vec::new() } else { frames.map(ContactConstraint::point).collect() }
 }
 
-/// Multiplies members of a result.
+/// Multiplies the given fields of a result.
 macro_rules! multiply {
     ($name:literal, $result:expr, $multiply:ident: $($($member:ident).+),+) => {{
         let r = $result;
@@ -242,7 +243,7 @@ fn single_calls(model: &Model) {
     multiply!("constrained_inverse_dynamics_derivatives", inverse, multiply:
         M, dtau_dq, dtau_dv, dacceleration_dq, dacceleration_dv);
 
-    // functions that write to matrices of the caller
+    // next: functions that write to matrices of the caller
     let mut J = DMatrix::zeros(c.rows(), nv);
     c.jacobian(&mut J);
     multiply("jacobian of constraints", &J);
@@ -283,7 +284,7 @@ fn single_calls(model: &Model) {
     multiply("factor of Cholesky", dense.lower());
 }
 
-/// Tests every function of a batch that returns matrices; returns their names.
+/// Tests every function of a batch that returns matrices, and returns the names of these functions.
 fn batches(model: &Model) -> BTreeSet<&'static str> {
     let States { q, v, x, f_ext } = &States::new(model, STATES);
     let (m, b) = (model, &mut Batch::new(model, STATES, 1));

@@ -1,4 +1,5 @@
-//! Batches of `f32` in every function: twice as many lanes as with `f64`, and the accuracy that seven digits allow.
+//! Every function of a batch of `f32`: it has twice as many lanes as with `f64`, and the accuracy that seven digits
+//! allow.
 #![allow(non_snake_case)]
 
 mod common;
@@ -12,12 +13,13 @@ use condyle_dynamics::level::{Level, pin};
 use condyle_dynamics::{Batch, ContactConstraint, Data, Model, ProximalSettings, crba};
 use table::{Found, States, table};
 
-/// Tolerance: 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
+/// Tolerance of 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
 const ROUNDINGS: f64 = 1e3 * f32::EPSILON as f64;
-/// Number of states: odd, and more than a vector register holds.
+/// Number of states. It is odd, and larger than the number of lanes of a vector register.
 const STATES: usize = 19;
 
-/// Functions whose result depends on M⁻¹: their relative error may be a rounding times the condition number of M.
+/// Functions whose result depends on M⁻¹. The relative error of such a result may be a rounding times the condition
+/// number of M.
 const INVERTS: [&str; 11] = [
     "aba",
     "minv",
@@ -32,7 +34,7 @@ const INVERTS: [&str; 11] = [
     "impulse_dynamics_derivatives",
 ];
 
-/// Returns the largest condition number of M over some states.
+/// Returns the largest condition number of M at the given states.
 fn condition(model: &Model, states: &[Input<f64>]) -> f64 {
     let mut data = Data::new(model);
     let of = |state: &Input<f64>| {
@@ -54,7 +56,7 @@ fn contact(model: &Model) -> Vec<ContactConstraint> {
 fn every_function_in_single_precision() {
     let mut worst = Vec::new();
     for model in embedded().map(|model| model.with_limbs(false)) {
-        // states that both precisions represent exactly
+        // use states that both precisions represent exactly
         let mut rng = common::rng(3);
         let narrow: Vec<Input<f32>> =
             (0..STATES).map(|_| Input::<f64>::random(&model, &mut rng).map(|x| x as f32)).collect();

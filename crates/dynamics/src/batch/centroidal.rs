@@ -16,9 +16,9 @@ results! {
         Ag: Matrices<'b, T> = [6, NV];
         /// Inertia of all moving bodies about their centre of mass, 6 × 6.
         Ig: Matrices<'b, T> = [6, 6];
-        /// c, three numbers per state.
+        /// Centre of mass c, three numbers per state.
         com: &'b [T] = [3];
-        /// Jacobian of c, 3 × nv.
+        /// Jacobian of the centre of mass, 3 × nv.
         Jcom: Matrices<'b, T> = [3, NV];
     }
 
@@ -27,17 +27,17 @@ results! {
     BatchCentroidalMapRate of CentroidalMapRate {
         /// Ag, 6 × nv.
         Ag: Matrices<'b, T> = [6, NV];
-        /// dAg/dt along v, 6 × nv.
+        /// Rate dAg/dt when the robot moves with v, 6 × nv.
         dAg: Matrices<'b, T> = [6, NV];
         /// Momentum about the centre of mass, six numbers per state.
         hg: &'b [T] = [6];
         /// Inertia of all moving bodies about their centre of mass, 6 × 6.
         Ig: Matrices<'b, T> = [6, 6];
-        /// c, three numbers per state.
+        /// Centre of mass c, three numbers per state.
         com: &'b [T] = [3];
-        /// ċ, three numbers per state.
+        /// Velocity ċ of the centre of mass, three numbers per state.
         com_velocity: &'b [T] = [3];
-        /// Jacobian of c, 3 × nv.
+        /// Jacobian of the centre of mass, 3 × nv.
         Jcom: Matrices<'b, T> = [3, NV];
     }
 
@@ -45,13 +45,13 @@ results! {
     BatchAllTerms of AllTerms {
         /// M, nv × nv.
         M: Matrices<'b, T> = [NV, NV];
-        /// h, nv numbers per state.
+        /// Nonlinear effects h, nv numbers per state.
         h: &'b [T] = [NV];
-        /// Momentum, its map and the map's rate, centre of mass and its Jacobian.
+        /// Centroidal momentum, its matrix Ag and the rate of Ag, the centre of mass and its Jacobian.
         centroidal: BatchCentroidalMapRate<'b, T> = [6, NV], [6, NV], [6], [6, 6], [3], [3], [3, NV];
-        /// T, one number per state.
+        /// Kinetic energy T, one number per state.
         kinetic_energy: &'b [T] = [];
-        /// V, one number per state.
+        /// Potential energy V, one number per state.
         potential_energy: &'b [T] = [];
     }
 }
@@ -67,7 +67,7 @@ batched! {
 
     /// Computes [`Velocities::com_velocity`](crate::Velocities::com_velocity) for each state: ċ, three numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -76,7 +76,7 @@ batched! {
     /// Computes [`Accelerations::com_acceleration`](crate::Accelerations::com_acceleration) for each state: c̈, three
     /// numbers.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -84,7 +84,7 @@ batched! {
         forward_accelerations(model, data, q, v, a).com_acceleration()
     }
 
-    /// Computes the Jacobian of the centre of mass of each state, 3 × nv, which is a part of
+    /// Computes the Jacobian of the centre of mass for each state, 3 × nv. It is one result of
     /// [`centroidal_map`](Self::centroidal_map).
     ///
     /// q: nq numbers per state.
@@ -103,7 +103,7 @@ batched! {
 
     /// Computes [`centroidal_map_rate`](crate::centroidal_map_rate) for each state.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -114,7 +114,7 @@ batched! {
     /// Computes [`Velocities::centroidal_momentum`](crate::Velocities::centroidal_momentum) for each state: hg, six
     /// numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -125,7 +125,7 @@ batched! {
     /// Computes [`Accelerations::centroidal_momentum_rate`](crate::Accelerations::centroidal_momentum_rate) for each
     /// state: dhg, six numbers.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -135,7 +135,7 @@ batched! {
 
     /// Computes [`Velocities::kinetic_energy`](crate::Velocities::kinetic_energy) for each state: T.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -151,7 +151,7 @@ batched! {
 
     /// Computes [`Velocities::mechanical_energy`](crate::Velocities::mechanical_energy) for each state: T + V.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -159,7 +159,7 @@ batched! {
 
     /// Computes [`compute_all_terms`](crate::compute_all_terms()) for each state, except the Jacobians of frames.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).

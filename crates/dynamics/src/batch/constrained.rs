@@ -13,24 +13,24 @@ use condyle_spatial::block::Real;
 results! {
     /// Forward dynamics under constraints of many states: see [`Constrained`](crate::Constrained).
     BatchConstrained of Constrained {
-        /// q̈, nv numbers per state.
+        /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// λ, one number per row, for each state.
+        /// Constraint forces λ, one number per row of J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Largest absolute value in J q̈ + γ of each state.
+        /// Error of the constraints, for each state: the largest absolute value in J q̈ + γ.
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
     }
 
-    /// Forward dynamics under constraints and its derivatives, of many states: see
+    /// Forward dynamics of many states under constraints, with derivatives: see
     /// [`ConstrainedDerivatives`](crate::ConstrainedDerivatives).
     BatchConstrainedDerivatives of ConstrainedDerivatives {
-        /// q̈, nv numbers per state.
+        /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// λ, one number per row, for each state.
+        /// Constraint forces λ, one number per row of J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Largest absolute value in J q̈ + γ of each state.
+        /// Error of the constraints, for each state: the largest absolute value in J q̈ + γ.
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
@@ -46,18 +46,18 @@ results! {
         dlambda_dv: Matrices<'b, T> = [ROWS, NV];
         /// ∂λ/∂τ, rows × nv.
         dlambda_dtau: Matrices<'b, T> = [ROWS, NV];
-        /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows.
+        /// Inertia of the constraints, Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows.
         inertia: Matrices<'b, T> = [ROWS, ROWS];
     }
 
-    /// Forward dynamics under constraints and its linearised equations, of many states: see
+    /// Forward dynamics of many states under constraints, with the linearised equations: see
     /// [`ConstrainedEquations`](crate::ConstrainedEquations).
     BatchConstrainedEquations of ConstrainedEquations {
-        /// q̈, nv numbers per state.
+        /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// λ, one number per row, for each state.
+        /// Constraint forces λ, one number per row of J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Largest absolute value in J q̈ + γ of each state.
+        /// Error of the constraints, for each state: the largest absolute value in J q̈ + γ.
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
@@ -75,11 +75,11 @@ results! {
 
     /// Impacts of many states: see [`Impulse`](crate::Impulse).
     BatchImpulse of Impulse {
-        /// v⁺, nv numbers per state.
+        /// Velocities v⁺ after the impact, nv numbers per state.
         v: &'b [T] = [NV];
-        /// Λ, one number per row, for each state.
+        /// Impulses Λ, one number per row of J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Largest absolute value in J (v⁺ + ε v) of each state.
+        /// Error of the constraints, for each state: the largest absolute value in J (v⁺ + ε v).
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
@@ -87,11 +87,11 @@ results! {
 
     /// Impacts of many states and their derivatives: see [`ImpulseDerivatives`](crate::ImpulseDerivatives).
     BatchImpulseDerivatives of ImpulseDerivatives {
-        /// v⁺, nv numbers per state.
+        /// Velocities v⁺ after the impact, nv numbers per state.
         v: &'b [T] = [NV];
-        /// Λ, one number per row, for each state.
+        /// Impulses Λ, one number per row of J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Largest absolute value in J (v⁺ + ε v) of each state.
+        /// Error of the constraints, for each state: the largest absolute value in J (v⁺ + ε v).
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
@@ -103,7 +103,7 @@ results! {
         dlambda_dq: Matrices<'b, T> = [ROWS, NV];
         /// ∂Λ/∂v, rows × nv.
         dlambda_dv: Matrices<'b, T> = [ROWS, NV];
-        /// (J M⁻¹ Jᵀ)⁻¹, rows × rows.
+        /// Inertia of the constraints, (J M⁻¹ Jᵀ)⁻¹, rows × rows.
         inertia: Matrices<'b, T> = [ROWS, ROWS];
     }
 }
@@ -111,18 +111,20 @@ results! {
 batched! {
     /// Computes [`constrained_dynamics`](crate::constrained_dynamics()) for each state.
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`aba`](Self::aba), or if `constraints` were made for another model, or by a batch with another number of
-    /// threads.
+    /// In the same cases as [`aba`](Self::aba), or if `constraints` were made for another model, or by a batch with
+    /// another number of threads.
     fn constrained_dynamics(model, data, constraints: BatchConstraints; q, v, tau, f_ext) -> BatchConstrained<'_, T> {
         constrained_dynamics(model, data, constraints, q, v, tau, f_ext)
     }
 
     /// Computes [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()) for each state.
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).
@@ -133,7 +135,8 @@ batched! {
 
     /// Computes [`constrained_dynamics_equations`](crate::constrained_dynamics_equations) for each state.
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).
@@ -144,7 +147,7 @@ batched! {
 
     /// Computes [`impulse_dynamics`](crate::impulse_dynamics()) for each state.
     ///
-    /// q: nq numbers per state; v: nv; restitution: ε.
+    /// q: nq numbers per state; v: nv numbers per state; restitution: ε, the same for all states.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).
@@ -154,7 +157,7 @@ batched! {
 
     /// Computes [`impulse_dynamics_derivatives`](crate::impulse_dynamics_derivatives()) for each state.
     ///
-    /// q: nq numbers per state; v: nv; restitution: ε.
+    /// q: nq numbers per state; v: nv numbers per state; restitution: ε, the same for all states.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).

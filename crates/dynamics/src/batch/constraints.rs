@@ -12,7 +12,7 @@ use condyle_model::{Error, Model};
 use condyle_spatial::block::Real;
 use core::ops::Range;
 
-/// Constraints of one model, with the scratch that one [`Batch`] needs for them: see [`ConstraintSet`].
+/// Constraints of one model, with the scratch for one [`Batch`]: see [`ConstraintSet`].
 ///
 /// ```
 /// use condyle_dynamics::{Batch, ContactConstraint, ProximalSettings, robots};
@@ -31,7 +31,7 @@ pub struct BatchConstraints<T: Real = f64> {
     pub(super) sets: Sets<T>,
 }
 
-/// One set per thread, with as many lanes as the groups of the batch.
+/// Sets of constraints, one per thread, with the number of lanes of the batch.
 #[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
@@ -40,7 +40,7 @@ pub(super) enum Sets<T: Real> {
 }
 
 impl<T: Real> Batch<T> {
-    /// Plans the constraints of a model for this batch, and allocates all memory.
+    /// Prepares constraints of a model for use with this batch, and allocates all memory.
     ///
     /// # Errors
     /// As [`ConstraintSet::new`].
@@ -76,7 +76,7 @@ impl<T: Real> BatchConstraints<T> {
         each!(Sets, &self.sets, sets => sets[0].rows())
     }
 
-    /// Returns the rows of constraint k.
+    /// Returns the range of rows of J that belong to constraint k.
     ///
     /// # Panics
     /// If constraint k does not exist.
@@ -85,15 +85,15 @@ impl<T: Real> BatchConstraints<T> {
         each!(Sets, &self.sets, sets => sets[0].range(k))
     }
 
-    /// Sets how redundant constraints share their forces.
+    /// Sets how redundant constraints share the constraint forces.
     pub fn set_proximal(&mut self, proximal: ProximalSettings) {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
     }
 
-    /// Changes the target of constraint k's frame in all states, between calls. Allocates nothing.
+    /// Changes the target of constraint k for all states, from the next call on. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Constraint`] if the target is not finite or its rotation is invalid. The old target is then kept.
+    /// [`Error::Constraint`] if the target is not finite or has an invalid rotation. The old target is then kept.
     ///
     /// # Panics
     /// If constraint k does not exist.
@@ -106,8 +106,8 @@ impl<T: Real> BatchConstraints<T> {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().try_for_each(|set| set.set_target(k, target.lift())))
     }
 
-    /// Returns whether a batch can use these constraints: it must have the same number of threads and lanes as the
-    /// batch that made them.
+    /// Returns whether a batch can use these constraints. The batch must have the same number of threads and lanes as
+    /// the batch that made the constraints.
     pub fn fits(&self, batch: &Batch<T>) -> bool {
         match (&self.sets, &batch.lanes) {
             (Sets::Single(sets), InLanes::Single(group)) => sets.len() == group.threads(),

@@ -30,7 +30,7 @@ results! {
 
     /// q̈ = aba(q, v, τ) and its derivatives, of many states: see [`AbaDerivatives`](crate::AbaDerivatives).
     BatchAbaDerivatives of AbaDerivatives {
-        /// q̈, nv numbers per state.
+        /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
         /// ∂q̈/∂q in the tangent space.
         da_dq: Matrices<'b, T> = [NV, NV];
@@ -91,7 +91,7 @@ results! {
         dtaudq: Matrices<'b, T> = [NV, NV];
     }
 
-    /// Derivatives of the centroidal momentum, its rate and the centre of mass, of many states: see
+    /// Derivatives of the centroidal momentum, of its rate, and of the centre of mass, of many states: see
     /// [`CentroidalDerivatives`](crate::CentroidalDerivatives).
     BatchCentroidalDerivatives of CentroidalDerivatives {
         /// ∂hg/∂q, 6 × nv.
@@ -118,7 +118,8 @@ results! {
 batched! {
     /// Computes [`rnea_derivatives`](crate::rnea_derivatives()) for each state: three matrices nv × nv.
     ///
-    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and a: nv numbers per state; f_ext: for each state, one force per body in the body's
+    /// frame; empty for no forces.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -131,7 +132,8 @@ batched! {
 
     /// Computes [`aba_derivatives`](crate::aba_derivatives()) for each state: nv numbers and three matrices nv × nv.
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
@@ -142,7 +144,7 @@ batched! {
 
     /// Computes [`static_torque_derivative`](crate::static_torque_derivative()) for each state: nv × nv.
     ///
-    /// q: nq numbers per state; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; f_ext: for each state, one force per body in the body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -152,7 +154,7 @@ batched! {
 
     /// Computes [`coriolis_derivatives`](crate::coriolis_derivatives) for each state: two matrices nv × nv.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -163,7 +165,7 @@ batched! {
     /// Computes [`passive_torque_derivatives`](crate::passive_torque_derivatives()) for each state: two matrices nv ×
     /// nv.
     ///
-    /// q: nq numbers per state; v: nv; smoothing: ε > 0.
+    /// q: nq numbers per state; v: nv numbers per state; smoothing: ε > 0, the same for all states.
     ///
     /// # Panics
     /// As [`passive_torque`](Self::passive_torque).
@@ -173,17 +175,18 @@ batched! {
         PassiveDerivatives { dtau_dq, dtau_dv }
     }
 
-    /// Computes [`energy_derivatives`](crate::energy_derivatives) for each state: nv numbers each.
+    /// Computes [`energy_derivatives`](crate::energy_derivatives) for each state: three vectors of nv numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn energy_derivatives(model, data; q, v) -> BatchEnergyDerivatives<'_, T> { energy_derivatives(model, data, q, v) }
 
-    /// Computes [`centroidal_derivatives`](crate::centroidal_derivatives()) for each state: 6 × nv and 3 × nv.
+    /// Computes [`centroidal_derivatives`](crate::centroidal_derivatives()) for each state: matrices of 6 × nv and 3 ×
+    /// nv.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -193,7 +196,8 @@ batched! {
 
     /// Computes [`rnea_hessian`](crate::rnea_hessian()) for each state: four matrices nv × nv.
     ///
-    /// q: nq numbers per state; v, a, lambda: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, a and lambda: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -203,7 +207,8 @@ batched! {
 
     /// Computes [`aba_hessian`](crate::aba_hessian()) for each state: four matrices nv × nv.
     ///
-    /// q: nq numbers per state; v, tau, lambda: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau and lambda: nv numbers per state; f_ext: for each state, one force per body in
+    /// the body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
@@ -214,7 +219,8 @@ batched! {
     /// Computes [`rnea_second_derivatives`](crate::rnea_second_derivatives) for each state: the nv × nv matrices of all
     /// τ_i, stacked vertically.
     ///
-    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and a: nv numbers per state; f_ext: for each state, one force per body in the body's
+    /// frame; empty for no forces.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -231,10 +237,12 @@ batched! {
     /// Computes [`RneaDerivatives::with_respect_to`](crate::RneaDerivatives::with_respect_to) for each state: nv ×
     /// [`Input::len`].
     ///
-    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and a: nv numbers per state; f_ext: for each state, one force per body in the body's
+    /// frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the input names a body that does not move, or its smoothing is not positive.
+    /// In the same cases as [`rnea`](Self::rnea), or if the input names a body that does not move, or if the smoothing
+    /// of the input is not positive.
     fn rnea_input_derivative(model, data => to; q, v, a, f_ext; input: Input)
     with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));
@@ -246,10 +254,12 @@ batched! {
     /// Computes [`AbaDerivatives::with_respect_to`](crate::AbaDerivatives::with_respect_to) for each state: nv ×
     /// [`Input::len`].
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`aba`](Self::aba), or if the input names a body that does not move, or its smoothing is not positive.
+    /// In the same cases as [`aba`](Self::aba), or if the input names a body that does not move, or if the smoothing of
+    /// the input is not positive.
     fn aba_input_derivative(model, data => to; q, v, tau, f_ext; input: Input)
     with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));

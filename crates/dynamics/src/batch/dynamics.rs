@@ -13,16 +13,17 @@ use crate::passes::passive::passive_torque;
 batched! {
     /// Computes [`rnea`](crate::rnea()) for each state: τ, nv numbers.
     ///
-    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and a: nv numbers per state; f_ext: for each state, one force per body in the body's
+    /// frame; empty for no forces.
     ///
     /// # Panics
     /// If an argument has the wrong length, the number of states exceeds the capacity, or the batch was made for a
-    /// model of another tree. The same holds for all functions below.
+    /// model with another tree. All other functions of a batch panic in these cases, too.
     fn rnea(model, data; q, v, a, f_ext) -> &[T] [[NV]] { rnea(model, data, q, v, a, f_ext) }
 
     /// Computes [`nonlinear_effects`](crate::nonlinear_effects) for each state: h, nv numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -38,7 +39,7 @@ batched! {
 
     /// Computes [`static_torque`](crate::static_torque()) for each state: τ, nv numbers.
     ///
-    /// q: nq numbers per state; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; f_ext: for each state, one force per body in the body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -46,7 +47,7 @@ batched! {
 
     /// Computes [`coriolis_matrix`](crate::coriolis_matrix) for each state: C, nv × nv.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -54,15 +55,18 @@ batched! {
 
     /// Computes [`aba`](crate::aba()) for each state: q̈, nv numbers.
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`](crate::Model::singular_joints)).
+    /// In the same cases as [`rnea`](Self::rnea), or if M is singular
+    /// ([`Model::singular_joints`](crate::Model::singular_joints)).
     fn aba(model, data; q, v, tau, f_ext) -> &[T] [[NV]] { aba(model, data, q, v, tau, f_ext) }
 
     /// Computes [`forward_dynamics`](crate::forward_dynamics()) for each state by a given method: q̈, nv numbers.
     ///
-    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v and tau: nv numbers per state; f_ext: for each state, one force per body in the
+    /// body's frame; empty for no forces.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
@@ -88,10 +92,10 @@ batched! {
 
     /// Computes [`passive_torque`](crate::passive_torque) for each state: τ, nv numbers.
     ///
-    /// q: nq numbers per state; v: nv; smoothing: ε > 0.
+    /// q: nq numbers per state; v: nv numbers per state; smoothing: ε > 0, the same for all states.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if `smoothing` is not positive.
+    /// In the same cases as [`rnea`](Self::rnea), or if `smoothing` is not positive.
     fn passive_torque(model, data; q, v; smoothing: f64) with wide -> &[T] [[NV]] {
         let tau = &mut wide[..v.len()];
         passive_torque(model, q, v, smoothing, tau);
@@ -100,7 +104,7 @@ batched! {
 
     /// Computes [`joint_torque_regressor`](crate::joint_torque_regressor) for each state: Y, nv × 10 (bodies − 1).
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -111,7 +115,7 @@ batched! {
     /// Computes [`kinetic_energy_regressor`](crate::kinetic_energy_regressor) for each state: y, 10 (bodies − 1)
     /// numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).

@@ -1,4 +1,4 @@
-//! Work of a batch: groups of states, one state per lane, distributed over threads.
+//! Distribution of a batch's work: groups of states, with one state per lane, are distributed over threads.
 
 use super::places::Places;
 use super::state_matrix::StateMatrix;
@@ -19,12 +19,13 @@ pub(super) struct Group<S: Block> {
     workers: Vec<Worker<S>>,
     /// Maximum number of groups.
     groups: usize,
-    /// Matrices of each group, allocated for the kinds that passes have requested so far. Written by: `keep`.
+    /// Matrices of each group, one per kind. Memory exists for the kinds that passes have requested so far. Written by:
+    /// `keep`.
     matrices: Vec<[Matrix<S>; KINDS]>,
 }
 
-/// Indices of the matrices that a group of states keeps in lanes, each nv × nv. Each matrix is written by one pass
-/// only, so that its zeros stay zero.
+/// Kinds of matrices that a group of states keeps in lanes, as indices; each matrix is nv × nv. Only one pass writes a
+/// matrix, so that the zeros of the matrix stay zero.
 pub(super) const M: usize = 0;
 
 pub(super) const MINV: usize = 1;
@@ -33,18 +34,18 @@ pub(super) const DTAU: [usize; 3] = [2, 3, 4];
 
 pub(super) const DA: [usize; 2] = [5, 6];
 
-/// Kinds that are symmetric: the two numbers of a pair differ at most by rounding, and either may replace the other.
+/// Kinds of symmetric matrices. Entries (i, j) and (j, i) differ at most by rounding, so either may be used for both.
 pub(super) const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
 
 pub(super) const KINDS: usize = 7;
 
-/// Number of arguments of a state. Their slots, in order: q; v; an acceleration or an effort; λ of a contraction;
-/// forces.
+/// Number of arguments of a pass for a state. The slots of arguments are, in order: q; v; an acceleration or an effort;
+/// the factor λ of a contraction; external forces.
 pub(super) const ARGUMENTS: usize = 5;
 
 pub(super) const FORCES: usize = ARGUMENTS - 1;
 
-/// Scratch of a thread.
+/// Scratch of one thread.
 #[derive(Debug)]
 struct Worker<S: Block> {
     data: Data<S>,
@@ -72,7 +73,7 @@ impl<S: Block> Worker<S> {
 }
 
 impl<S: Block> Clone for Worker<S> {
-    /// Returns a copy with the same capacity for forces, so that the copy does not allocate later either.
+    /// Returns a copy with the same capacity for forces, so that later calls on the copy do not allocate.
     fn clone(&self) -> Self {
         let Self { data, numbers, f_ext, six, wide } = self;
         let mut forces = Vec::with_capacity(f_ext.capacity());
@@ -88,7 +89,7 @@ pub(super) struct States<'w, S: Block> {
     pub q: &'w [S],
     pub v: &'w [S],
     pub a: &'w [S],
-    /// Same slice as `a`; a pass uses one of the two.
+    /// Same slice as `a`; a pass uses either `a` or `tau`.
     pub tau: &'w [S],
     pub lambda: &'w [S],
     pub f_ext: &'w [Force<S>],
@@ -97,16 +98,16 @@ pub(super) struct States<'w, S: Block> {
     pub six: &'w mut [Matrix<S>; 2],
     /// Scratch. Shape: nv × max(nv, 10).
     pub wide: &'w mut [S],
-    /// Matrices that stay in lanes, if the pass has any.
+    /// Matrices that stay in lanes; `None` if the pass has no such matrices.
     pub kept: Option<&'w mut [Matrix<S>; KINDS]>,
 }
 
-/// Work on a group of states: calls a function of this crate, and writes its results to their slots.
+/// Work on a group of states: a call of a function of this crate, whose results are written to destinations.
 pub(super) trait Pass<T: Real>: Copy + Sync {
     /// Kinds of matrices that the pass leaves in lanes.
     const KINDS: &'static [usize];
 
-    /// Runs the pass. Must be inlined into the code of the SIMD level.
+    /// Runs the pass. Implementations must be inlined into the code of the SIMD level.
     fn run<S: Block<Number = T>>(self, states: States<'_, S>, to: &mut Places<'_, T>);
 }
 
@@ -119,35 +120,36 @@ impl<T: Real, S: Block<Number = T>, P: Pass<T>> Kernel for Entered<'_, '_, '_, T
     }
 }
 
-/// Runs a pass with the instructions of its lanes.
+/// Runs a pass with the instructions of the SIMD level to which the lanes belong.
 pub(super) fn enter<T: Real, S: Block<Number = T>>(pass: impl Pass<T>, of: States<'_, S>, to: &mut Places<'_, T>) {
     S::enter(Entered(pass, of, to));
 }
 
-/// Pass for one type of lanes. The code that distributes states is compiled once for all passes.
+/// Function that runs a pass on one type of lanes. As the function is called through a pointer, the code that
+/// distributes states is compiled once for all passes.
 pub(super) type Work<'f, T, S> = dyn Fn(States<'_, S>, &mut Places<'_, T>) + Sync + 'f;
 
-/// Arguments of some states; arguments that a function does not take are empty.
+/// Arguments for several states; arguments that a function does not take are empty slices.
 #[derive(Clone, Copy)]
 pub(super) struct Arguments<'a, T>(pub [&'a [T]; ARGUMENTS]);
 
 impl<T> Arguments<'_, T> {
-    /// Splits the arguments into those for the first `n` of `states` states and those for the others.
+    /// Splits the arguments for `states` states into arguments for the first `n` states and arguments for the others.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let parts = self.0.map(|of| of.split_at(of.len() / states * n));
         (Self(parts.map(|part| part.0)), Self(parts.map(|part| part.1)))
     }
 }
 
-/// Destinations for the results of some states: vectors and matrices of each state, and matrices that stay in lanes, if
-/// any.
+/// Destinations for the results of several states: vectors and matrices of each state, and matrices that stay in lanes.
 struct Results<'a, S: Block> {
     numbers: Places<'a, S::Number>,
     matrices: &'a mut [[Matrix<S>; KINDS]],
 }
 
 impl<S: Block> Results<'_, S> {
-    /// Splits the destinations into those for the first `n` of `states` states and those for the others.
+    /// Splits the destinations for `states` states into destinations for the first `n` states and destinations for the
+    /// others.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let numbers = self.numbers.split(n, states);
         let matrices = self.matrices.split_at_mut(n.div_ceil(S::LANES).min(self.matrices.len()));
@@ -155,13 +157,13 @@ impl<S: Block> Results<'_, S> {
     }
 }
 
-/// Workers that share the computation, each with its constraints if the pass has any.
+/// Workers that share a computation, and one constraint set per worker if the pass has constraints.
 struct Team<'a, S: Block> {
     workers: &'a mut [Worker<S>],
     sets: &'a mut [ConstraintSet<S>],
 }
 
-/// Runs the work on all states, on all threads.
+/// Runs the work on all states, distributed over all threads.
 fn spread<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
@@ -229,7 +231,7 @@ impl<S: Block> Group<S> {
         self.workers.len()
     }
 
-    /// Panics unless this group was made for a model of the same tree.
+    /// Panics unless this group was made for a model with the same tree.
     #[track_caller]
     pub(super) fn check(&self, model: &Model) {
         self.workers[0].data.check(model);
@@ -274,7 +276,7 @@ impl<S: Block> Group<S> {
         StateMatrix::new(lane, [n, n], [S::LANES, S::LANES * n])
     }
 
-    /// Writes the matrices of the first states by rows, as many states as `to` has space for.
+    /// Writes matrices by rows, starting with the first state, until `to` is full.
     pub(super) fn write_rows(&self, kind: usize, to: &mut [S::Number]) {
         let n = self.matrices.first().map_or(0, |matrices| matrices[kind].nrows());
         if n == 0 {

@@ -10,7 +10,7 @@ use crate::passes::frames::ReferenceFrame;
 use condyle_spatial::Matrix;
 use condyle_spatial::block::Real;
 
-/// Derivatives of an acceleration, in the matrices of a single call.
+/// Derivatives of an acceleration, in the matrices that a single call fills.
 struct AccelerationDerivatives<'s, S> {
     da_dq: &'s Matrix<S>,
     da_dv: &'s Matrix<S>,
@@ -27,8 +27,8 @@ results! {
 }
 
 batched! {
-    /// Computes [`forward_kinematics`](crate::forward_kinematics) for each state: oXb of all bodies, in the order of
-    /// the bodies.
+    /// Computes [`forward_kinematics`](crate::forward_kinematics) for each state: the placements oXb of all bodies, in
+    /// order.
     ///
     /// q: nq numbers per state.
     ///
@@ -49,12 +49,13 @@ batched! {
         }
     }
 
-    /// Computes [`Placements::frame`](crate::Placements::frame) for each state: oXf, the only pose of the state.
+    /// Computes [`Placements::frame`](crate::Placements::frame) for each state: one pose, the placement oXf of the
+    /// frame.
     ///
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_placement(model, data => to; q; frame: usize) -> Poses<'_, T> [[4, 4]] {
         to.pose(0, [0, 1], forward_kinematics(model, data, q).frame(frame));
     }
@@ -64,7 +65,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_jacobian(model, data; q; frame: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         frame_jacobian(model, q, frame, reference, &mut six[0]);
         &six[0]
@@ -75,7 +76,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_jacobian(model, data; q; body: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         body_jacobian(model, q, body, reference, &mut six[0]);
         &six[0]
@@ -83,20 +84,20 @@ batched! {
 
     /// Computes [`Velocities::frame_velocity`](crate::Velocities::frame_velocity) for each state: v, six numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_velocity(model, data; q, v; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).frame_velocity(frame, reference)
     }
 
     /// Computes [`Velocities::body_velocity`](crate::Velocities::body_velocity) for each state: v, six numbers.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_velocity(model, data; q, v; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).body_velocity(body, reference)
     }
@@ -104,10 +105,10 @@ batched! {
     /// Computes [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration) for each state: a, six
     /// numbers.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference)
     }
@@ -115,32 +116,32 @@ batched! {
     /// Computes [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration) for each state: a, six
     /// numbers.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).body_acceleration(body, reference)
     }
 
     /// Computes [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration) for
-    /// each state: v̇ + ω × v, ω̇, six numbers.
+    /// each state: six numbers, v̇ + ω × v and then ω̇.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_classical_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference)
     }
 
     /// Computes [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration) for
-    /// each state: v̇ + ω × v, ω̇, six numbers.
+    /// each state: six numbers, v̇ + ω × v and then ω̇.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_classical_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference)
     }
@@ -148,10 +149,10 @@ batched! {
     /// Computes [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate) for each state: dJ/dt, 6 ×
     /// nv.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_jacobian_rate(model, data; q, v; frame: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_jacobian_rate(frame, reference, &mut six[0]);
@@ -161,10 +162,10 @@ batched! {
     /// Computes [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate) for each state: dJ/dt, 6 ×
     /// nv.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_jacobian_rate(model, data; q, v; body: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_jacobian_rate(body, reference, &mut six[0]);
@@ -174,10 +175,10 @@ batched! {
     /// Computes [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative) for each state:
     /// ∂v/∂q, 6 × nv.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_velocity_derivative(model, data; q, v; frame: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_velocity_derivative(frame, reference, &mut six[0]);
@@ -187,10 +188,10 @@ batched! {
     /// Computes [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative) for each state:
     /// ∂v/∂q, 6 × nv.
     ///
-    /// q: nq numbers per state; v: nv.
+    /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_velocity_derivative(model, data; q, v; body: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_velocity_derivative(body, reference, &mut six[0]);
@@ -198,12 +199,12 @@ batched! {
     }
 
     /// Computes [`Accelerations::frame_acceleration_derivatives`](crate::Accelerations::frame_acceleration_derivatives)
-    /// for each state, 6 × nv.
+    /// for each state: two matrices 6 × nv.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
@@ -212,12 +213,12 @@ batched! {
     }
 
     /// Computes [`Accelerations::body_acceleration_derivatives`](crate::Accelerations::body_acceleration_derivatives)
-    /// for each state, 6 × nv.
+    /// for each state: two matrices 6 × nv.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the body does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_acceleration_derivatives(model, data; q, v, a; body: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
@@ -226,13 +227,13 @@ batched! {
     }
 
     /// Computes
-    /// [`frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives)
-    /// for each state, 6 × nv.
+    /// [`frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives) for
+    /// each state: two matrices 6 × nv.
     ///
-    /// q: nq numbers per state; v, a: nv.
+    /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the frame does not exist.
+    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_classical_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;

@@ -1,15 +1,16 @@
 //! Batches of states, such as the knots of a horizon or the samples of a controller.
 //!
-//! A pass computes one state per lane of a vector register. The number of lanes depends on the SIMD level: eight or
-//! four in `f64`, sixteen or eight in `f32`, and one at the baseline level. Groups of states are distributed over
-//! threads. Arguments and results are stored state by state. The matrices of RNEA, CRBA, ABA and M⁻¹ keep the layout of
-//! the passes: entry by entry, each entry for a whole group. Lanes are independent, and each computes like a single
-//! call at that level. So a state's numbers are bitwise the same at any index, for any batch size and any number of
-//! threads.
+//! A pass (a recursion over the bodies) computes one state per lane of a vector register. The number of lanes depends
+//! on the SIMD level: eight or four in `f64`, sixteen or eight in `f32`, and one at the baseline level. Groups of
+//! states are distributed over threads. Arguments and results are stored state by state. The matrices of RNEA, CRBA,
+//! ABA and M⁻¹ keep the layout of the passes: entry by entry, each entry for all states of a group. Lanes are
+//! independent, and each lane computes like a single call at the same SIMD level. So the results of a state have the
+//! same bits at any index, for any batch size and any number of threads.
 //!
-//! Each function is an entry of a table (`table.rs`), which calls the function for a single state on lanes.
+//! Each function is an entry of a table (`table.rs`). The entry calls the function for a single state, with lanes as
+//! its numbers.
 
-/// Evaluates the same expression for each variant of an `InLanes` or `Sets`.
+/// Evaluates an expression for the variant of an `InLanes` or `Sets`; the expression is the same for all variants.
 macro_rules! each {
     ($Of:ident, $of:expr, $some:ident => $body:expr) => {
         match $of {
@@ -46,17 +47,17 @@ use places::{MOST_RESULTS, Places};
 use results::{Last, Shape};
 use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 
-/// Scratch and results for up to N states at once, on one or several threads.
+/// Scratch and results for the computation of up to N states in one call, on one or several threads.
 ///
 /// Every function takes the arguments of the function of the same name for a single state, concatenated over all
 /// states: q has `states` · nq numbers. The number of states may change from call to call. Results are valid until the
-/// next call. `T` is `f64`, or `f32` with the feature `f32`. If a robot has no coordinates, the number of forces gives
-/// the number of states; without forces, it is the capacity.
+/// next call. `T` is `f64`, or `f32` with the feature `f32`. If a robot has no coordinates, the number of forces
+/// determines the number of states; without forces, the number of states is the capacity.
 ///
 /// [`new`](Self::new) allocates the scratch of each thread, and a vector of nv numbers per state. A call allocates if
-/// its results need more memory than all earlier ones. With more than one thread, rayon allocates too. The SIMD level
-/// is the one in use when the batch is made. A batch for one thread runs in the caller's thread. Otherwise it runs in
-/// the rayon pool in which it is called, or in the global pool.
+/// its results need more memory than the results of all earlier calls. With more than one thread, rayon allocates too.
+/// A batch uses the SIMD level that is current when the batch is made. A batch for one thread runs in the caller's
+/// thread. Other batches run in the rayon pool of the caller, or in the global pool.
 ///
 /// ```
 /// use condyle_dynamics::{Batch, Data, rnea, robots};
@@ -72,13 +73,13 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
-    /// Results that do not stay in lanes, of all states one after the other. Shape: states × shape of the result.
-    /// Written by: all functions.
+    /// Results that do not stay in lanes, one state after the other. Shape: states × shape of the result. Written by:
+    /// all functions.
     slots: [Vec<T>; MOST_RESULTS],
     last: Last,
 }
 
-/// Number type of batches: `f64`, and `f32` with the feature `f32`.
+/// Number type that batches support: `f64`, and `f32` with the feature `f32`.
 pub trait BatchNumber: Real {}
 
 impl BatchNumber for f64 {}
@@ -86,7 +87,7 @@ impl BatchNumber for f64 {}
 #[cfg(feature = "f32")]
 impl BatchNumber for f32 {}
 
-/// Groups of states, with as many lanes as the vectors of the SIMD level.
+/// Groups of states, with the number of lanes that the vectors of the SIMD level have.
 #[derive(Clone, Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
@@ -95,10 +96,10 @@ enum InLanes<T: Real> {
 }
 
 impl<T: Real> Batch<T> {
-    /// Maximum number of threads; each has its own scratch.
+    /// Maximum number of threads of a batch; each thread has its own scratch.
     pub const MOST_THREADS: usize = 1024;
 
-    /// Maximum number of states; memory may suffice for fewer.
+    /// Maximum number of states of a batch; the memory of the machine may suffice only for fewer states.
     pub const MOST_STATES: usize = 1 << (usize::BITS / 2);
 
     /// Allocates a batch for up to `states` states at once, on `threads` threads.
@@ -127,11 +128,12 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// Returns a writer with the same functions, which write their results to the caller's memory.
+    /// Returns a writer: its functions are the functions of a batch, but write the results to the caller's memory.
     ///
-    /// `to` has one slice for each result of the function, in the order of the fields of its struct. Each slice holds
-    /// the numbers of all states one after the other, matrices by rows. Writing results directly avoids a second pass
-    /// through memory. If no argument gives the number of states, the length of the slices does.
+    /// `to` has one slice for each result of the function that is called, in the order of the fields of the result's
+    /// struct. Each slice holds the numbers of all states one after the other, matrices by rows. Results that are
+    /// written directly are not copied afterwards. If no argument determines the number of states, the length of the
+    /// slices determines it.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -155,8 +157,8 @@ impl<T: Real> Batch<T> {
         each!(InLanes, &self.lanes, group => group.threads())
     }
 
-    /// Returns the number of states of the arguments. The first argument with numbers per state determines it,
-    /// otherwise the forces do; without both, it is `full`.
+    /// Returns the number of states of the arguments. The first argument whose length per state is not 0 determines
+    /// this number. Without such an argument, the forces determine it. Without forces, the number is `full`.
     #[track_caller]
     fn count(&self, model: &Model, given: &[Given<'_, T>], full: usize) -> usize {
         let length = |at: usize| [model.nq(), model.nv(), model.nv(), model.nv(), 6 * model.nodes().len()][at];
@@ -185,8 +187,8 @@ impl<T: Real> Batch<T> {
         states
     }
 
-    /// Checks the arguments and runs a pass over all states. Results of these shapes go to the caller's memory
-    /// `written`, or stay in the batch.
+    /// Checks the arguments and runs a pass over all states. The results have the given shapes. If `written` is `None`,
+    /// the results stay in the batch; otherwise they go to the caller's memory `written`.
     #[track_caller]
     fn compute<P: Pass<T>>(
         &mut self,

@@ -1,4 +1,4 @@
-//! Destinations to which passes of a batch write the results of each state, one after the other.
+//! Destinations to which the passes of a batch write results, one state after the other.
 
 use super::group::SYMMETRIC;
 use condyle_spatial::block::{Block, MOST, Strided, scatter, scatter_matrix};
@@ -8,17 +8,17 @@ use core::mem;
 /// Maximum number of results of a function.
 pub(super) const MOST_RESULTS: usize = 12;
 
-/// Destinations for the results of states. Passes fill them one after the other, for a few states at a time.
+/// Destinations for the results of states. A pass fills one destination after the other, for a few states at a time.
 pub(super) struct Places<'a, T> {
-    /// Memory for the numbers of all states; empty beyond the number of results.
+    /// Memory for the numbers of all states, one slice per result; slices after the last result are empty.
     to: [&'a mut [T]; MOST_RESULTS],
     /// Number of results.
     results: usize,
-    /// Index of the first state that is written now.
+    /// Index of the first of the states that a pass currently writes.
     first: usize,
-    /// Number of states that are written now.
+    /// Number of states that a pass currently writes.
     states: usize,
-    /// Index of the result that is written next.
+    /// Index of the result that the pass writes next.
     next: usize,
 }
 
@@ -28,12 +28,13 @@ impl<'a, T> Places<'a, T> {
         Self { to, results, first: 0, states, next: 0 }
     }
 
-    /// Moves on to `states` states, starting at state `first`.
+    /// Selects the next states to write: `states` states, starting with state `first`.
     pub(super) fn go_to(&mut self, first: usize, states: usize) {
         (self.first, self.states, self.next) = (first, states, 0);
     }
 
-    /// Splits the destinations into those for the first `n` of `states` states and those for the others.
+    /// Splits the destinations for `states` states into destinations for the first `n` states and destinations for the
+    /// others.
     pub(super) fn split(mut self, n: usize, states: usize) -> (Self, Self) {
         let mut others = Self::new(Default::default(), self.results, states - n);
         for (first, other) in self.to[..self.results].iter_mut().zip(&mut others.to) {
@@ -59,9 +60,9 @@ impl<T> Places<'_, T> {
         self.next += 1;
     }
 
-    /// Writes a matrix of each state by rows, for a kind that could also have stayed in lanes.
+    /// Writes a matrix of each state by rows. Matrices of this kind could also have stayed in lanes.
     pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &Matrix<S>) {
-        // The columns of a symmetric matrix are its rows, one after the other.
+        // The columns of a symmetric matrix equal its rows, so the numbers are copied in order.
         let columns = if SYMMETRIC.contains(&kind) { x.len() } else { x.ncols() };
         self.columns(x.as_slice(), columns);
     }
@@ -92,7 +93,7 @@ impl<T> Places<'_, T> {
     }
 }
 
-/// Result of a single call, which is written to the next destinations.
+/// Result of a single call, which can be written to the next destinations.
 pub(super) trait Put<S: Block> {
     fn put(self, to: &mut Places<'_, S::Number>);
 }
@@ -118,7 +119,8 @@ put! {
     Inertia<S>: I => columns(&centroidal_matrix(I), 6);
 }
 
-/// Returns the inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī], by columns.
+/// Returns the 6 × 6 inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī], by columns. m is the mass, Ī
+/// the rotational inertia.
 #[inline(always)]
 fn centroidal_matrix<S: Scalar>(I: Inertia<S>) -> [S; 36] {
     let mut columns = [S::zero(); 36];

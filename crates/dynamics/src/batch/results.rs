@@ -1,4 +1,4 @@
-//! Results of a batch: vectors, matrices and poses of each state, and structs of them.
+//! Results of a batch: vectors, matrices and poses of each state, and structs of these types.
 
 use super::places::MOST_RESULTS;
 use super::state_matrix::StateMatrix;
@@ -7,8 +7,8 @@ use condyle_linalg::{check, check_index};
 use condyle_spatial::block::Real;
 use condyle_spatial::{Mat3, Se3, Vec3};
 
-/// Shape of a result for one state: no sizes for a number, one for a vector, two for a matrix, three for several
-/// matrices.
+/// Shape of a result for one state. A number has no sizes, a vector has one, a matrix has two, and several matrices
+/// have three.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Shape {
     sizes: [usize; 3],
@@ -42,8 +42,8 @@ impl Shape {
     }
 }
 
-/// Shapes of the results of a batch's last call: the number of states, the shape of each result, and the kind of each
-/// matrix that stays in lanes.
+/// Description of the results of a batch's last call: the number of states, the shape of each result, and the kind of
+/// each matrix that stays in lanes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Last {
     pub states: usize,
@@ -53,14 +53,14 @@ pub(super) struct Last {
 }
 
 impl Last {
-    /// Returns the number of states for which the slices have space. The first result with numbers determines it;
-    /// otherwise it is 0.
+    /// Returns the number of states for which the slices have space. The first result that is not empty determines this
+    /// number. If all results are empty, the number is 0.
     pub(super) fn room<T>(&self, places: &[&mut [T]]) -> usize {
         let first = places.iter().zip(&self.shapes).find(|(_, shape)| shape.len() > 0);
         first.map_or(0, |(place, shape)| place.len() / shape.len())
     }
 
-    /// Panics unless the slices match the results.
+    /// Panics unless there is one slice per result, with the length of the result.
     #[track_caller]
     pub(super) fn check<T>(&self, places: &[&mut [T]]) {
         assert!(
@@ -76,7 +76,7 @@ impl Last {
     }
 }
 
-/// Results that are read one after the other.
+/// Results of a batch, which are taken one after the other.
 pub(super) struct Taken<'b, T: Real> {
     pub batch: &'b Batch<T>,
     pub next: usize,
@@ -84,7 +84,8 @@ pub(super) struct Taken<'b, T: Real> {
 
 /// Type of results.
 pub(super) trait Take<'b, T: Real> {
-    /// Shapes of the results, for types that define them. Otherwise the function defines them.
+    /// Shapes of the results, for types that define shapes. For other types, the entry of the function in the table
+    /// defines the shapes.
     const SHAPES: &'static [&'static [usize]] = &[];
 
     fn take(from: &mut Taken<'b, T>) -> Self;
@@ -120,7 +121,7 @@ impl<'b, T: Real> Take<'b, T> for Poses<'b, T> {
     }
 }
 
-/// Matrix of each state of a batch.
+/// Matrices of the states of a batch, one per state.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrices<'b, T: Real> {
     of: Stored<'b, T>,
@@ -130,9 +131,9 @@ pub struct Matrices<'b, T: Real> {
 
 #[derive(Clone, Copy, Debug)]
 enum Stored<'b, T: Real> {
-    /// Matrices of this kind, as the passes leave them.
+    /// Matrices of the given kind, in the lanes in which the passes wrote them.
     InLanes(&'b InLanes<T>, usize),
-    /// Matrices one after the other, each by rows.
+    /// Matrices of all states, one after the other, each by rows.
     ByRows(&'b [T]),
 }
 
@@ -192,10 +193,10 @@ impl<'b, T: Real> Matrices<'b, T> {
     }
 }
 
-/// Poses of each state of a batch.
+/// Poses of the states of a batch; each state has the same number of poses.
 #[derive(Clone, Copy, Debug)]
 pub struct Poses<'b, T> {
-    /// Homogeneous matrices, each by rows.
+    /// Homogeneous matrices of all poses, each by rows.
     numbers: &'b [T],
     each: usize,
     states: usize,
@@ -221,8 +222,8 @@ fn check_state(k: usize, states: usize) {
     check_index("k", k, states, "states");
 }
 
-/// Defines structs of results, each made from a single call's struct. The fields of the given names are written one
-/// after the other, to destinations of the shapes in brackets.
+/// Defines structs with the results of a batch, each from the struct of the function for a single state. The fields
+/// with the given names are written one after the other, to destinations with the shapes in brackets.
 macro_rules! results {
     ($(
         $(#[$doc:meta])*

@@ -1,7 +1,7 @@
 //! Matrix of one state of a batch: borrowed numbers with a shape and two strides.
 //!
-//! The type is not a view of nalgebra, because nalgebra's products of views with non-adjacent rows read and write out
-//! of bounds (its issue 1616). Here every access is checked.
+//! The type is not a view of nalgebra, because products with such views are unsafe: if the rows are not adjacent,
+//! nalgebra reads and writes out of bounds (nalgebra's issue 1616). Here every access is checked.
 
 use super::state_matrix_operators::dot;
 use condyle_linalg::check;
@@ -12,9 +12,9 @@ use nalgebra::{DMatrix, Dim, Matrix, RawStorage, RawStorageMut, Scalar};
 
 /// Matrix of one state of a batch, which borrows its entries from the batch's results.
 ///
-/// Rows and columns may both have gaps between their entries, because several states share the memory. The matrix
-/// supports indexing, iteration by columns, transposition, sums, differences and products, like a matrix of nalgebra.
-/// [`to_owned`](Self::to_owned) copies it to a `DMatrix`, for all other operations.
+/// Both rows and columns may have gaps between their entries, because the memory also holds the matrices of other
+/// states. The matrix supports indexing, iteration by columns, transposition, sums, differences and products, like a
+/// matrix of nalgebra. [`to_owned`](Self::to_owned) copies it to a `DMatrix`, for all other operations.
 ///
 /// ```
 /// use condyle_dynamics::{Batch, robots};
@@ -28,7 +28,7 @@ use nalgebra::{DMatrix, Dim, Matrix, RawStorage, RawStorageMut, Scalar};
 /// assert!((M * &x - copy * x).amax() < 1e-14);
 /// ```
 pub struct StateMatrix<'b, T> {
-    /// Numbers; entry (i, j) is number i · `strides[0]` + j · `strides[1]`.
+    /// Numbers of the batch; entry (i, j) of the matrix is number i · `strides[0]` + j · `strides[1]`.
     numbers: &'b [T],
     shape: [usize; 2],
     strides: [usize; 2],
@@ -44,7 +44,8 @@ impl<T> Clone for StateMatrix<'_, T> {
 impl<T> Copy for StateMatrix<'_, T> {}
 
 impl<'b, T> StateMatrix<'b, T> {
-    /// Returns the matrix of this shape whose entry (i, j) is number i · `strides[0]` + j · `strides[1]`.
+    /// Returns the matrix with the given shape, whose entry (i, j) is number i · `strides[0]` + j · `strides[1]` of
+    /// `numbers`.
     ///
     /// # Panics
     /// If `numbers` is too short.
@@ -126,7 +127,7 @@ impl<'b, T> StateMatrix<'b, T> {
         self.columns(j, 1)
     }
 
-    /// Returns `count` rows from row `first` on.
+    /// Returns `count` rows, starting with row `first`.
     ///
     /// # Panics
     /// If one of these rows does not exist.
@@ -136,7 +137,7 @@ impl<'b, T> StateMatrix<'b, T> {
         self.view((first, 0), (count, self.shape[1]))
     }
 
-    /// Returns `count` columns from column `first` on.
+    /// Returns `count` columns, starting with column `first`.
     ///
     /// # Panics
     /// If one of these columns does not exist.
@@ -146,7 +147,7 @@ impl<'b, T> StateMatrix<'b, T> {
         self.view((0, first), (self.shape[0], count))
     }
 
-    /// Returns the block of this shape whose first entry is (i, j).
+    /// Returns the block of m × n entries whose first entry is (i, j).
     ///
     /// # Panics
     /// If the block is not inside the matrix.
@@ -186,7 +187,7 @@ impl<'b, T> StateMatrix<'b, T> {
         column.iter().step_by(self.strides[0]).take(self.shape[0])
     }
 
-    /// Panics unless the matrix has this shape.
+    /// Panics unless the matrix has the shape `found`.
     #[track_caller]
     fn check_shape(&self, name: &str, found: (usize, usize)) {
         let [m, n] = self.shape;
@@ -200,7 +201,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
         DMatrix::from_iterator(self.shape[0], self.shape[1], self.iter().cloned())
     }
 
-    /// Copies the matrix to a matrix of nalgebra, or to a block of one. Allocates nothing.
+    /// Copies the matrix to a matrix of nalgebra, or to a block of such a matrix. Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -231,7 +232,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
 }
 
 impl<T: Real> StateMatrix<'_, T> {
-    /// Writes the product M x to `out`, for a vector or a matrix x. Allocates nothing.
+    /// Writes the product M x of this matrix M and a vector or matrix x to `out`. Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -243,8 +244,7 @@ impl<T: Real> StateMatrix<'_, T> {
     /// ```
     ///
     /// # Panics
-    /// If the number of rows of `x` is not the number of columns of the matrix, or `out` does not have the product's
-    /// shape.
+    /// If the number of rows of `x` is not the number of columns of M, or `out` does not have the shape of M x.
     #[track_caller]
     pub fn mul_to<R: Dim, C: Dim, P: Dim, Q: Dim>(
         &self,
@@ -261,7 +261,8 @@ impl<T: Real> StateMatrix<'_, T> {
         }
     }
 
-    /// Writes the product M x of a vector to `out`: x has one number per column, `out` one per row. Allocates nothing.
+    /// Writes the product M x of this matrix M and a vector x to `out`. `x` has one number per column, `out` one number
+    /// per row. Allocates nothing.
     ///
     /// # Panics
     /// If `x` or `out` has the wrong length.
@@ -318,7 +319,7 @@ impl<T> Index<(usize, usize)> for StateMatrix<'_, T> {
     }
 }
 
-/// Panics: the index is outside of the matrix.
+/// Panics because an index is outside of the matrix.
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -1,7 +1,7 @@
-//! Conversions, sums, differences, products and comparisons of [`StateMatrix`], with each other and with matrices of
-//! nalgebra.
+//! Conversions of [`StateMatrix`]; sums, differences, products and comparisons with other [`StateMatrix`] and with
+//! matrices of nalgebra.
 //!
-//! Results own their entries. A product sums over increasing column indices, as two plain loops do.
+//! Results own their entries. Entry (i, j) of a product is a sum over increasing indices, as in plain loops.
 
 use super::state_matrix::StateMatrix;
 use alloc::vec::Vec;
@@ -11,7 +11,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, RawStorage, Scalar};
 
-/// Returns Σ M_ik x_k, summed over increasing k.
+/// Returns Σ M_ik x_k for row i, summed over increasing k.
 #[inline]
 pub(super) fn dot<T: Real>(M: &StateMatrix<'_, T>, i: usize, x: impl Fn(usize) -> T) -> T {
     let mut terms = M.row(i).into_iter().enumerate().map(|(k, &m)| m * x(k));
@@ -89,7 +89,7 @@ impl<T: Copy, R: Dim, C: Dim, S: RawStorage<T, R, C>> Entrywise for Matrix<T, R,
     }
 }
 
-/// Reference to such a matrix.
+/// Reference to a matrix with a shape and entries.
 impl<M: Entrywise> Entrywise for &M {
     type Entry = M::Entry;
     fn size(&self) -> (usize, usize) {
@@ -118,7 +118,7 @@ fn equal<T: PartialEq>(a: &impl Entrywise<Entry = T>, b: &impl Entrywise<Entry =
     b.size() == (m, n) && (0..n).all(|j| (0..m).all(|i| a.entry(i, j) == b.entry(i, j)))
 }
 
-/// Implements a product for these pairs of operands, each by value and by reference.
+/// Implements the product for the given pairs of operand types, each by value and by reference.
 macro_rules! products {
     ($($Left:ty, $Right:ty, [$($dims:tt)*] $Result:ty = $product:ident;)*) => {$(
         products!(@one $Left, $Right, [$($dims)*] $Result = $product);
@@ -175,7 +175,8 @@ products_with_slices! {
     &StateMatrix<'_, T>, [N] &[T; N];
 }
 
-/// Implements sums, differences and comparisons for these pairs of operands, the first two by value and by reference.
+/// Implements sums, differences and comparisons for the given pairs of operand types. Operands of sums and differences
+/// are taken by value and by reference.
 macro_rules! combinations {
     ($([$($generics:tt)*] $Left:ty, $Right:ty;)*) => {$(
         combinations!(@one [$($generics)*] $Left, $Right);

@@ -5,17 +5,17 @@
 //! fn coriolis_matrix(model, data; q, v) -> Matrices<'_, T> [[NV, NV]] { coriolis_matrix(model, data, q, v) }
 //! ```
 //!
-//! into methods of that name for `Batch` and `BatchWriter`. They take and check the arguments of all states, and run
-//! the body on groups of states, one state per lane.
+//! into methods of that name for `Batch` and `BatchWriter`. The methods take and check the arguments of all states, and
+//! run the body on groups of states, one state per lane.
 //!
-//! - The result of the body is written to destinations that have the shapes in brackets. Structs define their shapes in
-//!   `results!`.
+//! - The result of the body is written to destinations that have the shapes in brackets. The macro `results!` defines
+//!   the shapes of structs.
 //! - With `data => to`, the body writes to the destinations itself.
-//! - Arguments of states may be followed by arguments that all states share, with their types.
-//! - `with` names further scratch of the pass.
+//! - After the arguments of each state, an entry may list arguments that all states share, with types.
+//! - `with` names further scratch that the pass uses.
 //! - `columns` gives the value of `COLUMNS` in a shape.
-//! - `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of the shapes. A writer writes
-//!   these matrices too.
+//! - `keeps` names matrices of `Data` that stay in lanes and are not copied to destinations. The last shapes in
+//!   brackets belong to these matrices. `BatchWriter` writes these matrices too.
 
 use super::group::FORCES;
 use crate::calls::parameter_derivatives::Input;
@@ -24,33 +24,33 @@ use crate::passes::frames::{ReferenceFrame, check_body, check_frame};
 use crate::passes::passive::check_smoothing;
 use condyle_model::Model;
 
-/// Sizes in shapes that depend on the robot.
+/// Markers in shapes for sizes that depend on the robot.
 pub(super) const NV: usize = usize::MAX;
 pub(super) const BODIES: usize = usize::MAX - 1;
-/// Ten per body, except the world.
+/// Number of inertial parameters: ten per body, except the world.
 pub(super) const PARAMETERS: usize = usize::MAX - 2;
 /// Number of constraint rows.
 pub(super) const ROWS: usize = usize::MAX - 3;
 /// Number of columns given by an entry of the table.
 pub(super) const COLUMNS: usize = usize::MAX - 4;
 
-/// Argument of some states.
+/// Argument of a call, for all states.
 #[derive(Clone, Copy)]
 pub(super) struct Given<'a, T> {
     pub name: &'static str,
-    /// Slot among the arguments of a pass.
+    /// Index of the slot among the arguments of a pass.
     pub at: usize,
     pub numbers: &'a [T],
 }
 
-/// Expands to the type of an argument.
+/// Expands to the type of an argument of the given name.
 macro_rules! given {
     (f_ext, $T:ident) => { &[condyle_spatial::Force<$T>] };
     ($name:ident, $T:ident) => { &[$T] };
 }
 pub(super) use given;
 
-/// Expands to the numbers of an argument.
+/// Expands to the argument of the given name as a slice of numbers.
 macro_rules! numbers {
     (f_ext, $x:expr) => {
         condyle_spatial::block::flat($x)
@@ -72,7 +72,7 @@ pub(super) const fn place(name: &str) -> usize {
     }
 }
 
-/// Argument that all states share. It is checked before the lanes are entered, so that the panic names the caller's
+/// Argument that all states share. It is checked before any lane is computed, so that the panic names the caller's
 /// line.
 pub(super) trait Shared: Sized {
     /// Panics if the argument of this name is invalid for the model.
@@ -83,7 +83,7 @@ pub(super) trait Shared: Sized {
 impl Shared for ReferenceFrame {}
 impl Shared for Option<ForwardDynamicsMethod> {}
 
-/// Index of a body or a frame.
+/// Index of a body or a frame, as a shared argument.
 impl Shared for usize {
     #[track_caller]
     fn check(self, name: &str, model: &Model) {
@@ -94,7 +94,7 @@ impl Shared for usize {
     }
 }
 
-/// Restitution or smoothing.
+/// Restitution or smoothing, as a shared argument.
 impl Shared for f64 {
     #[track_caller]
     fn check(self, name: &str, _: &Model) {
@@ -123,7 +123,8 @@ macro_rules! put {
 }
 pub(super) use put;
 
-/// Expands to the shapes of results, given by the function or by the struct that it returns.
+/// Expands to the shapes of results. They are given by the entry of the function, or by the struct that the function
+/// returns.
 macro_rules! shapes {
     ($Out:ty, [$([$($size:expr),*]),*]) => { &[$(&[$($size),*]),*] };
     ($Out:ty,) => { <$Out as $crate::batch::results::Take<T>>::SHAPES };
@@ -171,7 +172,8 @@ macro_rules! batched {
                 }
             }
 
-            /// Computes all states. Results are `written` to the caller's memory or stay in the batch.
+            /// Computes all states. If `written` is `None`, the results stay in the batch; otherwise they go to the
+            /// caller's memory `written`.
             #[allow(clippy::too_many_arguments)] // as many as the function has
             #[track_caller]
             pub(super) fn compute<T: condyle_spatial::block::Real>(
@@ -214,8 +216,8 @@ macro_rules! batched {
             #[doc = concat!("Writes the results of [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ").")]
             ///
             /// # Panics
-            /// As the method of [`Batch`](crate::Batch), or if `to` does not have one slice per result, each of the
-            /// result's size.
+            /// In the same cases as the method of [`Batch`](crate::Batch), or if `to` does not have one slice per
+            /// result, with the length of the result.
             #[track_caller]
             pub fn $name(
                 &mut self,

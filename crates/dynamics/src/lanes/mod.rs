@@ -1,3 +1,3 @@
-//! Lanes: passes that compute several bodies of one state at once.
+//! Passes in lanes: they compute several bodies of one state at once.
 
 pub(crate) mod limbs;

@@ -1,28 +1,30 @@
-//! Impulses λ of m unilateral contacts with Coulomb friction, computed from velocities:
+//! Impulses λ of m unilateral contacts with Coulomb friction, as the solution of a problem on the level of velocities:
 //!
 //! ```text
 //! u = G λ + b        0 ≤ λ_n ⊥ u_n ≥ 0        ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t/‖u_t‖ where u_t ≠ 0
 //! ```
 //!
-//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity of the points without contact, plus the terms of the gaps in
-//! its normal rows. Each point has three rows: two along the ground, then the normal one. The friction cone is
-//! Coulomb's disc, without a pyramid or a convex relaxation. λ is a solution if and only if it is a fixed point of
+//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity that the points would have without contact, plus terms for the
+//! gaps in the normal rows. Each point has three rows: two along the ground, then the normal one. Friction follows
+//! Coulomb's disc exactly, without a pyramid or a convex relaxation. λ is a solution if and only if it is a fixed point
+//! of
 //!
 //! ```text
 //! λ_n ← max(0, λ_n − u_n/g_n)        λ_t ← P(λ_t − u_t/g_t),  P the projection on the disc of radius μ λ_n
 //! ```
 //!
-//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the distance from the fixed point times g, a
+//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the distance from the fixed point times g. It is a
 //! velocity. Two methods take turns:
 //!
-//! - Newton's method on the fixed point. It squares the error once it knows which points stick, slide and are open. A
-//!   few steps are discarded if they do not reduce the residual.
-//! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). They find these sets from any first guess.
+//! - Newton's method on the fixed point. It squares the error once it has found which points stick, slide or are open.
+//!   Several steps together are discarded if they do not reduce the residual.
+//! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). The sweeps find from any first guess which
+//!   points stick, slide or are open.
 //!
 //! Where contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the
-//! diagonal of G in its slope, but not in u. So it takes the step that changes the impulses least, and the fixed point
-//! stays the same (the proximal point algorithm, Rockafellar 1976). The first guess is the impulses of the last step,
-//! so that forces at rest stay constant.
+//! diagonal of G in the slope, but not in the equation for u. So its step changes the impulses least, and the fixed
+//! point stays the same (the proximal point algorithm, Rockafellar 1976). The impulses of the last time step are the
+//! first guess, so that forces at rest stay constant.
 
 use alloc::vec::Vec;
 use condyle_spatial::Scalar;
@@ -30,48 +32,50 @@ use condyle_spatial::Scalar;
 /// Minimum and maximum of ε, as a share of the largest entry on the diagonal of G. The minimum is small compared with
 /// the coupling of contacts, and large compared with rounding.
 const PROXIMAL: [f64; 2] = [1e-8, 1.0];
-/// Minimum of g, as a share of the same entry. The joints may hold a point in some directions, and its rows of G are
-/// then 0.
+/// Minimum of g_n and g_t, as a share of the largest entry on the diagonal of G. If the joints hold a point in a
+/// direction, the row of G for this direction is 0.
 const LEAST: f64 = 1e-12;
-/// Factor by which ε grows after discarded steps, and shrinks after accepted ones.
+/// Factor by which ε grows after discarded steps and shrinks after accepted steps.
 const DAMPING: f64 = 30.0;
-/// Number of steps of Newton's method within which the residual must shrink; chosen because the sets of points settle
-/// in two or three steps, during which the residual may grow (random contacts: 4 fails four times less often than 1).
+/// Number of steps of Newton's method within which the residual must shrink. Two or three steps find which points
+/// stick, slide or are open, and the residual may grow during these steps. With random contacts, 4 steps fail four
+/// times less often than 1 step.
 const BURST: usize = 4;
-/// Maximum share of the residual that may remain after accepted steps.
+/// Maximum ratio of the residual after accepted steps to the residual before.
 const PROGRESS: f64 = 0.7;
-/// Number of sweeps after discarded steps; they cost about as much as one step with 8 points.
+/// Number of Gauss–Seidel sweeps after discarded steps. With 8 points, all these sweeps cost about as much as one step
+/// of Newton's method.
 const SWEEPS: usize = 12;
 /// Number of projections per sweep for a point that slides.
 const ALONE: usize = 4;
-/// Share of the tolerance below which the first guess is kept. A worse guess is improved even if it meets the
-/// tolerance: otherwise the error of one step makes the forces of the next one ripple.
+/// Share of the tolerance below which the residual of a first guess is accepted. A worse guess is improved even if it
+/// meets the tolerance; otherwise the error of one time step makes the forces of the next step ripple.
 const POLISHED: f64 = 1e-4;
 
 /// Outcome of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
-    /// Residual within the tolerance.
+    /// Solution with a residual within the tolerance.
     Solved,
-    /// Residual (m/s) after the maximum number of iterations.
+    /// Failure to reach the tolerance, with the residual (m/s) after the last iteration.
     NotSolved(f64),
 }
 
 /// Memory for contacts of up to a given number of points; matrices are stored by columns.
 #[derive(Clone, Debug)]
 pub(super) struct ContactSolver {
-    /// G. Shape: 3m × 3m. Written by: the caller.
+    /// Delassus matrix G. Shape: 3m × 3m. Written by: the caller.
     pub G: Vec<f64>,
-    /// b (m/s). Shape: 3m. Written by: the caller.
+    /// Velocities b for λ = 0, with the terms of the gaps (m/s). Shape: 3m. Written by: the caller.
     pub b: Vec<f64>,
-    /// λ (N s): the first guess, then the solution. Shape: 3m.
+    /// Impulses λ (N s): the first guess, then the solution. Shape: 3m.
     pub impulses: Vec<f64>,
-    /// u = G λ + b (m/s), at the last λ. Shape: 3m. Written by: `solve`.
+    /// Velocities u = G λ + b (m/s) of the last λ. Shape: 3m. Written by: `solve`.
     pub velocities: Vec<f64>,
-    /// Impulses after Newton's step, and their u.
+    /// Impulses after a step of Newton's method, and the velocities u for these impulses.
     candidate: Vec<f64>,
     candidate_velocities: Vec<f64>,
-    /// Slope, right-hand side and solution of Newton's equation. Shape: 3m × 3m, and 3m.
+    /// Slope of Newton's equation, and its right-hand side, which the solution overwrites. Shape: 3m × 3m, and 3m.
     slope: Vec<f64>,
     step: Vec<f64>,
 }
@@ -93,7 +97,8 @@ impl ContactSolver {
     }
 
     /// Solves for λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). One iteration is
-    /// a burst of Newton's method, plus the sweeps if its steps are discarded. λ is always inside its cones.
+    /// a burst of steps of Newton's method, plus the sweeps if these steps are discarded. λ is always inside the
+    /// friction cones.
     pub(super) fn solve(&mut self, points: usize, friction: f64, tolerance: f64, max_iterations: usize) -> Outcome {
         let n = 3 * points;
         let Self { G, b, impulses, velocities, candidate, candidate_velocities, slope, step } = self;
@@ -143,7 +148,7 @@ impl ContactSolver {
     }
 }
 
-/// Numbers of one instant.
+/// Equations of the contacts in one time step.
 struct Problem<'a> {
     G: &'a [f64],
     b: &'a [f64],
@@ -164,26 +169,27 @@ impl<'a> Problem<'a> {
         self.G[j * self.n + i]
     }
 
-    /// Returns g_t and g_n of the point whose rows begin at r: bounds of the eigenvalues of its blocks.
+    /// Returns g_t and g_n of the point whose rows begin at r. They are bounds of the eigenvalues of the point's
+    /// tangential and normal blocks of G.
     fn stiffness(&self, r: usize) -> (f64, f64) {
         let least = LEAST * self.scale;
         ((self.entry(r, r) + self.entry(r + 1, r + 1)).max(least), self.entry(r + 2, r + 2).max(least))
     }
 
-    /// Returns row i of G λ + b.
+    /// Returns entry i of G x + b, for the impulses x.
     fn velocity(&self, i: usize, x: &[f64]) -> f64 {
         let row = &self.G[i * self.n..][..self.n]; // G is symmetric
         row.iter().zip(x).fold(self.b[i], |sum, (g, x)| sum + g * x)
     }
 
-    /// Computes u = G λ + b.
+    /// Computes u = G x + b, for the impulses x.
     fn multiply(&self, x: &[f64], u: &mut [f64]) {
         for (i, u) in u.iter_mut().enumerate() {
             *u = self.velocity(i, x);
         }
     }
 
-    /// Projects each impulse into its cone: λ_n ≥ 0, then ‖λ_t‖ ≤ μ λ_n.
+    /// Projects the impulse of each point into the friction cone: λ_n ≥ 0, then ‖λ_t‖ ≤ μ λ_n.
     fn project(&self, x: &mut [f64]) {
         for x in x.chunks_exact_mut(3) {
             x[2] = x[2].max(0.0);
@@ -191,7 +197,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the largest distance from the fixed point, times g (m/s). It is NaN if a number of λ is NaN.
+    /// Returns the largest distance of an impulse from the fixed point, times g (m/s). The result is NaN if an impulse
+    /// is NaN.
     fn residual(&self, x: &[f64], u: &[f64]) -> f64 {
         (0..self.n).step_by(3).fold(0.0, |largest: f64, r| {
             let (g_t, g_n) = self.stiffness(r);
@@ -204,8 +211,8 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Runs one Gauss–Seidel sweep. It sets the impulse of each point to the solution of the point's own law, with all
-    /// other impulses fixed. For a sliding point, it only approaches this solution.
+    /// Runs one Gauss–Seidel sweep. The sweep sets the impulse of each point to the solution of the contact law of this
+    /// point, with all other impulses fixed. For a sliding point, the impulse only approaches this solution.
     fn sweep(&self, x: &mut [f64]) {
         for r in (0..self.n).step_by(3) {
             let mut block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| self.entry(r + i, r + j)));
@@ -216,7 +223,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the impulse of one point. G is its block, w its velocity without its own impulse.
+    /// Returns the impulse of one point. G is the point's block of the Delassus matrix, w the point's velocity without
+    /// its own impulse.
     fn alone(&self, G: [[f64; 3]; 3], w: [f64; 3], mut x: [f64; 3], (g_t, g_n): (f64, f64)) -> [f64; 3] {
         if w[2] >= 0.0 {
             return [0.0; 3]; // open: u = w
@@ -237,7 +245,7 @@ impl<'a> Problem<'a> {
     /// Computes a step d of Newton's method for F(λ) = 0, with
     ///
     /// - open: F = λ;
-    /// - closed: F_n = u_n, with the row of G + ε as slope;
+    /// - closed: F_n = u_n, whose slope is the row of G, plus ε on the diagonal;
     /// - sticking: F_t = u_t;
     /// - sliding: F_t = λ_t − μ λ_n e, with e = z/‖z‖ and z = λ_t − u_t/g_t, so that dF_t = dλ_t − μ e dλ_n − μ λ_n/‖z‖
     ///   (1 − e eᵀ)(dλ_t − du_t/g_t).
@@ -293,7 +301,7 @@ fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
     a * x + b * y + c * z
 }
 
-/// Solves A x = b for a positive definite A, by Cholesky factorisation.
+/// Returns the solution x of A x = b for a positive definite A, by Cholesky factorisation.
 fn solve3(A: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
     let a = Scalar::sqrt(A[0][0]);
     let (l1, l2) = (A[1][0] / a, A[2][0] / a);
@@ -308,14 +316,14 @@ fn solve3(A: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
     [(y0 - l1 * x1 - l2 * x2) / a, x1, x2]
 }
 
-/// Returns the point of a disc about 0 that is nearest to z.
+/// Returns the point nearest to z in the disc with this radius about 0.
 fn disc(z: [f64; 2], radius: f64) -> [f64; 2] {
     let size = length(z);
     if size <= radius { z } else { z.map(|z| z * (radius / size)) }
 }
 
 /// Replaces b by the solution x of A x = b, by elimination with row exchanges. A is stored by columns and is
-/// overwritten. Rows without a pivot give numbers that are not finite.
+/// overwritten. If a row has no pivot, the solution is not finite.
 fn eliminate(A: &mut [f64], b: &mut [f64]) {
     let n = b.len();
     for k in 0..n {

@@ -1,4 +1,4 @@
-//! A step on the ground: gaps, Jacobians and the Delassus matrix of the points that may touch, their impulses, and the
+//! Step on the ground: gaps, Jacobians and Delassus matrix of the points that may touch, impulses of these points, and
 //! correction of penetration. Model and equations: [`Ground`]; impulses: `contact_solver.rs`.
 
 use super::Status;
@@ -12,26 +12,27 @@ use condyle_linalg::{Ltdl, dot};
 use condyle_model::{Error, Model};
 use condyle_spatial::{Act, Matrix, Vec3, matrix};
 
-/// Maximum distance from the plane at which a point counts as on the plane (m). The solver's tolerance moves a resting
-/// point by less (1e-12 m per step). If such distances were corrected, the corners of a sole would alternately carry
-/// the load.
+/// Maximum distance between a point and the plane at which the point counts as touching (m). The solver's tolerance
+/// moves a resting point by less (1e-12 m per step). If such distances were corrected, the corners of a sole would
+/// carry the load in turns.
 const RESTING: f64 = 1e-7;
-/// Share of its depth by which a penetrating point is moved out of the ground in a step.
+/// Share of the depth by which a penetrating point is moved towards the surface in each step.
 const OUT: f64 = 0.2;
-/// Maximum speed of this correction (m/s).
+/// Maximum speed at which a penetrating point is moved towards the surface (m/s).
 const OUT_SPEED: f64 = 0.5;
-/// Multiple of the speed that gravity produces in a step. A point that hits the ground more slowly does not bounce;
-/// otherwise restitution would shake a resting point.
+/// Minimum speed at which a point that hits the ground bounces, as a multiple of the speed that gravity produces in a
+/// step. Without this minimum, restitution would shake a resting point.
 const REST: f64 = 2.0;
 
 /// Function that computes a step on the ground: [`Contacts::advance`].
 type Step = fn(&mut Contacts, &Model, &mut Data<f64>, f64, (&[f64], &[f64]), &mut [f64]) -> Status;
 
-/// Memory for the contacts of one robot with its ground. P is the number of points.
+/// Memory for the contacts between one robot and the ground. P is the number of points.
 #[derive(Clone, Debug)]
 pub(super) struct Contacts {
     pub ground: Ground,
-    /// Pointer to [`advance`](Self::advance). The call by pointer keeps its code out of programs without a ground.
+    /// Pointer to [`advance`](Self::advance). The call by pointer keeps the code of contacts out of programs without a
+    /// ground.
     pub step: Step,
     /// Two unit vectors along the plane, then its normal.
     axes: [Vec3<f64>; 3],
@@ -39,18 +40,20 @@ pub(super) struct Contacts {
     pub impulses: Vec<f64>,
     /// Contacts of the last step. Shape: P. Written by: `advance`.
     pub results: Vec<GroundContact>,
-    /// Velocity that corrects the displacement of the step, not the velocity. Shape: nv. Written by: `advance`.
+    /// Velocity that is added only for the displacement of the step, to correct penetration. Shape: nv. Written by:
+    /// `advance`.
     pub correction: Vec<f64>,
-    /// J of one point along the axes of the world. Shape: 3 × nv.
+    /// Jacobian J of one point along the axes of the world. Shape: 3 × nv.
     jacobian: Matrix<f64>,
     /// Rows of J of all points along the axes, one row after the other. Shape: 3P × nv.
     J: Vec<f64>,
-    /// Rows of J M⁻¹ of the active points, stored like `J`.
+    /// Rows of J M⁻¹ for the active points, stored like `J`.
     Y: Vec<f64>,
-    /// φ, the distance to the plane (m); 0 if it is less than `RESTING`. Shape: P.
+    /// Gaps φ, the distances of the points to the plane (m); 0 if a distance is less than `RESTING`. Shape: P.
     gaps: Vec<f64>,
     positions: Vec<Vec3<f64>>,
-    /// Indices of the active points, whose impulses are solved for, in the order of activation. Shape: up to P.
+    /// Indices of the active points, in the order of activation. Only the impulses of these points are solved for.
+    /// Shape: up to P.
     active: Vec<usize>,
     factor: Ltdl<f64>,
     solver: ContactSolver,
@@ -80,15 +83,15 @@ impl Contacts {
         })
     }
 
-    /// Clears the results of the last step, so that the next step depends on the state only.
+    /// Clears the results of the last step, so that the next step depends only on the state.
     pub(super) fn reset(&mut self) {
         self.impulses.fill(0.0);
         let nothing = GroundContact { position: Vec3::zero(), force: Vec3::zero(), touches: false };
         self.results.fill(nothing);
     }
 
-    /// Replaces v_next, the velocity after a step without contacts, by the velocity with contacts. q and v are the
-    /// state before the step.
+    /// Replaces v_next, the velocity after a step without contacts, by the velocity after a step with contacts. q and v
+    /// are the state before the step.
     fn advance(
         &mut self,
         model: &Model,
@@ -99,7 +102,7 @@ impl Contacts {
     ) -> Status {
         self.correction.fill(0.0);
         if !v_next.iter().all(|v| v.is_finite()) {
-            return Status::Done; // the caller detects it
+            return Status::Done; // the caller detects numbers that are not finite
         }
         self.place(model, data, q);
         self.factor.factorize(crba(model, data, q));
@@ -114,7 +117,7 @@ impl Contacts {
         let rest = REST * h * model.gravity().norm();
         let outcome = loop {
             let outcome = self.solve(h, v, v_next, rest);
-            // Activate further points that the impulses of the others would push below the plane.
+            // Activate further points that the impulses of the active points would push below the plane.
             let before = self.active.len();
             for i in 0..self.gaps.len() {
                 let reached = self.gaps[i] + h * self.speed_after(i, v_next);
@@ -159,7 +162,7 @@ impl Contacts {
         &self.J[(3 * i + k) * nv..][..nv]
     }
 
-    /// Activates a point and computes its rows of J M⁻¹.
+    /// Activates point i and computes the rows of J M⁻¹ for it.
     fn add(&mut self, i: usize) {
         let (nv, at) = (self.correction.len(), 3 * self.active.len());
         for k in 0..3 {
@@ -170,19 +173,20 @@ impl Contacts {
         self.active.push(i);
     }
 
-    /// Returns J_n v of a point.
+    /// Returns J_n v of point i, its normal speed at the velocity v.
     fn normal_speed(&self, i: usize, v: &[f64]) -> f64 {
         dot(self.row(i, 2), v)
     }
 
-    /// Returns J_n (v + M⁻¹ Jᵀ λ) of a point, with the impulses λ of the active points.
+    /// Returns J_n (v + M⁻¹ Jᵀ λ) of point i: its normal speed after the impulses λ of the active points.
     fn speed_after(&self, i: usize, v: &[f64]) -> f64 {
         let (nv, row) = (v.len(), self.row(i, 2));
         let pushes = self.Y.chunks_exact(nv.max(1)).zip(&self.solver.impulses).take(3 * self.active.len());
         pushes.fold(dot(row, v), |sum, (Y, &impulse)| sum + impulse * dot(row, Y))
     }
 
-    /// Computes the impulses of the active points, with G = J M⁻¹ Jᵀ and b = J v plus the terms of the gaps.
+    /// Computes the impulses of the active points, with G = J M⁻¹ Jᵀ and b = J v_next plus terms for gaps and
+    /// restitution.
     fn solve(&mut self, h: f64, v: &[f64], v_next: &[f64], rest: f64) -> Outcome {
         let (nv, points) = (v.len(), self.active.len());
         let n = 3 * points;
@@ -228,8 +232,8 @@ impl Contacts {
         }
     }
 
-    /// Computes the correction w = M⁻¹ J_nᵀ π, as contacts without friction: 0 ≤ π ⊥ J_n (v⁺ + w) − (share of the
-    /// depth)/h ≥ 0.
+    /// Computes the correction w = M⁻¹ J_nᵀ π. Its impulses π solve a problem of contacts without friction: 0 ≤ π ⊥ J_n
+    /// (v⁺ + w) − (share of the depth)/h ≥ 0.
     fn correct(&mut self, h: f64, v_next: &[f64]) {
         let (nv, points) = (v_next.len(), self.active.len());
         let mut deep = false;
@@ -251,9 +255,9 @@ impl Contacts {
     }
 }
 
-/// Returns two orthogonal unit vectors perpendicular to n, then n. For n = z they are x and y.
+/// Returns two orthogonal unit vectors perpendicular to n, then n. For n = z, the first two are x and y.
 fn axes(n: Vec3<f64>) -> [Vec3<f64>; 3] {
-    // Duff et al. (2017): no cancellation for any n.
+    // The method of Duff et al. (2017) has no cancellation for any n.
     let sign = 1f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;

@@ -9,14 +9,14 @@ use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
     pub(super) struct Workspace<S>(size) {
-        /// Efforts, including the passive ones. Written by: `velocity`.
+        /// Efforts, including passive efforts. Written by: `velocity`.
         effort: Array<S> = filled(S::zero, size.nv),
         /// h v'. Written by: `position`.
         way: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Computes v' = v + h a, the velocity after the step, without the ground.
+/// Computes v' = v + h a, the velocity after a step without contacts.
 #[track_caller]
 pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -32,7 +32,8 @@ pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes q' = q ⊕ h (v' + w), the position after the step. The correction w is empty, or has nv numbers.
+/// Computes q' = q ⊕ h (v' + w), the position after the step. w corrects penetration of the ground; it has nv numbers,
+/// or is empty.
 pub(super) fn position<S: Scalar, R>(
     model: &Model<R>,
     d: &mut Workspace<S>,

@@ -6,8 +6,8 @@ use condyle_spatial::Vec3;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Tolerance within which a normal's length counts as 1; it covers the rounding of a normalised vector. Such a normal
-/// keeps its exact bits.
+/// Tolerance within which a normal's length counts as 1; it covers the rounding of a normalised vector. A normal within
+/// the tolerance keeps its exact bits.
 const UNIT: f64 = 1e-15;
 
 /// Point of a robot that may touch the ground.
@@ -17,7 +17,7 @@ const UNIT: f64 = 1e-15;
 pub struct GroundPoint {
     /// Index of the frame to which the point is fixed.
     pub frame: usize,
-    /// Position of the point in that frame (m).
+    /// Position of the point in the frame `frame` (m).
     pub position: Vec3<f64>,
 }
 
@@ -25,8 +25,8 @@ pub struct GroundPoint {
 ///
 /// The model combines rigid bodies with Coulomb friction, formulated with velocities (Moreau 1988; Stewart and Trinkle
 /// 1996; Anitescu and Potra 1997), and uses the steps of [`SemiImplicitEuler`](super::Integrator::SemiImplicitEuler).
-/// Each point has its gap φ to the plane and its impulse λ. Its velocity u⁺ = J v⁺ after the step has a part along the
-/// normal and a part along the plane:
+/// Each point has a gap φ to the plane and an impulse λ. The velocity of a point after the step, u⁺ = J v⁺, has a
+/// component u_n⁺ along the normal and a component u_t⁺ along the plane:
 ///
 /// ```text
 /// v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ
@@ -34,20 +34,20 @@ pub struct GroundPoint {
 /// ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t⁺/‖u_t⁺‖ where u_t⁺ ≠ 0       Coulomb's disc: no pyramid
 /// ```
 ///
-/// A point that approaches the plane is slowed down so that it arrives at the end of a step, without penetration to
-/// first order. With a restitution e, a point that would hit the plane faster than 2 h ‖g‖ leaves it with e times its
-/// speed instead (Newton's law). A point may be below the plane, in the initial state or because its path is curved.
-/// Then a correction w of the step's displacement, q⁺ = q ⊕ h (v⁺ + w), reduces the depth by a fifth per step, at no
-/// more than 0.5 m/s. w is never part of the velocity, so depth does not become speed.
+/// A point that approaches the plane is slowed down, so that it arrives exactly at the end of a step. To first order it
+/// does not penetrate. With a restitution e, a point that would hit the plane faster than 2 h ‖g‖ leaves the plane with
+/// e times its speed instead (Newton's law). A point may be below the plane, in the initial state or because its path
+/// is curved. Then the displacement of a step is corrected by w: q⁺ = q ⊕ h (v⁺ + w). This reduces the depth by a fifth
+/// per step, at no more than 0.5 m/s. The velocity does not include w, so depth does not become speed.
 ///
 /// Limits:
 ///
-/// - Errors are O(h): contact and sliding begin and end at the ends of steps.
+/// - Errors are O(h), because contact and sliding begin and end only at the ends of steps.
 /// - Contacts store no energy and add none: λ never increases the kinetic energy. The exception is e > 0 with several
-///   contacts and friction, where Newton's law can increase it.
+///   contacts and friction, where Newton's law can increase the energy.
 /// - Contacts of edges, of other bodies and between bodies are not modelled, nor are rolling resistance and torsional
-///   friction. A sole resists turning by its corners.
-/// - Impulses of redundant contacts are not unique; their sum is.
+///   friction. A sole resists turning by the friction of its corners.
+/// - Impulses of redundant contacts are not unique, but the sum of these impulses is.
 /// - Forces are mean values over a step.
 ///
 /// ```
@@ -73,28 +73,29 @@ pub struct GroundPoint {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Ground {
-    /// n, the direction out of the ground, in the world's frame. [`set_ground`](super::Simulation::set_ground)
-    /// normalises it.
+    /// Direction n out of the ground, in the world's frame. [`set_ground`](super::Simulation::set_ground) normalises
+    /// it.
     pub normal: Vec3<f64>,
     /// Height of the plane along n (m): n · p for each point p of the plane.
     pub height: f64,
-    /// μ, Coulomb's coefficient of friction, at least 0.
+    /// Coulomb's coefficient of friction μ, at least 0.
     pub friction: f64,
-    /// e, the ratio of a point's normal speed after the impact to the speed before it, from 0 to 1.
+    /// Restitution e, from 0 to 1: the ratio of a point's normal speed after an impact to the normal speed before the
+    /// impact.
     pub restitution: f64,
     /// Points of the robot that may touch the plane.
     pub points: Vec<GroundPoint>,
-    /// Maximum error in the laws of contact (m/s): a point at rest moves no faster. Most steps end far below it, since
-    /// the last step of Newton's method squares the error.
+    /// Maximum error in the laws of contact (m/s): a point at rest does not move faster. The error of most steps is far
+    /// smaller, since the last step of Newton's method squares the error.
     pub tolerance: f64,
-    /// Maximum number of iterations of the contact solver in a step; each is a step of Newton's method or a few sweeps
-    /// of Gauss–Seidel.
+    /// Maximum number of iterations of the contact solver in a step. An iteration consists of a few steps of Newton's
+    /// method, followed by Gauss–Seidel sweeps if those steps fail.
     pub max_iterations: usize,
 }
 
 impl Default for Ground {
-    /// Returns the plane z = 0 with friction 0.7, no restitution, and no points; a tolerance of 1e-8 m/s and 500
-    /// iterations.
+    /// Returns the plane z = 0 with friction 0.7, no restitution and no points. The tolerance is 1e-8 m/s, and the
+    /// maximum number of iterations is 500.
     fn default() -> Self {
         Self {
             normal: Vec3::new(0.0, 0.0, 1.0),
@@ -109,12 +110,13 @@ impl Default for Ground {
 }
 
 impl Ground {
-    /// Returns the default ground, with the origins of some frames as its points.
+    /// Returns the default ground, with the origins of the given frames as points.
     pub fn at_frames(frames: impl IntoIterator<Item = usize>) -> Self {
         frames.into_iter().fold(Self::default(), |ground, frame| ground.with_sole(frame, &[Vec3::zero()]))
     }
 
-    /// Adds a sole, a polygon given by its corners in its frame (m), and returns the ground. One corner is a point.
+    /// Adds a sole and returns the ground. The sole is a polygon, given by its corners in `frame` (m). A sole with one
+    /// corner is a point.
     ///
     /// ```
     /// use condyle_dynamics::{Vec3, robots, simulation::Ground};
@@ -130,7 +132,7 @@ impl Ground {
         self
     }
 
-    /// Checks all numbers for a robot, and normalises the normal.
+    /// Checks all numbers of the ground for a robot, and normalises the normal.
     pub(super) fn checked(mut self, model: &Model) -> Result<Self, Error> {
         let wrong = |what: String| Err(Error::Ground { what });
         let Vec3 { x, y, z } = self.normal;
@@ -177,7 +179,7 @@ impl Ground {
 pub struct GroundContact {
     /// Position of the point in the world at the beginning of the step (m).
     pub position: Vec3<f64>,
-    /// Force on the robot at the point, along the axes of the world, as the mean over the step (N).
+    /// Force of the ground on the robot at the point, along the axes of the world: the mean over the step (N).
     pub force: Vec3<f64>,
     /// Whether the ground pushed the point in the step.
     pub touches: bool,

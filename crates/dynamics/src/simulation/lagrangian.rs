@@ -1,9 +1,9 @@
-//! Momentum and slope of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with their derivatives.
+//! Momentum ∂L/∂v and slope ∂L/∂q of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with derivatives of both.
 //!
-//! In the world's frame, composite quantities are sums over all bodies that a joint carries: inertia Iᶜ, momentum hᶜ,
-//! and the force Fᶜ that holds the bodies still. Let Ψ̇ = v_λ × S and Ψ̈ = −g × S. When coordinate e of joint j
-//! changes, the bodies that j carries turn about S_e, and their velocity also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i +
-//! Ψ̇_e (see `rnea_derivatives.rs`). The turn alone changes no energy, so
+//! All quantities are in the world's frame. Composite quantities are sums over all bodies that a joint carries: inertia
+//! Iᶜ, momentum hᶜ, and the force Fᶜ that holds the bodies still. Let Ψ̇ = v_λ × S and Ψ̈ = −g × S. When coordinate e
+//! of joint j changes, the bodies that j carries turn about S_e. The velocity v_i of each such body i also changes by
+//! Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see `rnea_derivatives.rs`). The turn alone changes no energy, so
 //!
 //! ```text
 //! p_e = (M v)_e = S_e · hᶜ,   ∂L/∂q_e = Ψ̇_e · hᶜ − S_e · Fᶜ
@@ -25,7 +25,7 @@ use condyle_spatial::{Act, Array, Cross, Force, Inertia, Motion, Scalar, Vec3};
 workspace! {
     /// Quantities in the world's frame; matrices are stored by columns.
     pub(super) struct Workspace<S>(size) {
-        /// Velocity. Written by: `pass`.
+        /// Velocities of the bodies. Written by: `pass`.
         v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Iᶜ. Written by: `pass`.
         IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -37,7 +37,7 @@ workspace! {
         Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Ψ̈. Written by: `pass`.
         Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// p = M v. Written by: `pass`.
+        /// Momentum p = M v. Written by: `pass`.
         pub(super) p: Array<S> = filled(S::zero, size.nv),
         /// ∂L/∂q. Written by: `pass`.
         pub(super) L_q: Array<S> = filled(S::zero, size.nv),
@@ -50,8 +50,8 @@ workspace! {
     }
 }
 
-/// Computes all quantities for bodies whose placements are known, in O(n · depth). External forces enter ∂L/∂q like the
-/// slope of a potential, although they may have none. Then ∂²L/∂q∂q is not symmetric.
+/// Computes all quantities for bodies whose placements are known, in O(n · depth). External forces are added to ∂L/∂q
+/// like the slope of a potential, although a potential may not exist. If it does not, ∂²L/∂q∂q is not symmetric.
 #[inline(always)]
 pub(super) fn pass<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let (oX, S) = (&w.oX, &w.S);

@@ -1,12 +1,12 @@
-//! Dense factorisation A = L U on any scalar, stored by columns, without row exchanges.
+//! Dense factorisation A = L U for any scalar type, without row exchanges. Matrices are stored by columns.
 //!
-//! It is for matrices M + O(h) near a positive definite M. Their symmetric parts are positive definite, so elimination
-//! in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
+//! It is used for matrices M + O(h) near a positive definite M. The symmetric parts of such matrices are positive
+//! definite, so elimination in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
 
 use condyle_linalg::axpy::axpy;
 use condyle_spatial::Scalar;
 
-/// Replaces A by L (without its unit diagonal) and U.
+/// Replaces A by U and by L without the unit diagonal of L.
 pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
     for j in 0..n {
         let (left, rest) = A.split_at_mut(j * n);

@@ -1,4 +1,5 @@
-//! Simulation of robots: steps from (q, v) at one instant to the next, on the joints' groups.
+//! Simulation of robots: each step computes (q, v) at the next instant. Positions are elements of the joints' Lie
+//! groups.
 //!
 //! Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). Three
 //! [`Integrator`]s compute steps; a [`Simulation`] owns the state and all scratch.
@@ -11,7 +12,7 @@
 //! simulation.set_state(&neutral(&quadruped), &[0.0; 18])?;
 //! let status = simulation.run(100, |now| now.tau[8] = -0.5 * now.v[8]); // a control law, once per step
 //! assert!(status.is_done());
-//! assert!((simulation.q()[2] + 0.5 * 9.81 * 0.1f64.powi(2)).abs() < 2e-3); // it has fallen ½ g t²
+//! assert!((simulation.q()[2] + 0.5 * 9.81 * 0.1f64.powi(2)).abs() < 2e-3); // the base has fallen ½ g t²
 //! # Ok::<(), condyle_dynamics::Error>(())
 //! ```
 //!
@@ -46,49 +47,52 @@ pub use ground::{Ground, GroundContact, GroundPoint};
 pub use state::State;
 pub use status::Status;
 
-/// Method that computes a step. τ and the external forces are constant during a step, the forces in the body's frame.
-/// [Passive torques](crate::passive_torque) follow position and velocity within the step.
+/// Method that computes a step. τ and the external forces are constant during a step; an external force is constant in
+/// the frame of the body on which it acts. [Passive torques](crate::passive_torque) follow position and velocity within
+/// the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Integrator {
-    /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation. It is symplectic where M
-    /// is constant. Otherwise the Coriolis forces are evaluated at the beginning of the step. Bodies that spin fast
-    /// without damping then gain energy, light links without bound. Suitable for damped robots and short horizons.
+    /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation of aba. The method is
+    /// symplectic where M is constant. Otherwise it evaluates the Coriolis forces at the beginning of the step. Bodies
+    /// that spin fast without damping then gain energy; the energy of light links can grow without bound. Suitable for
+    /// damped robots and short horizons.
     SemiImplicitEuler,
     /// Classical Runge–Kutta method for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta methods on
-    /// Lie groups*, 1998). Order 4, four evaluations; the energy drifts by O(h⁴) per second.
+    /// Lie groups*, 1998). Order 4, four evaluations of aba; the energy drifts by O(h⁴) per second.
     RungeKutta4,
     /// Variational integrator of the midpoint Lagrangian, solved by Newton's method with exact derivatives. Order 2,
-    /// symmetric, symplectic: the energy oscillates by O(h²) without drift, and momentum is conserved to rounding. Its
-    /// equation has no solution if a velocity changes by much more than itself in a step ([`Status::NotConverged`]).
-    /// Source: Marsden and West, *Discrete mechanics and variational integrators*, 2001; on groups: Bou-Rabee and
-    /// Marsden, *Hamilton–Pontryagin integrators on Lie groups*, 2009.
+    /// symmetric, symplectic: the energy oscillates by O(h²) without drift, and momentum is conserved to rounding. The
+    /// equation of a step has no solution if a velocity changes by a large multiple of its value
+    /// ([`Status::NotConverged`]). Source: Marsden and West, *Discrete mechanics and variational integrators*, 2001; on
+    /// groups: Bou-Rabee and Marsden, *Hamilton–Pontryagin integrators on Lie groups*, 2009.
     Variational,
 }
 
-/// Method and step of a simulation.
+/// Integrator, step length and tolerances of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Settings {
-    /// Method of the steps.
+    /// Integrator that computes the steps.
     pub integrator: Integrator,
-    /// h, the length of a step (s), above 0.
+    /// Length h of a step (s), above 0.
     pub dt: f64,
     /// Smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s). `None` switches off damping, friction,
     /// springs and gravity compensation of the joints.
     pub passive: Option<f64>,
-    /// Relative error of the momentum balance below which Newton's method makes its last iteration, which squares the
-    /// error.
+    /// Relative error of the momentum balance below which Newton's method makes one last iteration. The last iteration
+    /// squares the error.
     pub tolerance: f64,
     /// Maximum number of iterations of Newton's method.
     pub max_iterations: usize,
 }
 
 impl Default for Settings {
-    /// Returns semi-implicit Euler at 1 kHz without passive torques, a tolerance of 1e-9 and 20 iterations.
+    /// Returns settings for semi-implicit Euler at 1 kHz, without passive torques, with a tolerance of 1e-9 and at most
+    /// 20 iterations.
     fn default() -> Self {
         Self { integrator: Integrator::SemiImplicitEuler, dt: 1e-3, passive: None, tolerance: 1e-9, max_iterations: 20 }
     }
@@ -103,10 +107,10 @@ pub struct Control<'a, S> {
     pub q: &'a [S],
     /// Velocity, nv numbers.
     pub v: &'a [S],
-    /// Joint efforts during the step, nv numbers (N m, N); 0 when the law is called.
+    /// Joint efforts during the step, nv numbers (N m, N). All efforts are 0 when the law is called.
     pub tau: &'a mut [S],
-    /// Force on each body during the step (N, N m), at its origin and in its frame, index 0 is the world; 0 when the
-    /// law is called.
+    /// External force on each body during the step (N, N m), in the frame of the body and at the origin of this frame.
+    /// Index 0 is the world. All forces are 0 when the law is called.
     pub f_ext: &'a mut [Force<S>],
 }
 
@@ -119,15 +123,15 @@ struct Input<'a, S> {
     passive: Option<f64>,
 }
 
-/// State of a robot, and all memory to advance it. After [`new`](Self::new) and [`set_ground`](Self::set_ground),
-/// nothing is allocated.
+/// State of a robot, and all memory to compute the next states. After [`new`](Self::new) and
+/// [`set_ground`](Self::set_ground), nothing is allocated.
 ///
-/// It shares its model, so it may be stored, cloned and sent to another thread. A scalar with lanes runs several
-/// simulations in parallel, and dual numbers give derivatives of the simulation. Newton's method then iterates until
-/// all lanes have converged. A ground acts on `f64` only.
+/// A simulation shares its model, so it may be stored, cloned and sent to another thread. With a scalar of several
+/// lanes, it runs several simulations in parallel; Newton's method then iterates until all lanes have converged. Dual
+/// numbers give derivatives of the simulation. Only simulations of `f64` can have a ground.
 #[derive(Clone, Debug)]
 pub struct Simulation<S: Scalar = f64, R = f64> {
-    /// Method and step; may be changed between steps.
+    /// Integrator, step length and tolerances; may be changed between steps.
     pub settings: Settings,
     model: Arc<Model<R>>,
     data: Data<S>,
@@ -137,7 +141,7 @@ pub struct Simulation<S: Scalar = f64, R = f64> {
     /// State after the step that is being computed.
     q_next: Vec<S>,
     v_next: Vec<S>,
-    /// Efforts that the control law sets, and the forces.
+    /// Efforts and forces that the control law sets.
     tau: Vec<S>,
     f_ext: Vec<Force<S>>,
     euler: euler::Workspace<S>,
@@ -147,14 +151,14 @@ pub struct Simulation<S: Scalar = f64, R = f64> {
 }
 
 impl Simulation<f64> {
-    /// Sets the ground and replaces the previous one. A ground without points removes it.
+    /// Sets the ground; replaces the previous ground. A ground without points removes the previous ground.
     ///
-    /// The state is kept, even if points are below the ground. Allocates the memory of the ground.
+    /// The state is kept, even if points are below the ground. Allocates memory for the contacts with the ground.
     ///
     /// # Errors
     /// [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does
-    /// not exist or is fixed to the world, or the normal is no direction. Also if the restitution is not in 0..=1, the
-    /// friction or the tolerance is negative, or a number is not finite.
+    /// not exist or is fixed to the world, or the normal does not define a direction. Also if the restitution is not in
+    /// 0..=1, the friction or the tolerance is negative, or a number is not finite.
     pub fn set_ground(&mut self, ground: Ground) -> Result<(), Error> {
         if self.settings.integrator != Integrator::SemiImplicitEuler {
             let what =
@@ -166,13 +170,13 @@ impl Simulation<f64> {
         Ok(())
     }
 
-    /// Returns the ground, if the robot has one.
+    /// Returns the ground; `None` if the simulation has no ground.
     pub fn ground(&self) -> Option<&Ground> {
         self.ground.as_ref().map(|contacts| &contacts.ground)
     }
 
-    /// Returns the contacts of the ground's points in the last step, in the order of the points. Before the first step,
-    /// no contact touches.
+    /// Returns the contact of each point with the ground in the last step, in the order of the points. Before the first
+    /// step, no point touches.
     pub fn contacts(&self) -> &[GroundContact] {
         self.ground.as_ref().map_or(&[], |contacts| &contacts.results)
     }
@@ -181,7 +185,7 @@ impl Simulation<f64> {
 impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// Allocates all memory and sets the robot to [`neutral`](crate::neutral), at rest, at time 0.
     ///
-    /// model: an [`Arc`] of a model, which is shared; a model, which is moved; or `&model`, which is copied.
+    /// model: an [`Arc`] of a model is shared, a model is moved, and a reference to a model is copied.
     pub fn new(model: impl Into<Arc<Model<R>>>, settings: Settings) -> Self {
         let model = model.into();
         let q: Vec<S> = crate::neutral(&model).into_iter().map(S::splat).collect();
@@ -219,14 +223,14 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         &self.v
     }
 
-    /// Returns the sum of the steps since the state was set (s).
+    /// Returns the time since the state was set: the sum of all step lengths (s).
     pub fn time(&self) -> f64 {
         self.time
     }
 
     /// Sets the position to q, the velocity to v and the time to 0. Allocates nothing.
     ///
-    /// q: nq numbers; v: nv. The numbers are checked only for `f64`.
+    /// q: nq numbers; v: nv numbers. The numbers are checked only for `f64`.
     ///
     /// # Errors
     /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not have
@@ -253,11 +257,11 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         Ok(())
     }
 
-    /// Makes one step of `settings.dt` under constant efforts and forces.
+    /// Computes one step of length `settings.dt` under constant efforts and forces.
     ///
     /// tau: nv numbers (N m, N); f_ext: one force per body as in [`aba`](crate::aba()), or empty for none. Costs O(n)
-    /// for the explicit integrators, and O(n³) for each of about three iterations of the variational one. Allocates
-    /// nothing.
+    /// for the explicit integrators. The variational integrator needs about three iterations, each of which costs
+    /// O(n³). Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Integrator, Settings, Simulation}};
@@ -312,11 +316,11 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         status
     }
 
-    /// Makes several steps and calls a control law before each of them. It stops early at a step that fails, and
-    /// returns the status of that step. Otherwise it returns [`ContactsNotConverged`](Status::ContactsNotConverged)
-    /// with the largest error if a step reported it.
+    /// Computes several steps and calls a control law before each step. Stops early at a step that fails, and returns
+    /// the status of that step. Otherwise, if a step reported [`ContactsNotConverged`](Status::ContactsNotConverged),
+    /// returns this status with the largest error.
     ///
-    /// Allocates nothing, unless the law does.
+    /// Allocates nothing, unless the control law allocates.
     ///
     /// # Panics
     /// As [`step`](Self::step).
@@ -339,13 +343,13 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     }
 }
 
-/// Returns the numbers of a vector of doubles.
+/// Returns the numbers of `x` if it is a vector of `f64`.
 fn doubles(x: &dyn Any) -> Option<&[f64]> {
     x.downcast_ref::<Vec<f64>>().map(Vec::as_slice)
 }
 
-/// Converts the velocity after a step without contacts to the velocity with contacts. Only simulations of `f64` have a
-/// ground.
+/// Replaces the velocity after a step without contacts by the velocity after a step with contacts. Only simulations of
+/// `f64` can have a ground.
 fn on_ground(
     ground: Option<&mut contacts::Contacts>,
     (model, data): (&dyn Any, &mut dyn Any),

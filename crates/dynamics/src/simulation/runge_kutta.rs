@@ -1,4 +1,4 @@
-//! Classical Runge–Kutta method on the joints' groups.
+//! Classical Runge–Kutta method on the joints' Lie groups.
 //!
 //! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀ the motion is q₀ ⊕ ξ(t). Since ∂(q₀ ⊕ ξ)/∂ξ
 //! is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹, the motion satisfies
@@ -19,24 +19,24 @@ use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
     pub(super) struct Workspace<S>(size) {
-        /// Efforts, including the passive ones. Written by: `step`.
+        /// Efforts, including passive efforts. Written by: `step`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// State of a stage: ξ, v. Written by: `step`.
+        /// State (ξ, v) at which a stage is evaluated. Written by: `step`.
         xi: Array<S> = filled(S::zero, size.nv),
         v: Array<S> = filled(S::zero, size.nv),
-        /// Rates of the state of a stage. Written by: `step`.
+        /// Rates of ξ and v at a stage. Written by: `step`.
         dxi: Array<S> = filled(S::zero, size.nv),
         dv: Array<S> = filled(S::zero, size.nv),
-        /// Weighted sums of the rates. Written by: `step`.
+        /// Weighted sums of the rates over all stages. Written by: `step`.
         sum_xi: Array<S> = filled(S::zero, size.nv),
         sum_v: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Time of each stage as a fraction of the step, and weight of its slope.
+/// Time of each stage as a fraction of the step, and weight of the stage's rates.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
-/// Runs the whole method.
+/// Computes a step.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -1,11 +1,11 @@
-//! State of a simulation that can be stored and restored.
+//! State of a simulation, which can be stored and restored.
 
 use super::Simulation;
 use alloc::vec::Vec;
 use condyle_model::Error;
 use condyle_spatial::{Constant, Scalar};
 
-/// Quantities that determine the next steps of a [`Simulation`], besides its robot, settings and ground.
+/// Quantities that determine the next steps of a [`Simulation`], together with the robot, the settings and the ground.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -16,14 +16,14 @@ pub struct State<S = f64> {
     pub q: Vec<S>,
     /// Velocity, nv numbers.
     pub v: Vec<S>,
-    /// Impulses of the ground in the last step, 3 numbers for each of its points (N s): the contact solver's first
-    /// guess.
+    /// Impulses of the ground in the last step, 3 numbers for each point of the ground (N s). They are the first guess
+    /// of the contact solver.
     pub impulses: Vec<f64>,
 }
 
 impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
-    /// Returns a copy of the state. A simulation that continues from it with [`restore`](Self::restore) gives the same
-    /// bits.
+    /// Returns a copy of the state. A simulation that continues from the copy, after [`restore`](Self::restore),
+    /// computes the same bits.
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Settings, Simulation}};
@@ -40,11 +40,11 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         State { time: self.time, q: self.q.clone(), v: self.v.clone(), impulses }
     }
 
-    /// Continues from a state of a simulation of this robot on this ground.
+    /// Sets the simulation to a stored state, which must come from a simulation of the same robot on the same ground.
     ///
     /// # Errors
-    /// [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite; else as
-    /// [`set_state`](Self::set_state).
+    /// [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite; other
+    /// errors as for [`set_state`](Self::set_state).
     pub fn restore(&mut self, state: &State<S>) -> Result<(), Error> {
         let impulses = self.ground.as_ref().map_or(0, |ground| ground.impulses.len());
         for (name, expected, found) in [

@@ -7,16 +7,16 @@ use core::fmt;
 #[must_use]
 #[non_exhaustive]
 pub enum Status {
-    /// All steps were taken, within all tolerances.
+    /// Success: all steps were taken, within all tolerances.
     Done,
-    /// Newton's method has not reached the tolerance. The step was not taken, and the old state is kept. A shorter step
-    /// helps.
+    /// Failure of Newton's method to reach the tolerance. The step was not taken, and the old state is kept. A shorter
+    /// step helps.
     NotConverged {
-        /// Number of iterations that were made.
+        /// Number of iterations of Newton's method.
         iterations: usize,
     },
     /// Impulses of the ground that violate the laws of contact by more than the tolerance. The step was still taken
-    /// with them: they only push, and are inside the friction cones. More iterations
+    /// with these impulses. They only push, and are inside the friction cones. More iterations
     /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step may help. If M is badly
     /// conditioned, for example for bodies of some grams, rounding leaves an error. Then the
     /// [`tolerance`](super::Ground::tolerance) should be larger.
@@ -39,8 +39,8 @@ impl Status {
         matches!(self, Self::Done | Self::ContactsNotConverged { .. })
     }
 
-    /// Returns the status of a run whose last step has the status `last`. It is the status of a step that was not
-    /// taken, otherwise the largest error of the contacts.
+    /// Returns the status of a run from the status of all earlier steps and the status `last` of the last step. If a
+    /// step was not taken, it is the status of that step. Otherwise it reports the largest error of the contacts.
     #[must_use = "the status of the run"]
     pub fn and(self, last: Self) -> Self {
         match (self, last) {

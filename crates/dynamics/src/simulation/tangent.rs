@@ -1,22 +1,22 @@
-//! Products with the block-diagonal Jacobians of the joints' groups, block by block.
+//! Products with the Jacobians of the joints' Lie groups. The Jacobians are block-diagonal, with one block per joint.
 
 use condyle_model::Model;
 use condyle_model::joint::{GroupJacobian, Joint};
 use condyle_spatial::{Constant, Cross, Force, Motion, Scalar};
 use core::ops::Range;
 
-/// Maximum size of a block, the size for a free body.
+/// Maximum size of a block: the size for a free joint.
 const SIX: usize = 6;
-/// Number of terms of a series in ad_y: enough for full precision up to an angle of 1 rad in a step, and for ten digits
-/// up to 2.5 rad.
+/// Number of terms of a series in ad_y. It is enough for full precision if a joint turns by at most 1 rad in a step,
+/// and for ten digits up to 2.5 rad.
 const TERMS: i32 = 18;
 
-/// Returns each joint with its own coordinates, and the offset of these coordinates in v.
+/// Returns each joint that has its own coordinates, with the offset of these coordinates in v.
 fn joints<R>(model: &Model<R>) -> impl Iterator<Item = (Joint, usize)> + '_ {
     model.nodes().iter().skip(1).filter(|n| n.mimic.is_none()).map(|n| (n.joint, n.idx_v))
 }
 
-/// Returns the block of a joint at tangent vector y, column by column; `None` for the identity.
+/// Returns the block of a joint at the tangent vector y, by columns; `None` if the block is the identity.
 fn block<S: Scalar>(joint: Joint, which: GroupJacobian, y: &[S]) -> Option<[[S; SIX]; SIX]> {
     let columns = joint.jacobian(which, y)?.columns();
     let mut block = [[S::zero(); SIX]; SIX];
@@ -37,7 +37,7 @@ fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     sum
 }
 
-/// Returns the blocks at y that differ from the identity, each with its coordinates.
+/// Returns the blocks at y that differ from the identity, each with the range of coordinates of its joint.
 fn blocks<'a, S: Scalar, R>(
     model: &'a Model<R>,
     which: GroupJacobian,
@@ -90,13 +90,14 @@ pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: Gr
     }
 }
 
-/// Returns the joints whose group is not commutative: the indices of their unit twists, and their offset in v.
+/// Returns, for each joint whose group is not commutative, the indices of the joint's unit twists, and the offset of
+/// its coordinates in v.
 fn twists<R>(model: &Model<R>) -> impl Iterator<Item = (&'static [usize], usize)> + '_ {
     joints(model).filter(|(joint, _)| !joint.commutes()).map(|(joint, at)| (joint.axes(), at))
 }
 
-/// Returns the armature of a coordinate whose momentum stays along the body's axes. For the linear coordinates of a
-/// free joint, it returns 0.
+/// Returns the armature of coordinate k of a joint. For the linear coordinates of a free joint, returns 0
+/// (`free_armature.rs`).
 fn rotor<S: Scalar, R: Constant<S>>(model: &Model<R>, axes: &[usize], at: usize, k: usize) -> S {
     if axes.len() == SIX && k < 3 { S::zero() } else { model.armature()[at + k].lift() }
 }
@@ -113,8 +114,8 @@ fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
 /// Computes f += w ×* (D w) with the armature D, block by block.
 ///
 /// Every algorithm treats armature as D q̈, except along the linear coordinates of free joints (`free_armature.rs`). A
-/// Lagrangian with ½ wᵀ D w would turn the momentum D w with the body, on joints where this makes a difference. The
-/// force computed here cancels this effect. It does no work.
+/// Lagrangian with the term ½ wᵀ D w would turn the momentum D w with the body, if the group of the joint is not
+/// commutative. The force computed here cancels this effect. The force does no work.
 pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
@@ -126,7 +127,7 @@ pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f
     }
 }
 
-/// Adds the slope of that force with respect to w to A, a square matrix stored by columns.
+/// Adds the slope of the force of [`add_rotors`] with respect to w to A, a square matrix stored by columns.
 pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], A: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
@@ -144,8 +145,8 @@ pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &
 
 /// Computes A −= s ∂(J_exp(−y)ᵀ p)/∂y at constant p, for a square matrix stored by columns.
 ///
-/// J_exp(−y) = Σ ad_yᵏ/(k+1)!. With pₖ = (ad_yᵀ)ᵏ p, the change along δ is Σ Dₖ/(k+1)!, D₀ = 0, Dₖ₊₁ = ad_δᵀ pₖ + ad_yᵀ
-/// Dₖ. Here ad_yᵀ p = −y ×* p.
+/// J_exp(−y) is Σ ad_yᵏ/(k+1)!. Let pₖ = (ad_yᵀ)ᵏ p, with ad_yᵀ p = −y ×* p. The derivative along δ is Σ Dₖ/(k+1)!,
+/// with D₀ = 0 and Dₖ₊₁ = ad_δᵀ pₖ + ad_yᵀ Dₖ.
 pub(super) fn subtract_slope<S: Scalar, R>(model: &Model<R>, y: &[S], p: &[S], s: S, A: &mut [S]) {
     for (axes, at) in twists(model) {
         let y6 = Motion::from(embed(axes, |k| y[at + k]));

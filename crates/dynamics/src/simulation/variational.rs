@@ -1,27 +1,29 @@
-//! Variational integrator of the midpoint Lagrangian, on the joints' groups.
+//! Variational integrator of the midpoint Lagrangian, on the joints' Lie groups.
 //!
-//! The motion during a step is approximated by q ⊕ t w with constant w, and its action by h L(q ⊕ h w/2, w). The sum of
-//! the actions of all steps must be stationary under changes of the positions between steps, including the virtual work
-//! of τ. With y = h w, this condition gives the momentum p' after the step from the momentum p before it:
+//! The motion during a step of length h is approximated by q ⊕ t w with constant w, and the action of the step by h L(q
+//! ⊕ h w/2, w). The sum of the actions of all steps must be stationary under changes of the positions between steps,
+//! including the virtual work of τ. With y = h w, this condition gives the momentum p' after the step from the momentum
+//! p before it:
 //!
 //! ```text
 //! M(q_m) w = J(−y)ᵀ p + h/2 J(−y/2)ᵀ f        q_m = q ⊕ y/2,   f = ∂L/∂q(q_m, w) + τ
 //! p' = Ad(y)ᵀ p + h Ad(y/2)ᵀ f                q' = q ⊕ y
 //! ```
 //!
-//! J is the group's right Jacobian J_exp, and Ad(y) = ∂(q ⊕ −y)/∂q. Newton's method solves the first equation for w;
-//! its slope is
+//! J is the right Jacobian J_exp of the group, and Ad(y) = ∂(q ⊕ −y)/∂q. Newton's method solves the first equation for
+//! w. With x = y/2, the slope of this equation is
 //!
 //! ```text
 //! M + h/2 ∂p/∂q J(y/2) − h ∂(J(−y)ᵀ p)/∂y − h²/4 ∂(J(−x)ᵀ f)/∂x
 //!   − h/2 J(−y/2)ᵀ (h/2 ∂²L/∂q∂q J(y/2) + (∂p/∂q)ᵀ + ∂τ/∂v)
 //! ```
 //!
-//! Passive efforts also depend on q, and add ∂τ/∂q to ∂²L/∂q∂q.
+//! Passive efforts also depend on q, so ∂τ/∂q is added to ∂²L/∂q∂q.
 //!
-//! The map (q, p) → (q', p') is symplectic and its own inverse when h changes sign. It conserves the momentum of bodies
-//! that move freely: Ad(y)ᵀ only expresses it in the body's new frame. Source: Marsden and West (2001), section 2.3,
-//! for the midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
+//! The map (q, p) → (q', p') is symplectic. With −h instead of h, it is its own inverse. It conserves the momentum of
+//! bodies that move freely: Ad(y)ᵀ only expresses this momentum in the body's new frame. Source: Marsden and West
+//! (2001), section 2.3, for the midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. The velocity is v =
+//! M(q)⁻¹ p.
 
 use super::{Input, Settings, Status, lagrangian, lu, tangent};
 use crate::calls::inertia::crba;
@@ -37,30 +39,30 @@ use condyle_model::layout::Single;
 use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
-    /// Scratch. Written by: `step`, unless stated otherwise.
+    /// Scratch. Fields without another statement are written by `step`.
     pub(super) struct Workspace<S>(size, model: &Model<R>) {
-        /// p, the momentum before the step.
+        /// Momentum p before the step.
         p: Array<S> = filled(S::zero, size.nv),
-        /// w, the velocity during the step.
+        /// Velocity w during the step.
         w: Array<S> = filled(S::zero, size.nv),
-        /// −h w, h w/2 and −h w/2. Written by: `set_ways`.
+        /// Displacements −h w, h w/2 and −h w/2. Written by: `set_ways`.
         minus_y: Array<S> = filled(S::zero, size.nv),
         x: Array<S> = filled(S::zero, size.nv),
         minus_x: Array<S> = filled(S::zero, size.nv),
-        /// f = ∂L/∂q + τ. Written by: `evaluate`.
+        /// Force f = ∂L/∂q + τ at the midpoint. Written by: `evaluate`.
         f: Array<S> = filled(S::zero, size.nv),
-        /// Passive efforts of the joints, and their slopes with respect to q and v. Written by: `evaluate`.
+        /// Passive efforts of the joints, and slopes of these efforts with respect to q and v. Written by: `evaluate`.
         passive: Array<S> = filled(S::zero, size.nv),
         passive_q: Array<S> = filled(S::zero, size.nv * size.nv),
         passive_v: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
+        /// Products J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
         carried: Array<S> = filled(S::zero, size.nv),
         pushed: Array<S> = filled(S::zero, size.nv),
-        /// Residual of the equation, then Newton's step.
+        /// Residual of the equation for w, then the step of Newton's method.
         residual: Array<S> = filled(S::zero, size.nv),
-        /// Slope of the equation, and its factor. Written by: `slope`.
+        /// Slope of the equation for w, then the factor of this slope. Written by: `slope`.
         slope: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Momenta, slopes of L, and their derivatives, at the midpoint. Written by: `evaluate`.
+        /// Momenta and slopes of L at the midpoint, with derivatives. Written by: `evaluate`.
         lagrangian: lagrangian::Workspace<S> = lagrangian::Workspace::new(size),
         /// Factor of M after the step.
         M: Ltdl<S> = Ltdl::new(model),
@@ -78,7 +80,7 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// Computes f at the midpoint, and the terms of the equation.
+/// Computes f at the midpoint, and the terms of the equation for w.
 fn evaluate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -110,7 +112,7 @@ fn evaluate<S: Scalar, R: Constant<S>>(
     tangent::multiply_left_transposed(model, Exp, &d.minus_x, &mut d.pushed); // J(−y/2)ᵀ f
 }
 
-/// Computes the slope of the equation with respect to w. The derivatives computed by `evaluate` are overwritten.
+/// Computes the slope of the equation for w. Overwrites derivatives that `evaluate` has computed.
 fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S) {
     let nv = model.nv();
     let half = h * S::splat(0.5);
@@ -142,7 +144,7 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
 /// Minimum momentum (kg m²/s, kg m/s) that counts as motion.
 const STILL: f64 = 1e-30;
 
-/// Runs the whole method.
+/// Computes a step.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -181,7 +183,7 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
             error += d.residual[k].abs();
             size += inside.abs() + d.carried[k].abs() + (d.pushed[k] * half).abs();
         }
-        // The next step squares the error, and completes the derivatives of dual numbers.
+        // One more iteration squares the error, and completes the derivatives of dual numbers.
         converged = S::all(error.lt(size * S::splat(settings.tolerance)));
         slope(model, d, h);
         lu::factorize(&mut d.slope, model.nv());

@@ -1,4 +1,4 @@
-//! Random constraints.
+//! Random constraints for tests.
 
 use super::{State, all_models, normal3, random_pose, rng};
 use condyle_dynamics::{
@@ -8,13 +8,14 @@ use condyle_dynamics::{
 use rand::RngExt;
 use rand::rngs::StdRng;
 
-/// Largest condition number of Λ: with a greater one, a set of constraints cannot test the algorithm.
+/// Maximum condition number of Λ. Sets of constraints with a larger condition number are too inaccurate for a test of
+/// the algorithm.
 const WORST_CONDITION: f64 = 1e4;
 
 const KINDS: [ConstraintKind; 4] =
     [ConstraintKind::Point, ConstraintKind::Rigid, ConstraintKind::Line, ConstraintKind::Plane];
 
-/// Returns a contact or loop of any kind, in either reference, with any gains and targets.
+/// Returns a contact or loop of a random kind, in a random reference frame, with random gains and targets.
 pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConstraint {
     let frames = model.frames().len();
     let motion = |rng: &mut StdRng| Motion::new(normal3(rng), normal3(rng));
@@ -36,7 +37,7 @@ pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConst
     }
 }
 
-/// Returns random constraints that the robot can satisfy at a state, with unique forces.
+/// Returns random constraints that the robot can satisfy at a state, and for which the constraint forces are unique.
 pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng) -> Vec<ContactConstraint> {
     let mut chosen = Vec::new();
     let mut data = Data::new(model);
@@ -54,7 +55,8 @@ pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng)
     chosen
 }
 
-/// Returns models, each with a state and constraints that it can satisfy there, with unique forces.
+/// Returns models, each with a state and constraints. At this state, the robot can satisfy the constraints, and the
+/// constraint forces are unique.
 pub(crate) fn cases(trees: u64) -> Vec<(Model, State, Vec<ContactConstraint>)> {
     let with_constraints = |(seed, model): (usize, Model)| {
         let mut rng = rng(seed as u64);

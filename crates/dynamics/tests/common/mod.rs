@@ -14,12 +14,12 @@ use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
-/// Returns a generator with the same numbers in every run.
+/// Returns a random generator that gives the same numbers in every run.
 pub(crate) fn rng(seed: u64) -> StdRng {
     StdRng::seed_from_u64(seed)
 }
 
-/// Returns n numbers, standard normal.
+/// Returns n numbers from the standard normal distribution.
 pub(crate) fn normal(rng: &mut StdRng, n: usize) -> Vec<f64> {
     let mut one = || {
         let (u, angle) = (1.0 - rng.random::<f64>(), core::f64::consts::TAU * rng.random::<f64>());
@@ -42,7 +42,7 @@ pub(crate) fn random_pose(rng: &mut StdRng) -> Se3<f64> {
     Se3::new(random_rotation(rng), normal3(rng).scale(0.5))
 }
 
-/// Returns the inertia of four mass points.
+/// Returns the inertia of four random mass points.
 pub(crate) fn random_inertia(rng: &mut StdRng) -> Inertia<f64> {
     (0..4).fold(Inertia::zero(), |I, _| {
         let mass = 0.2 + rng.random::<f64>();
@@ -69,24 +69,25 @@ pub(crate) struct Part {
     pub(crate) placement: Se3<f64>,
     pub(crate) inertia: Inertia<f64>,
     pub(crate) armature: f64,
-    /// Index of the part whose joint this one follows, and the relation.
+    /// Index of the part whose joint leads, and the relation, if the joint of this part follows another joint.
     pub(crate) mimic: Option<(usize, Mimic)>,
-    /// Frame on the body.
+    /// Placement of a frame on the body.
     pub(crate) frame: Se3<f64>,
 }
 
-/// Robot that can be described in more than one format. Part i (counted from 1) is named `b{i}`, its frame `f{i}`.
+/// Robot that can be described in more than one format. Part i (counted from 1) is named `b{i}`, and the frame on this
+/// part `f{i}`.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree {
     pub(crate) parts: Vec<Part>,
     pub(crate) gravity: Vec3<f64>,
-    /// Whether its passive efforts have all derivatives: they contain neither |v| nor |Δ|.
+    /// Whether the passive efforts of the robot are smooth functions: they contain neither |v| nor |Δ|.
     pub(crate) smooth: bool,
 }
 
 impl Tree {
-    /// Creates a robot with every kind of joint in random order on random parents. Revolute and prismatic joints have
-    /// aligned and other axes.
+    /// Creates a robot with every kind of joint in random order on random parents. Axes of revolute and prismatic
+    /// joints are both parallel to coordinate axes and oblique.
     pub(crate) fn random(rng: &mut StdRng) -> Self {
         let e = |k: usize, s: f64| Vec3::from(core::array::from_fn(|i| if i == k { s } else { 0.0 }));
         let mut kinds = vec![
@@ -107,7 +108,7 @@ impl Tree {
         kinds.shuffle(rng);
         let mut tree = Self { parts: Vec::new(), gravity: normal3(rng).scale(5.0), smooth: false };
         for joint in kinds {
-            // half of the bodies are on the previous one, so that some branches are long
+            // half of the bodies have the previous body as parent, so that some branches are long
             let n = tree.parts.len();
             let parent = if rng.random::<bool>() { n } else { rng.random_range(0..=n) };
             tree.add(rng, parent, joint);
@@ -115,8 +116,8 @@ impl Tree {
         tree
     }
 
-    /// Creates the same robot with joints that follow others: in the leader's branch, in other branches, with several
-    /// followers, and with inverted axes.
+    /// Creates the same robot with additional joints that follow other joints: in the leader's branch, in other
+    /// branches, with several followers of one leader, and with negative ratios.
     pub(crate) fn random_with_mimics(rng: &mut StdRng) -> Self {
         let mut tree = Self::random(rng);
         let n = tree.parts.len();
@@ -132,8 +133,8 @@ impl Tree {
         tree.follow(below, leader, -0.7, 0.3);
         tree.follow(far_below, leader, 1.0, 0.0);
         tree.follow(across, leader, 0.4, -0.2);
-        tree.follow(earlier, between, 1.5, 0.1); // its index is lower than its leader's
-        // continuous joints, as leaders and as followers
+        tree.follow(earlier, between, 1.5, 0.1); // the follower has a lower index than the leader
+        // continuous joints are leaders and followers too
         let endless = tree.add(rng, below, Joint::Continuous { axis: e });
         let backwards = tree.add(rng, endless, Joint::Revolute { axis: a });
         let faster = tree.add(rng, 0, Joint::Continuous { axis: d });
@@ -208,7 +209,7 @@ fn losses(i: usize, smooth: bool) -> JointOptions {
     JointOptions { damping: 0.1 + 0.05 * (i % 3) as f64, damping_polynomial, friction, ..JointOptions::default() }
 }
 
-/// Returns a rest position for the spring of a joint.
+/// Returns a position of a joint at which the spring of the joint is at rest.
 fn rest(joint: Joint) -> &'static [f64] {
     match joint {
         Joint::Continuous { .. } => &[0.6, 0.8],
@@ -220,7 +221,7 @@ fn rest(joint: Joint) -> &'static [f64] {
     }
 }
 
-/// Returns the efforts of armature: a q̈, and for a free joint's linear coordinates a (v̇ + ω × v).
+/// Returns the efforts caused by an armature a: a q̈, and a (v̇ + ω × v) for the linear coordinates of a free joint.
 #[allow(dead_code)] // used by some of the tests
 pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
     let mut tau: Vec<f64> = model.armature().iter().zip(a).map(|(armature, a)| armature * a).collect();
@@ -245,7 +246,7 @@ pub(crate) fn fixed() -> Model {
     builder.build().expect("a robot need not move")
 }
 
-/// Returns the embedded robots, one of them also with an apparent mass of its base, and random trees with and without
+/// Returns the embedded robots, a copy of one with an apparent mass of the base, and random trees with and without
 /// mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();
@@ -257,7 +258,8 @@ pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     models
 }
 
-/// Creates n hinges (one in four is a slide), each body on the one with index `parent`; on a free-flyer if `floating`.
+/// Creates a tree of n joints: hinges, and one slide in four joints. `parent` gives the index of a body's parent. With
+/// `floating`, the first joint is a free-flyer.
 pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) -> Model {
     let rng = &mut rng(n as u64);
     let mut builder = ModelBuilder::new("tree");
@@ -276,7 +278,7 @@ pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) ->
     builder.build().expect("a tree is well-formed")
 }
 
-/// Returns long chains: one on the world, one on a floating base, and one with branches on branches.
+/// Returns three long trees: a chain on the world, a chain on a floating base, and a tree whose branches have branches.
 pub(crate) fn long_branches() -> [Model; 3] {
     [
         tree(53, false, |i| i - 1),
@@ -297,7 +299,7 @@ pub(crate) struct State {
     pub(crate) v: Vec<f64>,
     pub(crate) a: Vec<f64>,
     pub(crate) tau: Vec<f64>,
-    /// Force on each body, and one on the world, which must not matter.
+    /// Force on each body. The force on the world must have no effect.
     pub(crate) f_ext: Vec<Force<f64>>,
 }
 
@@ -319,7 +321,7 @@ pub(crate) fn lift_forces<S: Scalar>(f: &[Force<f64>]) -> Vec<Force<S>> {
     f.iter().map(|f| f.lift()).collect()
 }
 
-/// Returns x + ε d.
+/// Returns the dual numbers x + ε d.
 pub(crate) fn dual(x: &[f64], d: &[f64]) -> Vec<Dual64> {
     x.iter().zip(d).map(|(&x, &d)| Dual64::new(x, d)).collect()
 }
@@ -343,7 +345,7 @@ pub(crate) fn moved<S: Scalar>(model: &Model, q: &[S], d: &[S]) -> Vec<S> {
     out
 }
 
-/// Computes λ_X_i as in textbooks: Rodrigues' formula about the joint's own axis.
+/// Computes the placement of a body in its parent as in textbooks, by Rodrigues' formula about the axis of the joint.
 pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
     let turn = |w: Vec3<f64>| lie::exp3(w).to_rotation();
     let z = Vec3::new(0.0, 0.0, 1.0);
@@ -361,7 +363,8 @@ pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
     Se3::new(rotation, translation)
 }
 
-/// Computes the position that joint i would have if it were not a follower: ratio · q + offset, by angles.
+/// Computes the position of joint i from its own kind: for a follower, ratio · q + offset, where q is the position of
+/// the leader as an angle.
 pub(crate) fn own_position(model: &Model, i: usize, q: &[f64]) -> Vec<f64> {
     let body = &model.bodies()[i];
     let Some(Mimic { ratio, offset }) = body.mimic else { return q[body.idx_q..body.idx_q + body.joint.nq()].to_vec() };
@@ -372,7 +375,7 @@ pub(crate) fn own_position(model: &Model, i: usize, q: &[f64]) -> Vec<f64> {
     if body.joint.nq() == 2 { vec![x.cos(), x.sin()] } else { vec![x] }
 }
 
-/// Returns aXb as its twelve numbers.
+/// Returns the twelve numbers of the placement X.
 pub(crate) fn flat<S: Scalar>(X: Se3<S>) -> Vec<S> {
     X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array).collect()
 }
@@ -385,7 +388,7 @@ pub(crate) fn relative(a: &[f64], b: &[f64]) -> f64 {
     difference / (1.0 + b.iter().map(|b| b.abs()).fold(0.0, largest))
 }
 
-/// Largest error so far, and its tolerance.
+/// Largest error that was found so far, and the tolerance for this error.
 pub(crate) struct Worst {
     name: &'static str,
     tolerance: f64,

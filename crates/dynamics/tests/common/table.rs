@@ -1,4 +1,4 @@
-//! Table of every function that a control loop calls; properties that all functions share are tested with it.
+//! Table of every function that a control loop calls. Tests use it for properties that all functions must have.
 //!
 //! [`DivideConquer`](condyle_dynamics::DivideConquer) is not in the table, because rayon allocates when threads
 //! synchronise.
@@ -27,7 +27,7 @@ pub(crate) struct Input<S> {
     pub(crate) q: Vec<S>,
     pub(crate) q1: Vec<S>,
     pub(crate) v: Vec<S>,
-    /// Acceleration or effort.
+    /// Accelerations or joint efforts.
     pub(crate) x: Vec<S>,
     pub(crate) f_ext: Vec<Force<S>>,
 }
@@ -52,7 +52,7 @@ impl<S: Scalar> Input<S> {
     }
 }
 
-/// Results of the functions of the table, and scratch that does not belong to a `Data`.
+/// Results of the functions in the table, and scratch that is not part of a `Data`.
 pub(crate) struct Output<S: Scalar> {
     pub(crate) numbers: Vec<S>,
     q: Vec<S>,
@@ -93,7 +93,7 @@ impl<S: Scalar> Output<S> {
         }
     }
 
-    /// Appends the state after a step of 1 ms, and whether the step was taken.
+    /// Appends the state after a step of 1 ms, then 1 if the step was taken, else 0.
     fn step(&mut self, integrator: Integrator, i: &Input<S>) {
         self.simulation.settings.integrator = integrator;
         self.simulation.settings.passive = Some(0.1);
@@ -113,8 +113,8 @@ impl<S: Scalar> Output<S> {
     }
 }
 
-/// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move, or
-/// whose file has removed the frames of a body that the constraints need.
+/// Returns a contact and a loop, with one more iteration than needed. If the robot cannot move, or the bodies have no
+/// frames for these constraints, returns no constraints.
 fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let last = model.bodies().len() - 1;
     let frame = |body: usize| model.frames().iter().position(|f| f.body == body).filter(|_| last > 0);
@@ -129,7 +129,7 @@ fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     set
 }
 
-/// Returns the inputs on which τ and q̈ depend, besides q, v, and each other.
+/// Returns the inputs on which inverse and forward dynamics depend, besides q, v, q̈ and τ.
 fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
     use condyle_dynamics::Input::*;
     let last = model.bodies().len() - 1;
@@ -137,7 +137,7 @@ fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
     [Force(last), inertia, Gravity, Armature, Damping, Friction { smoothing: 0.1 }]
 }
 
-/// Functions that need no `Data`, or create their own.
+/// Functions that need no `Data`, or that create a `Data` themselves.
 const WITHOUT_DATA: [&str; 10] = [
     "integrate",
     "difference",
@@ -155,19 +155,19 @@ pub(crate) fn has_data(name: &str) -> bool {
     !WITHOUT_DATA.iter().any(|f| name.starts_with(f))
 }
 
-/// Newton iterations of a simulated step; from random states three are enough.
+/// Maximum number of Newton iterations in a simulated step. Three iterations are enough from random states.
 const ITERATIONS: usize = 5;
 
-/// Returns whether a function couples the lanes. A simulation steps in all lanes or in none, and Newton's method
-/// iterates until it has converged in all.
+/// Returns whether a function couples the lanes. A simulation takes a step in all lanes or in no lane, and Newton's
+/// method iterates until all lanes have converged.
 pub(crate) fn in_step(name: &str) -> bool {
     name.starts_with("simulation")
 }
 
 pub(crate) type Function<S> = fn(&Model, &mut Data<S>, &Input<S>, &mut Output<S>);
 
-/// Returns name and call of each function that is compiled as a whole for every SIMD level. A call allocates only if
-/// the function does.
+/// Returns the name and a call of each function that is compiled as a whole for every SIMD level. A call allocates only
+/// if the function allocates.
 pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     [
         ("rnea", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
@@ -207,7 +207,7 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     ]
 }
 
-/// Returns name and call of each function. A call allocates only if the function does.
+/// Returns the name and a call of each function. A call allocates only if the function allocates.
 pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
     let others: [(&'static str, Function<S>); 42] = [
         ("rnea_derivatives by all other inputs", |m, d, i, o| {

@@ -1,6 +1,7 @@
 """Reference numbers of MuJoCo 4.0.0 for tests/suite/mjcf.rs: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
 
-Quaternions are stored with w first, and a free joint's linear velocity in the world's frame; the test converts them.
+The numbers follow MuJoCo's conventions: quaternions begin with w, and the linear velocity of a free joint is in the
+world's frame. The test converts these numbers.
 """
 
 import json
@@ -13,7 +14,7 @@ assert mujoco.__version__ == "4.0.0"
 here = pathlib.Path(__file__).parent
 for name in ["arm", "quadruped"]:
     text = (here / f"{name}.xml").read_text()
-    # the mesh file is missing: MuJoCo would read it, but it has no mass
+    # remove the mesh, because MuJoCo would read a file that does not exist; the mesh has no mass
     lines = [line for line in text.splitlines() if "mesh" not in line]
     assets = {p.name: p.read_bytes() for p in here.glob("*_defaults.xml")}
     model = mujoco.MjModel.from_xml_string("\n".join(lines), assets)
@@ -61,8 +62,8 @@ for name in ["arm", "quadruped"]:
         )
     (here / f"{name}_mujoco.json").write_text(json.dumps(out) + "\n")
 
-# Joints that follow others: positions at which MuJoCo's equality constraints hold, and MuJoCo's results there, in the
-# leaders' coordinates, v = G v_leaders.
+# Joints that follow other joints: positions at which MuJoCo's equality constraints hold, and results at them.
+# All numbers are in the coordinates of the leaders: v = G v_leaders.
 model = mujoco.MjModel.from_xml_path(str(here / "gripper.xml"))
 data = mujoco.MjData(model)
 rng = np.random.default_rng(1)
@@ -97,9 +98,9 @@ for _ in range(3):
     )
 (here / "gripper_mujoco.json").write_text(json.dumps(out))
 
-# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/springs.rs. These
-# numbers follow the conventions of this library (quaternions with w last, the linear velocity of a free joint in the
-# body's axes).
+# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/springs.rs.
+# These numbers follow Condyle's conventions.
+# Quaternions end with w, and the linear velocity of a free joint is in the body's axes.
 model = mujoco.MjModel.from_xml_path(str(here / "passive.xml"))
 data = mujoco.MjData(model)
 rng = np.random.default_rng(1)
@@ -111,11 +112,11 @@ for _ in range(4):
     mujoco.mj_forward(model, data)
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
-    T = np.eye(model.nv)  # MuJoCo's velocity = T times ours
+    T = np.eye(model.nv)  # MuJoCo's velocity is T times Condyle's velocity
     T[:3, :3] = data.body("base").xmat.reshape(3, 3)
     v = T.T @ data.qvel
     turned = np.zeros(model.nv)
-    turned[:3] = np.cross(v[3:6], v[:3])  # MuJoCo's acceleration = T (ours + ω × v)
+    turned[:3] = np.cross(v[3:6], v[:3])  # MuJoCo's acceleration is T (a + ω × v), with Condyle's acceleration a
     q = data.qpos.copy()
     for joint in ["float", "ball"]:
         at = model.joint(joint).qposadr[0] + (3 if joint == "float" else 0)

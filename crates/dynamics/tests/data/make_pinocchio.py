@@ -1,4 +1,4 @@
-"""Reference numbers for tests/suite/mimic.rs: `pip install pin==4.1.0`, then `python make_pinocchio.py`."""
+"""Reference numbers of Pinocchio for tests/suite/mimic.rs: `pip install pin==4.1.0`, `python make_pinocchio.py`."""
 
 import json
 import pathlib

@@ -6,8 +6,8 @@ use crate::counting::allocations;
 use condyle_dynamics::{Data, Scalar};
 use num_dual::Dual64;
 
-/// Checks the three robots, a tree of every joint type, and a tree with joints that follow others; from the first call
-/// on.
+/// Checks from the first call on: with the three embedded robots, a tree with every joint type, and a tree with mimic
+/// joints.
 fn check<S: Scalar>() {
     for (seed, model) in all_models(1).iter().enumerate() {
         let input = Input::<S>::random(model, &mut rng(seed as u64));

@@ -1,5 +1,5 @@
-//! Inverse dynamics, the inertia matrix and forward dynamics in the form of the book, compared with the formulation in
-//! the library.
+//! Inverse dynamics, the inertia matrix and forward dynamics, as Featherstone's book formulates them. The results are
+//! compared with the results of this library.
 
 use crate::common;
 
@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
 
 /// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
-/// The same times the condition number of M.
+/// Tolerance of results with M⁻¹: sums over all bodies, times the condition number of M.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 20;
 
@@ -20,7 +20,7 @@ fn motion(x: &[f64]) -> Motion<f64> {
     Motion::from(core::array::from_fn(|k| x[k]))
 }
 
-/// The matrix of a linear map of motions to motions or forces.
+/// Returns the 6 × 6 matrix of a linear map from motions to motions or forces.
 fn matrix(map: impl Fn(Motion<f64>) -> [f64; 6]) -> Matrix6<f64> {
     Matrix6::from_columns(&core::array::from_fn::<_, 6, _>(|k| {
         let unit = core::array::from_fn(|i| if i == k { 1.0 } else { 0.0 });
@@ -28,12 +28,13 @@ fn matrix(map: impl Fn(Motion<f64>) -> [f64; 6]) -> Matrix6<f64> {
     }))
 }
 
-/// A robot at q as Featherstone, *Rigid Body Dynamics Algorithms* (2008), has it, in body coordinates.
+/// Robot at a position q in body coordinates, as described in Featherstone, *Rigid Body Dynamics Algorithms* (2008).
 struct Book<'a> {
     model: &'a Model,
-    /// λXi of each body.
+    /// Placement of each body i in its parent λ.
     X: Vec<Se3<f64>>,
-    /// Motion subspaces, 6 × nv. Joints that follow another one have their columns in the coordinate of their leader.
+    /// Motion subspaces, 6 × nv each. A joint that follows another joint has its column at the coordinate of the
+    /// leader.
     S: Vec<Matrix6xX<f64>>,
 }
 
@@ -63,7 +64,8 @@ impl<'a> Book<'a> {
         self.model.bodies()[i].parent
     }
 
-    /// iXλ of motions. Its transpose is λX*i of forces.
+    /// Returns the transform iXλ of motions from the parent λ to body i. The transpose of iXλ transforms forces from i
+    /// to λ.
     fn up(&self, i: usize) -> Matrix6<f64> {
         matrix(|x| self.X[i].act_inv(x).to_array())
     }
@@ -72,7 +74,7 @@ impl<'a> Book<'a> {
         self.model.bodies().iter().map(|body| matrix(|x| (body.inertia * x).to_array())).collect()
     }
 
-    /// v_i and v_J of each body.
+    /// Returns the velocity v_i and the joint velocity v_J of each body.
     fn velocities(&self, v: &[f64]) -> [Vec<Motion<f64>>; 2] {
         let mut vel = [vec![Motion::zero(); self.X.len()], vec![Motion::zero(); self.X.len()]];
         for i in 1..self.X.len() {
@@ -82,7 +84,7 @@ impl<'a> Book<'a> {
         vel
     }
 
-    /// τ by table 5.1.
+    /// Computes τ by table 5.1 of the book.
     fn rnea(&self, State { v, a, f_ext, .. }: &State) -> Vec<f64> {
         let (model, qdd) = (self.model, DVector::from_column_slice(a));
         let [vel, vJ] = self.velocities(v);
@@ -107,7 +109,8 @@ impl<'a> Book<'a> {
         tau.as_slice().to_vec()
     }
 
-    /// M by table 6.2. Products of two joints are added up, as they are several where joints share a coordinate.
+    /// Computes M by table 6.2 of the book. The products of pairs of joints are added, because several pairs contribute
+    /// to an entry of M if joints share a coordinate.
     fn crba(&self) -> DMatrix<f64> {
         let mut Ic = self.inertias();
         let mut M = DMatrix::from_diagonal(&DVector::from_column_slice(self.model.armature()));
@@ -127,7 +130,7 @@ impl<'a> Book<'a> {
         M
     }
 
-    /// q̈ by table 7.1. Joints must not share coordinates.
+    /// Computes q̈ by table 7.1 of the book. Joints must not share coordinates.
     fn aba(&self, State { v, tau, f_ext, .. }: &State) -> Vec<f64> {
         let (model, bodies) = (self.model, self.X.len());
         let at = |i: usize| (model.bodies()[i].idx_v, model.bodies()[i].joint.nv());
@@ -174,7 +177,8 @@ impl<'a> Book<'a> {
     }
 }
 
-/// On the embedded robots, and random trees with every kind of joint, armature, and forces on all bodies.
+/// The library gives the results of the book on the embedded robots and on random trees. The trees have every kind of
+/// joint, armature, and forces on all bodies.
 #[test]
 fn the_book_gives_the_same() {
     let mut efforts = Worst::new("rnea = table 5.1", ROUNDING);
@@ -195,7 +199,7 @@ fn the_book_gives_the_same() {
             let expected = book.aba(&state);
             accelerations.see(model, aba(model, &mut data, &q, &v, &effort, &f_ext), &expected);
         } else {
-            // The recursion does not close where joints share a coordinate: M q̈ = τ − h.
+            // The book's recursion is not possible where joints share a coordinate, so M q̈ = τ − h is solved instead.
             state.a.fill(0.0);
             let right = DVector::from_column_slice(&effort) - DVector::from_vec(book.rnea(&state));
             let expected = M.cholesky().expect("M is positive definite").solve(&right);

@@ -1,5 +1,5 @@
-//! Centre of mass, centroidal momentum, energies, and all terms at once, compared with dual numbers in time and with
-//! the other algorithms.
+//! Centre of mass, centroidal momentum, energies, and the function that computes all terms at once. They are compared
+//! with time derivatives by dual numbers and with other algorithms.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ use num_dual::Dual64;
 
 /// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
-/// Tolerance of the same after forward dynamics: times the condition number of M.
+/// Tolerance after forward dynamics: sums over all bodies, times the condition number of M.
 const INVERTED: f64 = 1e-9;
 const TREES: u64 = 15;
 
@@ -27,7 +27,7 @@ fn moving(model: &Model, q: &[f64], v: &[f64]) -> Vec<Dual64> {
     moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v))
 }
 
-/// ċ = Jcom v and c̈, by dual numbers; the momentum is m ċ.
+/// ċ = Jcom v and c̈ equal time derivatives by dual numbers, and the linear momentum is m ċ.
 #[test]
 fn centre_of_mass() {
     let mut place = Worst::new("c = Σ m_i c_i / m", ROUNDING);
@@ -55,7 +55,8 @@ fn centre_of_mass() {
     }
 }
 
-/// hg = Ag v, dAg = dAg/dt, dhg = Ag a + dAg v = dhg/dt; Ig is the inertia of all bodies as one.
+/// hg = Ag v. dAg is the rate of Ag, and dhg = Ag a + dAg v is the rate of hg. Ig is the inertia of all bodies as one
+/// rigid body.
 #[test]
 fn momentum() {
     let mut momentum = Worst::new("Ag v = hg", ROUNDING);
@@ -97,7 +98,7 @@ fn newton_and_euler() {
     let [_, quadruped, humanoid] = embedded();
     for (model, seed) in [quadruped, humanoid].iter().flat_map(|model| (0..20).map(move |seed| (model, seed))) {
         let State { q, v, mut tau, f_ext, .. } = State::random(model, &mut rng(seed));
-        tau[..6].fill(0.0); // the base has no drive
+        tau[..6].fill(0.0); // no motor acts on the base
         let mut data = Data::new(model);
         let a = aba(model, &mut data, &q, &v, &tau, &f_ext).to_vec();
         let k = forward_accelerations(model, &mut data, &q, &v, &a);

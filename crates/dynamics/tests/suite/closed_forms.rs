@@ -9,12 +9,13 @@ use condyle_dynamics::{
 };
 use core::f64::consts::PI;
 
-/// Tolerance of some hundreds of operations on numbers of size 10.
+/// Tolerance of a few hundred operations on numbers of about 10.
 const ROUNDING: f64 = 1e-13;
 const G: f64 = 9.81;
 const Z: Vec3<f64> = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
 
-/// Link of a planar arm: length, distance of the centre of mass along it, mass, inertia about the centre of mass.
+/// Link of a planar arm: length, distance of the centre of mass along the link, mass, and inertia about the centre of
+/// mass.
 #[derive(Clone, Copy)]
 struct Link {
     l: f64,
@@ -39,7 +40,7 @@ fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     builder.gravity(R * Vec3::new(0.0, -G, 0.0));
     let (mut parent, mut placement) = (WORLD, Se3::new(R, Vec3::new(0.3, -0.2, 0.1)));
     for (i, link) in links.iter().enumerate() {
-        // the rotational inertia about the other axes does not matter
+        // the arm only rotates about z, so the other moments of inertia have no effect
         let inertia = Inertia::from_com(link.m, Vec3::new(link.c, 0.0, 0.0), Sym3::diagonal(link.I));
         parent = builder.body(&format!("link{i}"), parent, Joint::Revolute { axis: Z }, placement, inertia);
         placement = along_x(link.l);
@@ -47,7 +48,8 @@ fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     builder.build().unwrap()
 }
 
-/// Source: Spong, Hutchinson, Vidyasagar, *Robot Modeling and Control* (2006), section 7.3.2.
+/// The dynamics of a planar arm with two links equal the equations in Spong, Hutchinson, Vidyasagar, *Robot Modeling
+/// and Control* (2006), section 7.3.2.
 #[test]
 fn two_links() {
     let [a, b, _] = LINKS;
@@ -75,8 +77,8 @@ fn two_links() {
     }
 }
 
-/// Uses absolute angles θ_i = q_1 + … + q_i, and A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj. Then T = ½ Σ A_ij cos(θ_i − θ_j)
-/// θ̇_i θ̇_j, and a torque at link i also acts on the links before it.
+/// A planar arm with three links, in absolute angles θ_i = q_1 + … + q_i: T = ½ Σ A_ij cos(θ_i − θ_j) θ̇_i θ̇_j with
+/// A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj. A torque that turns link i also acts on all links before it.
 #[test]
 fn three_links() {
     let arm = |k: usize, i: usize| match k.cmp(&i) {
@@ -141,10 +143,11 @@ fn pendulum() {
     }
 }
 
-/// A pendulum released at 2 rad swings with the period 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)).
+/// A pendulum released at 2 rad swings with the period 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)). K is the complete
+/// elliptic integral, agm the arithmetic-geometric mean.
 #[test]
 fn period_of_a_pendulum() {
-    /// Number of steps, and tolerance: the Runge–Kutta error is (0.001)⁴ times a fifth derivative.
+    /// Number of steps, and tolerance. The error of the Runge–Kutta method is (0.001)⁴ times a fifth derivative.
     const STEPS: u32 = 2000;
     const INTEGRATION: f64 = 1e-10;
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -1.0), Sym3::zero());
@@ -170,7 +173,8 @@ fn period_of_a_pendulum() {
     assert!((q - 2.0).abs() < INTEGRATION && v.abs() < INTEGRATION, "after a period: {q} {v}");
 }
 
-/// A cart on rails has a pole, upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l θ̈ + ẍ cos θ = g sin θ.
+/// A cart on rails carries a pole, which is upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l θ̈ + ẍ cos
+/// θ = g sin θ.
 #[test]
 fn cart_and_pole() {
     let (M, m, l) = (1.5, 0.4, 0.8);
@@ -190,7 +194,8 @@ fn cart_and_pole() {
     }
 }
 
-/// Euler's equations hold: J ω̇ = n − ω × J ω; the centre of mass falls, whatever the body does.
+/// A free body satisfies Euler's equations J ω̇ = n − ω × J ω. Its centre of mass falls freely, however the body
+/// rotates.
 #[test]
 fn free_body() {
     let rng = &mut rng(3);
@@ -207,12 +212,12 @@ fn free_body() {
             let r = Quaternion::new(r[0], r[1], r[2], r[3]).normalize();
             let q = [p.x, p.y, p.z, r.vector.x, r.vector.y, r.vector.z, r.scalar];
             let twist: Vec<f64> = v.to_array().into_iter().chain(w.to_array()).collect();
-            // a torque n about the centre of mass, no force
+            // the body feels a torque n about the centre of mass, but no force except its weight
             let tau = [0.0, 0.0, 0.0, n.x, n.y, n.z];
             let free = n - w.cross(J * w);
             let w_dot = Vec3::new(free.x / J.xx, free.y / J.yy, free.z / J.zz);
-            // acceleration of the origin: gravity minus the contribution of the rotation about the centre of mass;
-            // spatial, hence − ω × v
+            // The acceleration of the origin is gravity minus the contribution of the rotation about the centre of
+            // mass. As it is a spatial acceleration, ω × v is subtracted.
             let fall = r.to_rotation().transpose_mul(Vec3::new(0.0, 0.0, -G));
             let v_dot = fall - w_dot.cross(c) - w.cross(w.cross(c)) - w.cross(v);
             let expected: Vec<f64> = v_dot.to_array().into_iter().chain(w_dot.to_array()).collect();
@@ -222,7 +227,7 @@ fn free_body() {
     }
 }
 
-/// A top stands on its tip: Ī ω̇ = c × m g − ω × Ī ω about the tip.
+/// A top that stands on its tip satisfies Ī ω̇ = c × m g − ω × Ī ω, with the inertia Ī about the tip.
 #[test]
 fn top() {
     let rng = &mut rng(4);
@@ -245,7 +250,7 @@ fn top() {
     }
 }
 
-/// A puck on the ice satisfies m (v̇ + ω × v) = f in body coordinates, and a point in the air m ẍ = f + m g.
+/// A puck on ice satisfies m (v̇ + ω × v) = f in body coordinates. A point mass in the air satisfies m ẍ = f + m g.
 #[test]
 fn puck_and_point() {
     let rng = &mut rng(5);
@@ -267,7 +272,8 @@ fn puck_and_point() {
     }
 }
 
-/// One motor drives two wheels geared by −3, and a rack on the first wheel: (J₁ + 9 J₂ + r² m) θ̈ = τ.
+/// One motor drives a wheel, a second wheel with the gear ratio −3, and a rack on the first wheel: (J₁ + 9 J₂ + r² m)
+/// θ̈ = τ.
 #[test]
 fn gears() {
     let (J1, J2, m, r) = (0.2, 0.05, 1.5, 0.1);

@@ -1,4 +1,5 @@
-//! Growth of the work of the recursions: operations counted, not timed.
+//! Growth of the work of recursive algorithms with the number of bodies. The tests count operations and do not measure
+//! times.
 
 use crate::common;
 use crate::counted::{Counted, Operations, counted};
@@ -10,7 +11,7 @@ use condyle_dynamics::{
     robots,
 };
 
-/// n hinges, each body on the one that `parent` names.
+/// Creates a tree of n hinges. `parent` gives the index of a body's parent.
 fn hinges(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let rng = &mut rng(n as u64);
     let mut builder = ModelBuilder::new("hinges");
@@ -23,10 +24,10 @@ fn hinges(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     builder.build().expect("a tree is well-formed")
 }
 
-/// The parent of each body.
+/// Function that returns the index of a body's parent.
 type Shape = fn(usize) -> usize;
 
-/// A chain, a binary tree, a star about body 1, and a chain of branches.
+/// Shapes of trees: a chain, a binary tree, a star about body 1, and a chain of branches.
 const SHAPES: [(&str, Shape); 4] = [
     ("chain", |i| i - 1),
     ("binary tree", |i| i / 2),
@@ -34,17 +35,18 @@ const SHAPES: [(&str, Shape); 4] = [
     ("caterpillar", |i| if i % 3 == 1 { i.saturating_sub(3) } else { i - 1 }),
 ];
 
-/// Bodies that are added at a time: joints repeat after 3 and 4 bodies, shapes after 3.
+/// Number of bodies that are added at a time. It is a multiple of 3 and 4, because joints repeat after 3 and 4 bodies,
+/// and shapes after 3.
 const GROUP: usize = 12;
 
-/// Operations for each hinge, as the book's page on complexity has them.
+/// Number of operations per hinge, as on the book's page on complexity.
 const RNEA_PER_HINGE: u64 = 245;
 const ABA_PER_HINGE: u64 = 629;
-/// The same of CRBA: for each hinge, and for each pair of a hinge and an ancestor.
+/// Number of operations of CRBA: per hinge, and per pair of a hinge and one of its ancestors.
 const CRBA_PER_HINGE: f64 = 276.0;
 const CRBA_PER_PAIR: f64 = 11.0;
 
-/// Operations of RNEA, CRBA and ABA at one state.
+/// Counts the operations of RNEA, CRBA and ABA at one state.
 fn work(model: &Model) -> [Operations; 3] {
     let State { q, v, a, .. } = State::random(model, &mut rng(0));
     let [q, v, a]: [Vec<Counted>; 3] = [&q, &v, &a].map(|x| lift(x));
@@ -56,7 +58,7 @@ fn work(model: &Model) -> [Operations; 3] {
     ]
 }
 
-/// Σ depth: ancestors of all bodies, themselves counted too.
+/// Returns Σ depth, the sum of the depths of all bodies. The depth of a body is the number of its ancestors, plus one.
 fn sum_of_depths(model: &Model) -> u64 {
     let mut depth = vec![0; model.bodies().len()];
     for (i, body) in model.bodies().iter().enumerate().skip(1) {
@@ -65,7 +67,7 @@ fn sum_of_depths(model: &Model) -> u64 {
     depth.iter().sum()
 }
 
-/// RNEA and ABA take the same number of operations for each body more, whatever the shape of the tree.
+/// RNEA and ABA take the same number of operations for each additional body, for any shape of the tree.
 #[test]
 fn work_of_rnea_and_aba_is_linear() {
     for (name, parent) in SHAPES {
@@ -84,8 +86,8 @@ fn work_of_rnea_and_aba_is_linear() {
     }
 }
 
-/// CRBA takes a + b n + c Σ depth operations, with the same a, b and c for all shapes: n² on a chain, n log n on a
-/// balanced tree, n on a star.
+/// CRBA takes a + b n + c Σ depth operations, with the same a, b and c for all shapes of trees. Σ depth grows like n²
+/// for a chain, n log n for a balanced tree, and n for a star.
 #[test]
 fn work_of_crba_is_the_sum_of_depths() {
     let seen: Vec<(f64, f64, f64)> = SHAPES
@@ -93,7 +95,7 @@ fn work_of_crba_is_the_sum_of_depths() {
         .flat_map(|&(_, parent)| [GROUP, 2 * GROUP, 4 * GROUP].map(|n| hinges(n, parent)))
         .map(|model| (model.nv() as f64, sum_of_depths(&model) as f64, work(&model)[1].flops() as f64))
         .collect();
-    // c from a chain and a star of 4 groups; a and b from two stars
+    // c follows from a chain and a star of 4 groups, and a and b follow from two stars
     let [chain, star, short] = [seen[2], seen[8], seen[6]];
     let c = (chain.2 - star.2) / (chain.1 - star.1);
     let b = (star.2 - short.2 - c * (star.1 - short.1)) / (star.0 - short.0);
@@ -105,7 +107,7 @@ fn work_of_crba_is_the_sum_of_depths() {
     }
 }
 
-/// A joint of another kind costs other constants, and the growth stays.
+/// With joints of other kinds, the number of operations per body changes, but the growth stays linear.
 #[test]
 fn with_slides_and_a_floating_base() {
     for floating in [false, true] {
@@ -123,7 +125,7 @@ fn with_slides_and_a_floating_base() {
     }
 }
 
-/// Operations of forward dynamics by a method.
+/// Counts the operations of forward dynamics by a method.
 fn forward(model: &Model, method: ForwardDynamicsMethod) -> Operations {
     let State { q, v, tau, .. } = State::random(model, &mut rng(0));
     let [q, v, tau]: [Vec<Counted>; 3] = [&q, &v, &tau].map(|x| lift(x));
@@ -131,7 +133,7 @@ fn forward(model: &Model, method: ForwardDynamicsMethod) -> Operations {
     counted(|| forward_dynamics(model, &mut data, &q, &v, &tau, &[], Some(method))).0
 }
 
-/// Operations of all terms at once, and of the same terms by a call each.
+/// Counts the operations for all terms at once, and for the same terms by one call per term.
 fn terms(model: &Model) -> [Operations; 2] {
     let State { q, v, .. } = State::random(model, &mut rng(0));
     let [q, v]: [Vec<Counted>; 2] = [&q, &v].map(|x| lift(x));
@@ -151,7 +153,7 @@ fn terms(model: &Model) -> [Operations; 2] {
     [together.0, apart.0]
 }
 
-/// Operations of the dense and of the sparse factor of M.
+/// Counts the operations of the dense and of the sparse factorisation of M.
 fn factors(model: &Model) -> [Operations; 2] {
     let q = lift(&State::random(model, &mut rng(0)).q);
     let M = crba::<Counted, f64>(model, &mut Data::new(model), &q).clone();
@@ -167,7 +169,7 @@ fn factors(model: &Model) -> [Operations; 2] {
     [dense.0, sparse.0]
 }
 
-/// Several humanoids in one model.
+/// Creates one model with several humanoids.
 fn humanoids(n: usize) -> Model {
     let (one, mut builder) = (robots::humanoid(), ModelBuilder::new("crowd"));
     for k in 0..n {
@@ -176,7 +178,7 @@ fn humanoids(n: usize) -> Model {
     builder.build().expect("robots side by side are one")
 }
 
-/// The tables of the book's page on complexity are what is counted here.
+/// The tables on the book's page on complexity show the numbers that this test counts.
 #[test]
 fn the_book_has_these_figures() {
     let page = include_str!("../../../../docs/complexity.md");

@@ -1,4 +1,4 @@
-//! Models made from models, and paths through the space of positions.
+//! Models that are composed of other models, and paths through the space of positions.
 
 use crate::common;
 
@@ -9,7 +9,7 @@ use condyle_dynamics::{
 };
 use nalgebra::DMatrix;
 
-/// Tolerance of two computations of some hundred operations each, on numbers of order one.
+/// Tolerance between two computations of some hundred operations each, on numbers of order one.
 const ROUNDING: f64 = 1e-12;
 
 #[test]
@@ -128,7 +128,7 @@ fn ways_between_positions() {
         difference(&model, &a.q, &b.q, &mut rest);
         assert!((whole - rest.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < ROUNDING * (1.0 + whole));
         interpolate(&model, &a.q, &b.q, 0.3, &mut d, &mut q);
-        // a path at constant velocity: the length of the rest is proportional to the remaining time
+        // the path has constant velocity, so the length of the rest is proportional to the remaining time
         assert!((distance(&model, &q, &b.q, &mut rest) - 0.7 * whole).abs() < 1e-10 * (1.0 + whole));
         let mut long: Vec<f64> = q.clone();
         normalize(&model, &mut long);

@@ -1,4 +1,4 @@
-//! Constrained dynamics and impacts: the constraints hold, by constraint forces only.
+//! Constrained dynamics and impacts: the constraints hold, and only constraint forces enforce them.
 
 use crate::common;
 
@@ -13,14 +13,14 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods, some thousand roundings each.
+/// Tolerance between two exact methods with some thousand roundings each.
 const EXACT: f64 = 1e-11;
-/// Tolerance after a product with M or its inverse, or with Λ, whose condition numbers are up to 1e4.
+/// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
 const TREES: u64 = 15;
 
-/// Computes the quantity that a constraint requires to vanish, from the public kinematics; rates of velocities by dual
-/// numbers in time.
+/// Computes the quantity that a constraint requires to vanish, from the public functions of kinematics. Rates of
+/// velocities are time derivatives by dual numbers.
 fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
     let world = ReferenceFrame::World;
     let mut data = Data::<Dual64>::new(model);
@@ -78,7 +78,7 @@ fn in_rows(c: &ContactConstraint, force: Force<f64>) -> Vec<f64> {
     }
 }
 
-/// Computes the effort of a constraint's force, from the public Jacobians.
+/// Computes the joint efforts of a constraint's force, from the public Jacobians.
 fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) -> DVector<f64> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
@@ -100,7 +100,7 @@ fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) ->
     own - J.tr_mul(&DVector::from_row_slice(&oF.to_array()))
 }
 
-/// Every constraint holds, and M q̈ + h − Jᵀ λ = τ: both equations that define the solution.
+/// Every constraint holds, and M q̈ + h − Jᵀ λ = τ. These two equations define the solution.
 #[test]
 fn constraints_hold_by_forces_of_their_own() {
     let mut held = Worst::new("J q̈ + γ", CONDITIONED);
@@ -128,7 +128,7 @@ fn constraints_hold_by_forces_of_their_own() {
     println!("{rows} rows in all");
 }
 
-/// For a contact of a point or a frame, the axes of the rows only change the axes of λ.
+/// For a contact of a point or a frame, other axes of the rows only change the axes in which λ is expressed.
 #[test]
 fn references_turn_forces_only() {
     let mut worst = Worst::new("q̈ in both references", CONDITIONED);
@@ -162,7 +162,7 @@ fn references_turn_forces_only() {
     }
 }
 
-/// Returns the standing humanoid: on both soles, with bent knees.
+/// Returns a humanoid that stands on both soles with bent knees, its state, and the frames of the soles.
 fn standing() -> (Model, State, [usize; 2]) {
     let model = robots::humanoid();
     let mut state = State::random(&model, &mut rng(7));
@@ -173,7 +173,8 @@ fn standing() -> (Model, State, [usize; 2]) {
     (model, state, soles)
 }
 
-/// Redundant rows are detected and get no force. With μ they share the force, and the motion is the same.
+/// Redundant rows are detected and get no force. With the proximal parameter μ, redundant rows share the force, and the
+/// motion is the same.
 #[test]
 fn redundant_constraints() {
     let (model, s, [left, right]) = standing();
@@ -182,7 +183,7 @@ fn redundant_constraints() {
         ContactConstraint::rigid(left),
         ContactConstraint { reference: ReferenceFrame::LocalWorldAligned, ..ContactConstraint::rigid(right) },
     ];
-    // the ankle's frame belongs to the same body as the sole
+    // the frame of the ankle is on the same body as the sole
     let body = model.frames()[left].body;
     let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
     let twice = [once[0], once[1], ContactConstraint::rigid(again)];
@@ -203,8 +204,8 @@ fn redundant_constraints() {
     }
 }
 
-/// The forces computed with μ are the smallest ones, as with M⁻¹ and the pseudo-inverse, for any number of points on a
-/// line.
+/// With the proximal parameter μ, the forces of redundant points on a line are the smallest possible forces. They equal
+/// the forces computed with M⁻¹ and a pseudo-inverse.
 #[test]
 fn smallest_forces() {
     let mut builder = ModelBuilder::new("box");
@@ -234,7 +235,8 @@ fn smallest_forces() {
     assert!((lambda - smallest).amax() < 1e-6);
 }
 
-/// Contradicting constraints give the finite solution of the first one, and are reported.
+/// If two constraints contradict each other, the result is the finite solution for the first constraint, and the
+/// contradiction is reported.
 #[test]
 fn contradictions() {
     let (model, s, [left, _]) = standing();
@@ -268,7 +270,8 @@ fn no_constraint() {
     }
 }
 
-/// For ε = 1, T⁺ = T. For ε = 0, the lost energy is the energy of the lost velocity, ½ Δᵀ M Δ (Carnot's theorem).
+/// For the restitution ε = 1, an impact keeps the kinetic energy. For ε = 0, the lost energy is ½ Δᵀ M Δ with the lost
+/// velocity Δ (Carnot's theorem).
 #[test]
 fn energy_of_impacts() {
     let mut worst = Worst::new("energy of impacts", CONDITIONED);
@@ -289,8 +292,9 @@ fn energy_of_impacts() {
     }
 }
 
-/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0. The
-/// acceleration is the allowed one nearest to the free one, so no allowed change brings it nearer (Gauss).
+/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0. Of all
+/// accelerations that the constraints allow, q̈ is nearest to the free acceleration, so no allowed change brings it
+/// nearer (Gauss).
 #[test]
 fn gauss_principle() {
     let mut worst = Worst::new("Gauss's principle", CONDITIONED);
@@ -308,7 +312,7 @@ fn gauss_principle() {
     }
 }
 
-/// Targets in the set are used, and can be changed.
+/// The targets of a constraint set are used, and can be changed.
 #[test]
 fn moving_targets() {
     let (model, s, [left, right]) = standing();
@@ -377,7 +381,8 @@ fn another_robots_constraints() {
     constrained_dynamics(&arm, &mut Data::new(&arm), &mut set, &[0.0; 7], &[0.0; 7], &[0.0; 7], &[]);
 }
 
-/// The loops of a model become constraints of its frames; a coupling of joints does not constrain a frame.
+/// The loops of a model become constraints between frames of the model. A coupling of joints does not constrain a
+/// frame.
 #[test]
 fn loops_of_a_model() {
     let mut builder = ModelBuilder::new("loops");

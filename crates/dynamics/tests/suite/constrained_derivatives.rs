@@ -13,11 +13,12 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods, some thousand roundings each.
+/// Tolerance between two exact methods with some thousand roundings each.
 const EXACT: f64 = 1e-11;
-/// Tolerance after a product with M or its inverse, or with Λ, whose condition numbers are up to 1e4.
+/// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
-/// Tolerance and step of central differences: the error is rounding of 1e-16/step, plus step² times a third derivative.
+/// Tolerance and step of central differences. The error is a rounding of 1e-16/step, plus step² times a third
+/// derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
@@ -48,7 +49,8 @@ impl Algorithm for Dynamics {
     }
 }
 
-/// Inverse dynamics: τ and J q̈ + γ as a function of q, v and q̈, for forces that are not a solution.
+/// Constrained inverse dynamics: τ and J q̈ + γ as functions of q, v and q̈. The forces need not be a solution of
+/// constrained dynamics.
 struct Inverse;
 
 impl Algorithm for Inverse {
@@ -168,7 +170,8 @@ fn derivatives_of_constrained_dynamics() {
     }
 }
 
-/// M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c = 0 hold for the derivatives computed by dual numbers.
+/// The derivatives computed by dual numbers satisfy M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c = 0, with the returned M, J, r
+/// and c.
 #[test]
 fn equations_of_constrained_dynamics() {
     let names = ["r, c for q", "r, c for v", "for τ"];
@@ -212,7 +215,8 @@ fn equations_of_constrained_dynamics() {
     }
 }
 
-/// At a motion and forces that are not a solution, derivatives are exact. The values are M q̈ + h − Jᵀ λ and J q̈ + γ.
+/// Derivatives of constrained inverse dynamics are exact, even for accelerations and forces that do not solve
+/// constrained dynamics. The values are M q̈ + h − Jᵀ λ and J q̈ + γ.
 #[test]
 fn derivatives_of_constrained_inverse_dynamics() {
     let names = ["∂(τ, J q̈ + γ)/∂q", "∂(τ, J q̈ + γ)/∂v", "∂(τ, J q̈ + γ)/∂q̈"];
@@ -268,7 +272,7 @@ fn derivatives_of_impulse_dynamics() {
     }
 }
 
-/// K K⁻¹ = 1, with the returned blocks of K⁻¹.
+/// The returned blocks form K⁻¹, the inverse of the whole matrix of constrained dynamics: K K⁻¹ = 1.
 #[test]
 fn inverse_of_the_whole_matrix() {
     let mut worst = Worst::new("K K⁻¹ − 1", CONDITIONED);
@@ -292,7 +296,7 @@ fn inverse_of_the_whole_matrix() {
     }
 }
 
-/// Redundant rows have no force at neighbouring states either, so all derivatives are exact.
+/// Redundant rows have no force, also at neighbouring states, so all derivatives are exact.
 #[test]
 fn redundant_constraints() {
     let mut exact = Worst::new("redundant constraints", EXACT);

@@ -1,10 +1,11 @@
-//! A scalar that counts operations.
+//! Scalar that counts operations.
 
 use condyle_dynamics::Scalar;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::cell::Cell;
 
-/// Operations by kind. A fused multiply-add is a product and a sum. A change of sign and a selection cost nothing.
+/// Numbers of operations by kind. A fused multiply-add counts as a product and a sum. A change of sign and a selection
+/// are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Operations {
     /// Products.
@@ -13,19 +14,20 @@ pub(crate) struct Operations {
     pub(crate) sums: u64,
     /// Quotients and roots.
     pub(crate) quotients: u64,
-    /// Angles: sines with their cosines, and angles of points.
+    /// Trigonometric functions: each is a sine and cosine of an angle, or the angle of a point.
     pub(crate) angles: u64,
-    /// Fused multiply-adds among the products and sums.
+    /// Fused multiply-adds, which are also counted as products and sums.
     pub(crate) fused: u64,
 }
 
 impl Operations {
-    /// All operations. A fused multiply-add is one.
+    /// Returns the number of all operations. A fused multiply-add counts as one operation.
     pub(crate) fn all(self) -> u64 {
         self.flops() + self.angles - self.fused
     }
 
-    /// All operations but angles. A fused multiply-add is two.
+    /// Returns the number of all operations except trigonometric functions. A fused multiply-add counts as two
+    /// operations.
     pub(crate) fn flops(self) -> u64 {
         self.products + self.sums + self.quotients
     }
@@ -37,7 +39,7 @@ thread_local! {
     };
 }
 
-/// A number that knows how many operations had to be done one after the other for it, and counts all of them.
+/// Number that counts all operations, and stores the length of the longest chain of operations that led to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Counted {
     value: f64,
@@ -126,7 +128,8 @@ impl Scalar for Counted {
     }
 }
 
-/// Operations in all, and the longest row of operations that had to wait for one another.
+/// Returns the number of all operations of f, and the length of the longest chain of operations in which each needs the
+/// result of the previous one.
 pub(crate) fn counted<'a>(f: impl FnOnce() -> &'a [Counted]) -> (Operations, u32) {
     OPERATIONS.set(Operations::default());
     let steps = f().iter().map(|x| x.steps).max().unwrap_or(0);

@@ -7,17 +7,20 @@ use condyle_dynamics::{Data, Force, Inertia, Model, Scalar, aba, aba_derivatives
 use nalgebra::DMatrix;
 use num_dual::{Dual, Dual64};
 
-/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
+/// condition number of M.
 const EXACT: f64 = 1e-11;
-/// Tolerance times the condition number of M, which grows with the cube of a chain's length: 1e7 for 90 links. The
-/// error is relative to the largest entries, which cancels most of it.
+/// Tolerance for long chains. The condition number of M grows with the cube of a chain's length: it is 1e7 for 90
+/// links. As the error is relative to the largest entries, most of this growth cancels.
 const LONG: f64 = 1e-9;
-/// Tolerance and step of central differences: the error is rounding of 1e-16/step, plus step² times a third derivative.
+/// Tolerance and step of central differences. The error is a rounding of 1e-16/step, plus step² times a third
+/// derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
 
-/// Algorithm as a function of position, velocity and a third vector (acceleration or effort), with or without f_ext.
+/// Algorithm as a function of position, velocity and a third vector (acceleration or effort), with or without external
+/// forces.
 trait Algorithm {
     fn run<S: Scalar>(&self, model: &Model, data: &mut Data<S>, q: &[S], v: &[S], x: &[S], f: &[Force<S>]) -> Vec<S>;
 }
@@ -113,7 +116,7 @@ fn inverse_dynamics() {
     }
 }
 
-/// Computes columns side by side, and M⁻¹ ∂τ without a product.
+/// On long branches, the library computes several columns side by side, and M⁻¹ ∂τ without a matrix product.
 #[test]
 fn long_branches() {
     let mut exact = Worst::new("∂τ of long branches", EXACT);
@@ -161,8 +164,8 @@ fn forward_dynamics() {
     }
 }
 
-/// The hand-written derivatives also run on dual numbers: ∂²τ/∂q∂q is computed by nesting, and by differentiating the
-/// derivative.
+/// The hand-written derivatives also run on dual numbers. ∂²τ/∂q∂q is computed by nested dual numbers, and by
+/// differentiating the hand-written derivative.
 #[test]
 fn second_derivatives() {
     let mut worst = Worst::new("∂²τ/∂q²", EXACT);
@@ -171,7 +174,7 @@ fn second_derivatives() {
         let State { q, v, a, .. } = State::random(model, &mut rng(seed as u64));
         let (j, k) = (seed % nv, (3 * seed + 1) % nv);
         let still = vec![0.0; nv];
-        // first along j in the inner numbers, then from there along k in the outer ones
+        // move first along j with the inner dual numbers, then from there along k with the outer dual numbers
         let inner = moved(model, &lift(&q), &dual(&still, &unit(nv, j)));
         let mut data = Data::<Dual64>::new(model);
         let derivative = rnea_derivatives(model, &mut data, &inner, &lift(&v), &lift(&a), &[]).dtau_dq;

@@ -1,4 +1,4 @@
-//! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, on any number of
+//! Forward dynamics by divide and conquer. It gives the accelerations of `aba` in O(log n) steps, on any number of
 //! threads.
 
 use crate::common;
@@ -11,9 +11,10 @@ use condyle_dynamics::{
 };
 use num_dual::Dual64;
 
-/// Tolerance of some hundreds of roundings times the condition number of M. It is 1e2 to 1e5 in the robots and grows
-/// with the cube of a chain's length: 1e8 for 300 links. `aba` itself loses as many digits. The error is relative to
-/// the largest accelerations, which belong to the light tips and grow alike.
+/// Tolerance of some hundreds of roundings times the condition number of M. The condition number is 1e2 to 1e5 for the
+/// robots and grows with the cube of a chain's length: it is 1e8 for 300 links. `aba` itself loses as many digits. The
+/// error is relative to the largest accelerations. These are the accelerations of the light tips, and they grow in the
+/// same way.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 
@@ -71,7 +72,7 @@ fn branches_and_floating_bases() {
     }
 }
 
-/// Several robots on the world form one model.
+/// One model consists of several robots that are fixed to the world.
 #[test]
 fn a_forest() {
     let mut worst = Worst::new("divide and conquer on forests", INVERTED);
@@ -80,7 +81,7 @@ fn a_forest() {
     }
 }
 
-/// Bodies without mass, and point masses on their hinge's axis, are valid as long as a body below them has mass.
+/// A body without mass, or with a point mass on the axis of its hinge, is valid if a body that it carries has mass.
 #[test]
 fn bodies_without_mass() {
     let mut worst = Worst::new("divide and conquer with massless bodies", INVERTED);
@@ -106,7 +107,7 @@ fn bodies_without_mass() {
 }
 
 /// Creates a floating palm with four fingers of four hinges each. The last three hinges are parallel, and the tips are
-/// light. The rotors grow with the joint's index along the finger.
+/// light. The inertia of a joint's rotor grows with the index of the joint along the finger.
 fn hand(rotor: f64) -> Model {
     let inertia = |mass: f64| Inertia::from_com(mass, Vec3::new(0.0, 0.0, 0.02), Sym3::diagonal(1e-4 * mass));
     let at = |y: f64, z: f64| Se3::new(Mat3::identity(), Vec3::new(0.0, y, z));
@@ -127,8 +128,8 @@ fn hand(rotor: f64) -> Model {
     builder.build().expect("a hand is well-formed")
 }
 
-/// Between the handles of a piece there are fewer than six degrees of freedom, in a plane, so its compliance Y is
-/// singular.
+/// The joints between the handles of a piece have fewer than six degrees of freedom, all in a plane. So the compliance
+/// Y of the piece is singular.
 #[test]
 fn fingers() {
     let mut worst = Worst::new("divide and conquer on hands", INVERTED);
@@ -140,7 +141,7 @@ fn fingers() {
     }
 }
 
-/// Creates a chain of n hinges, of which every third follows one of two others; bodies selected by `massless` have no
+/// Creates a chain of n hinges. Every third hinge follows one of two leaders. Bodies selected by `massless` have no
 /// inertia.
 fn chain_with_followers(n: usize, massless: impl Fn(usize) -> bool) -> Model {
     let rng = &mut rng(n as u64);
@@ -167,8 +168,8 @@ fn chains_with_followers() {
     }
 }
 
-/// Only the couplings give these joints inertia: a massless follower at each tip, and a wheel on a massless arm. The
-/// wheel could turn against that arm if it were not geared to the leader.
+/// Only couplings give these joints inertia: massless followers at the tip, and a wheel on a massless arm. Without the
+/// gear to the leader, the wheel could turn freely relative to the arm.
 #[test]
 fn followers_without_inertia() {
     let axis = Vec3::new(0.0, 0.0, 1.0);
@@ -195,7 +196,7 @@ fn followers_without_inertia() {
     }
 }
 
-/// Dual numbers give tangents, by the same source.
+/// The generic code also runs on dual numbers, which give derivatives.
 #[test]
 fn on_dual_numbers() {
     let mut worst = Worst::new("derivatives by divide and conquer", INVERTED);
@@ -211,7 +212,7 @@ fn on_dual_numbers() {
     }
 }
 
-/// The assembly fixes the order of every sum, so the bits do not depend on the threads.
+/// The assembly fixes the order of every sum, so the bits of a result do not depend on the number of threads.
 #[test]
 fn same_bits_for_any_number_of_threads() {
     let pools: Vec<_> = [1, 2, 3]
@@ -236,8 +237,8 @@ fn same_bits_for_any_number_of_threads() {
     }
 }
 
-/// A chain of n bodies has joins nested ⌈log₂ n⌉ deep; other trees have at most about twice as many (heavy paths, cut
-/// by weight).
+/// For a chain of n bodies, joins are nested to the depth ⌈log₂ n⌉. For other trees, which are cut into heavy paths,
+/// the depth is at most about twice as large.
 #[test]
 fn depth() {
     let log2 = |n: usize| n.next_power_of_two().ilog2() as usize;
@@ -258,8 +259,9 @@ fn depth() {
     }
 }
 
-/// The steps computed, not the steps planned: each doubling of a chain adds the same number of steps, where the
-/// articulated-body algorithm doubles them, for a fixed multiple of its work.
+/// Counts the sequential steps of the computation itself. When a chain is twice as long, the number of steps grows by a
+/// constant; with the articulated-body algorithm, it doubles. The total work is a constant multiple of the work of that
+/// algorithm.
 #[test]
 fn steps_grow_with_the_logarithm() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");

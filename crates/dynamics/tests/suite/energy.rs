@@ -1,4 +1,4 @@
-//! The algorithms follow from the energies (Lagrange), which need only placements.
+//! Algorithms compared with derivatives of the energies (Lagrange). The energies are computed only from placements.
 
 use crate::common;
 
@@ -89,7 +89,8 @@ fn gravity_is_the_slope_of_potential_energy() {
     }
 }
 
-/// vᵀ τ + Σ ⟨v_i, f_ext,i⟩ = d(T + V)/dt, when the robot moves with v and accelerates with a.
+/// The power of efforts and external forces is the rate of the energy: vᵀ τ + Σ ⟨v_i, f_ext,i⟩ = d(T + V)/dt, for the
+/// velocity v and the acceleration a.
 #[test]
 fn power_balance() {
     let mut worst = Worst::new("vᵀ τ = dE/dt", ROUNDING);
@@ -102,7 +103,7 @@ fn power_balance() {
         let (kinetic, potential) = energies(model, &mut duals, &q_moving, &dual(&v, &a));
         let rate = (kinetic + potential).eps;
         worst.see(model, &[power(rnea(model, &mut data, &q, &v, &a, &[]))], &[rate]);
-        // power of the external forces, with the bodies' velocities by dual numbers
+        // add the power of the external forces, with velocities of bodies by dual numbers
         let mut dual_data = Data::new(model);
         let placements = forward_kinematics(model, &mut dual_data, &q_moving);
         let mut external = 0.0;
@@ -122,7 +123,7 @@ fn power_balance() {
     }
 }
 
-/// C v is quadratic in v: (∂h/∂v) v = 2 C v. And Ṁ − 2C is skew: vᵀ Ṁ v = 2 vᵀ C v.
+/// C v is quadratic in v, so (∂h/∂v) v = 2 C v. Ṁ − 2C is skew-symmetric, so vᵀ Ṁ v = 2 vᵀ C v.
 #[test]
 fn coriolis_forces_do_no_work() {
     let mut quadratic = Worst::new("(∂h/∂v) v = 2 (h − g)", ROUNDING);

@@ -1,4 +1,4 @@
-//! Sparse and dense factors of M: their product, their solutions, and their zeros.
+//! Sparse and dense factors of M: products of the factors, solutions of linear systems, and zeros of the factors.
 
 use crate::common;
 
@@ -11,7 +11,7 @@ use num_dual::Dual64;
 
 /// Tolerance of some hundreds of roundings, relative to the largest entry of M.
 const RECONSTRUCTED: f64 = 1e-13;
-/// Tolerance of the same times the condition number of M, which is 1e2 to 1e5 in these robots.
+/// Tolerance of some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 for these robots.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 
@@ -57,7 +57,7 @@ fn reconstructs() {
     }
 }
 
-/// Both factors solve, for vectors, for matrices and for the identity.
+/// Both factors solve linear systems whose right-hand sides are vectors, matrices and the identity.
 #[test]
 fn solves() {
     let mut vector = Worst::new("M M⁻¹ b = b", INVERTED);
@@ -95,7 +95,8 @@ fn solves() {
     }
 }
 
-/// Without shared coordinates, row k has one entry for each degree of freedom between k and the root, and no others.
+/// Without shared coordinates, row k of the factor has one entry for each degree of freedom between k and the root, and
+/// no other entries.
 #[test]
 fn zeros_are_those_of_the_tree() {
     for model in all_models(TREES).iter().filter(|m| m.bodies().iter().all(|b| b.mimic.is_none())) {
@@ -139,8 +140,8 @@ fn dense_nonzeros(mut H: DMatrix<f64>) -> (usize, DMatrix<f64>) {
     (H.lower_triangle().iter().filter(|&&x| x != 0.0).count(), H)
 }
 
-/// With shared coordinates, the rows contain all nonzeros. The chosen order needs fewer entries in total than the
-/// coordinates' own order.
+/// With shared coordinates, the rows of the factor contain all nonzeros. The order that the library chooses needs fewer
+/// entries than the original order of the coordinates.
 #[test]
 fn shared_coordinates_keep_branches_apart() {
     let mut stored = (0, 0);
@@ -166,8 +167,9 @@ fn shared_coordinates_keep_branches_apart() {
     assert!(stored.0 < stored.1);
 }
 
-/// All fingers of a hand follow one coordinate, at the tip of the first finger. That coordinate is ordered where the
-/// fingers meet. Each finger's row contains that coordinate, its own, and the arm's.
+/// All fingers of a hand follow one coordinate, which is at the tip of the first finger. The factor orders this
+/// coordinate where the fingers meet. The row of a finger contains this coordinate, the coordinates of the finger, and
+/// the coordinates of the arm.
 #[test]
 fn fingers_that_follow() {
     let link = Inertia::from_com(0.1, Vec3::new(0.01, 0.02, 0.03), condyle_dynamics::Sym3::diagonal(1e-3));
@@ -196,7 +198,7 @@ fn fingers_that_follow() {
     assert!((X - DMatrix::identity(7, 7)).amax() < INVERTED);
 }
 
-/// d(M⁻¹ b) = −M⁻¹ dM M⁻¹ b.
+/// On dual numbers, a solution has the derivative d(M⁻¹ b) = −M⁻¹ dM M⁻¹ b.
 #[test]
 fn on_dual_numbers() {
     let mut worst = Worst::new("d(M⁻¹ b)", INVERTED);

@@ -1,4 +1,4 @@
-//! Armature of free joints: in free space it equals a mass at the origin of the body, in every algorithm.
+//! Armature of free joints. In free space, armature equals a mass at the origin of the body, in every algorithm.
 
 use crate::common;
 
@@ -12,13 +12,15 @@ use condyle_dynamics::{
     nonlinear_effects, rnea, rnea_derivatives, rnea_hessian, robots,
 };
 
-/// Tolerances of the same sums in another order; with M⁻¹ times its condition number.
+/// Tolerances between the same sums in different orders. For results with M⁻¹, the tolerance includes the condition
+/// number of M.
 const ROUNDING: f64 = 1e-11;
 const CONDITIONED: f64 = 1e-8;
 /// Apparent mass (kg).
 const MASS: f64 = 2.5;
 
-/// Returns a robot in free space whose base has armature, and one whose base has an additional mass instead.
+/// Returns two robots in free space: the base of the first has armature, the base of the second has an additional mass
+/// instead.
 fn pair(robot: &Model) -> [Model; 2] {
     let free = robot.clone().with_gravity(Vec3::zero()).unwrap();
     let nv = robot.nv();
@@ -28,7 +30,7 @@ fn pair(robot: &Model) -> [Model; 2] {
     [free.with_armature(&armature(MASS)).unwrap(), heavier.with_armature(&armature(0.0)).unwrap()]
 }
 
-/// Returns all numbers that algorithms compute for a model: first without M⁻¹, then with it.
+/// Returns all numbers that the algorithms compute for a model: first results without M⁻¹, then results with M⁻¹.
 fn numbers(model: &Model, s: &State, frames: [&str; 2]) -> [Vec<f64>; 2] {
     let (State { q, v, a, tau, f_ext }, nv) = (s, model.nv());
     let data = &mut Data::new(model);
@@ -84,7 +86,7 @@ fn numbers(model: &Model, s: &State, frames: [&str; 2]) -> [Vec<f64>; 2] {
     [sums, solved]
 }
 
-/// Tests single bodies, and branches in parallel lanes.
+/// In free space, armature acts like a mass. The test computes bodies one by one, and branches in parallel lanes.
 #[test]
 fn in_free_space_it_is_a_mass() {
     let mut sums = Worst::new("armature of a base = mass", ROUNDING);
@@ -108,7 +110,7 @@ fn in_free_space_it_is_a_mass() {
     }
 }
 
-/// Armature has no weight.
+/// Armature has no weight, so gravity efforts do not change.
 #[test]
 fn it_has_no_weight() {
     let quadruped = robots::quadruped();
@@ -118,7 +120,8 @@ fn it_has_no_weight() {
     assert_eq!(gravity(&heavier, &mut Data::new(&heavier), &q), weight);
 }
 
-/// A free joint is on a moving body. Its armature resists the motion relative to that body, along that body's axes.
+/// If the parent of a free joint moves, the armature resists motion relative to the parent, along the axes of the
+/// parent.
 #[test]
 fn on_a_body_that_moves() {
     let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
@@ -133,14 +136,14 @@ fn on_a_body_that_moves() {
     let with = rnea(&heavier, &mut Data::new(&heavier), &q, &v, &a, &[]).to_vec();
     let [linear, angular] = [1, 4].map(|k| Vec3::new(v[k], v[k + 1], v[k + 2]));
     let acceleration = Vec3::new(a[1], a[2], a[3]) + angular.cross(linear); // v̇ + ω × v
-    assert!((with[0] - without[0]).abs() < 1e-12); // the table does not feel the armature
+    assert!((with[0] - without[0]).abs() < 1e-12); // the parent, a table, does not feel the armature
     for (k, x) in acceleration.to_array().into_iter().enumerate() {
         assert!((with[k + 1] - without[k + 1] - MASS * x).abs() < 1e-12);
         assert!((with[k + 4] - without[k + 4]).abs() < 1e-12);
     }
 }
 
-/// Along the axes of the parent, a rotating body has one number for all axes, in models from any source.
+/// The armature of a free joint along its three linear axes must be one number, for models from any source.
 #[test]
 fn three_equal_numbers() {
     let quadruped = robots::quadruped();

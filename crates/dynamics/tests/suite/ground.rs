@@ -1,4 +1,5 @@
-//! Ground of a simulation, compared with closed forms: landing, standing, sliding, sticking, lift-off, energy.
+//! Contacts of a simulation with the ground, compared with closed forms: landing, standing, sliding, sticking, lift-off
+//! and energy.
 
 use crate::common::{normal3, random_rotation, relative, rng};
 use crate::counting::allocations;
@@ -11,13 +12,13 @@ use condyle_dynamics::{
 const G: f64 = 9.81;
 /// Time step of all tests (s).
 const H: f64 = 1e-3;
-/// Half of the box's length, width and height (m), and its mass (kg).
+/// Half of the length, width and height of the box (m), and the mass of the box (kg).
 const HALF: [f64; 3] = [0.15, 0.1, 0.05];
 const MASS: f64 = 2.0;
-/// Tolerance of the contact solver (1e-9 m/s) over some thousand steps, and rounding.
+/// Tolerance for the errors of the contact solver (1e-9 m/s) over some thousand steps, and for rounding.
 const SOLVED: f64 = 1e-7;
 
-/// Creates a box that moves freely, with a frame in its centre.
+/// Creates a box that moves freely, with a frame at the centre of the box.
 fn free_box() -> Model {
     let [x, y, z] = HALF.map(|half| 4.0 * half * half * MASS / 12.0);
     let moments = Sym3 { xx: y + z, yy: x + z, zz: x + y, ..Sym3::zero() };
@@ -55,7 +56,8 @@ fn energy(model: &Model, simulation: &Simulation<f64>) -> f64 {
 
 fn passive(_: &mut Control<'_, f64>) {}
 
-/// A box slides with exactly μ g, along any direction. It stops after v²/(2 μ g) minus half a step's distance.
+/// A box slides with exactly μ g, along any direction. It stops after a distance of v²/(2 μ g), minus half the distance
+/// of the first step.
 #[test]
 fn a_box_slides_to_a_stop() {
     let model = free_box();
@@ -83,7 +85,8 @@ fn a_box_slides_to_a_stop() {
     }
 }
 
-/// The forces of a standing robot are the same in each step and sum up to its weight: it neither drifts nor vibrates.
+/// The forces on a standing robot are the same in each step, and their sum is its weight. The robot neither drifts nor
+/// vibrates.
 #[test]
 fn standing_is_still() {
     let model = free_box();
@@ -117,7 +120,8 @@ fn standing_is_still() {
     }
 }
 
-/// On a slope a box sticks below the friction angle, and slides above it with g (sin α − μ cos α).
+/// A box sticks on a slope α below the friction angle. On a steeper slope, it slides with the acceleration g (sin α − μ
+/// cos α).
 #[test]
 fn sticks_or_slides_on_a_slope() {
     let model = free_box();
@@ -171,8 +175,8 @@ fn falls_lands_and_lifts_off() {
     }
 }
 
-/// A point whose joints constrain some directions lands and stands like a free one: on a vertical rail, and on a
-/// pendulum.
+/// A point lands and stands like a free point, even if joints constrain its motion. The examples are a vertical rail
+/// and a pendulum.
 #[test]
 fn joints_may_hold_directions() {
     let z = Vec3::new(0.0, 0.0, 1.0);
@@ -195,7 +199,7 @@ fn joints_may_hold_directions() {
     assert!(heavy.run(500, |now| now.tau[0] = 3.0).is_done()); // the pendulum turns down, until its tip touches at 30°
     assert!((heavy.q()[0] - f64::asin(0.5)).abs() < 1e-6 && heavy.v()[0].abs() < 1e-9);
     assert!(heavy.contacts()[0].touches);
-    // a rail along the ground: the point can only slide, and no force pushes it
+    // on a rail along the ground, the point can only slide, and the ground exerts no force
     let mut builder = ModelBuilder::new("cart");
     let cart =
         builder.body("cart", WORLD, Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) }, Se3::identity(), weight);
@@ -206,7 +210,8 @@ fn joints_may_hold_directions() {
     assert_eq!(simulation.v()[0], 1.0);
 }
 
-/// A ball rebounds to e² of its height, and comes to rest instead of vibrating.
+/// With a restitution e, a ball rebounds to e² times its initial height. In the end it comes to rest and does not
+/// vibrate.
 #[test]
 fn restitution_rebounds() {
     let model = free("ball", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01)));
@@ -230,10 +235,11 @@ fn restitution_rebounds() {
     }
 }
 
-/// Boxes tumble over their eight corners: contacts only reduce the energy, and all boxes come to rest.
+/// Cubes tumble over their eight corners. Contacts only reduce the energy, and all cubes with friction come to rest.
 #[test]
 fn energy_never_grows() {
-    // without contacts, a cube's spin keeps its energy, except for h² ω² of the velocity that turns with it
+    // Without contacts, the spin of a cube keeps its energy. The energy of the linear velocity has a relative error of
+    // h² ω², because this velocity is expressed in the axes of the turning cube.
     let model = free("cube", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.02)));
     let cube: Vec<_> =
         corners().into_iter().map(|c| Vec3::from([c.x / HALF[0], c.y / HALF[1], c.z / HALF[2]]) * 0.1).collect();
@@ -250,7 +256,7 @@ fn energy_never_grows() {
             let (v, now) = (simulation.v(), energy(&model, &simulation));
             let spin = Vec3::new(v[3], v[4], v[5]).norm_squared();
             let turned = H * H * spin * MASS * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-            // a corner may enter the plane by the curvature of its path, and is then pushed out again
+            // the path of a corner is curved, so the corner may enter the plane; pushing it out adds potential energy
             let depth = H * H * (spin * 0.2 + G) * MASS * G;
             assert!(now <= before + turned + depth + 1e-9, "cube {seed}: {before} to {now} J");
             before = now;
@@ -267,9 +273,9 @@ fn placed(model: &Model, q: &[f64]) -> Se3<f64> {
     forward_kinematics(model, &mut Data::new(model), q).body(1)
 }
 
-/// Returns a control law that holds a posture. It is as stiff as an explicit integrator allows for the inertia of each
-/// joint, plus the weight of the limbs. A joint's inertia is M_kk where it carries a light limb, and 1/(M⁻¹)_kk where
-/// both of its sides are heavy.
+/// Returns a control law that holds a posture. The law compensates the weight, and is as stiff as an explicit
+/// integrator allows for the inertia at each joint. This inertia is M_kk if the joint carries a light limb. With
+/// `heavy`, it is 1/(M⁻¹)_kk, for joints with heavy bodies on both sides.
 fn posture(model: &Model, q0: &[f64], heavy: bool) -> impl FnMut(&mut Control<'_, f64>) + use<> {
     let (mut data, q0) = (Data::new(model), q0.to_vec());
     let inertia: Vec<f64> = if heavy {
@@ -328,7 +334,7 @@ fn robots_stand() {
     assert!(relative(simulation.q(), &q) < 1e-6, "{:?} {q:?}", simulation.q());
     assert!((push(&simulation).z / (statue.total_mass() * G) - 1.0).abs() < 1e-6);
 
-    // with all its joints free, held by control laws
+    // now all joints of the humanoid can move, and a control law holds the posture
     let mut q = neutral(&humanoid);
     let frames = soles.map(|frame| humanoid.frame(&statue.frames()[frame].name).unwrap());
     let ground = frames.into_iter().fold(Ground::default(), |ground, frame| ground.with_sole(frame, &sole));
@@ -356,8 +362,8 @@ fn depth_does_not_become_speed() {
     assert!((simulation.q()[2] - HALF[2]).abs() < 1e-6, "{}", simulation.q()[2]);
 }
 
-/// A simulation continues from a stored state with the same bits, contacts included; so does one whose state is set
-/// again.
+/// A simulation continues from a stored state with the same bits, including the contacts. A simulation whose initial
+/// state is set again also repeats the same bits.
 #[test]
 fn contacts_are_part_of_the_state() {
     let (model, q, ground) = quadruped();
@@ -380,7 +386,7 @@ fn contacts_are_part_of_the_state() {
     assert_eq!(simulation.state(), end);
 }
 
-/// Steps do not allocate, in the air, on landing and at rest.
+/// Steps do not allocate: neither in the air, nor on landing, nor at rest.
 #[test]
 fn steps_do_not_allocate() {
     let (model, mut q, ground) = quadruped();
@@ -394,7 +400,8 @@ fn steps_do_not_allocate() {
     assert!(simulation.contacts().iter().any(|contact| contact.touches));
 }
 
-/// A contact solver without iterations reports its failure and its error; its impulses only push, inside the cones.
+/// A contact solver without iterations reports the failure and the error. The impulses still only push, and are inside
+/// the friction cones.
 #[test]
 fn a_solver_that_is_stopped_says_so() {
     let model = free_box();

@@ -1,4 +1,4 @@
-//! Properties of every function: no hidden state, and panics that name the argument; and the properties of models.
+//! Guarantees of every function (no hidden state, and panics that name the argument), and guarantees of models.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use num_dual::Dual64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// A function gives the same bits whatever ran before on the same `Data`, even with NaN.
+/// A function gives the same bits after any earlier calls with the same `Data`, even if these calls computed NaN.
 #[test]
 fn no_hidden_order() {
     for (seed, model) in all_models(3).iter().enumerate() {
@@ -40,8 +40,8 @@ fn no_hidden_order() {
     }
 }
 
-/// A robot with only fixed joints has no coordinates, and every function gives its remaining results, which are finite.
-/// The exception is the centre of mass of the moving bodies, which do not exist; it is documented to be NaN.
+/// A robot with only fixed joints has no coordinates. Every function still gives its other results, and they are
+/// finite. The exception is the centre of mass of the moving bodies: without moving bodies, it is NaN, as documented.
 #[test]
 fn robots_without_coordinates() {
     const CENTRE_OF_MASS: [&str; 6] = [
@@ -76,7 +76,7 @@ fn message(call: impl FnOnce()) -> String {
     panic.downcast_ref::<String>().cloned().expect("the message has numbers in it")
 }
 
-/// Each argument of each function is given one number short or too long.
+/// Each argument of each function is passed with one number too few or too many. The panic must name the argument.
 #[test]
 fn wrong_lengths_name_the_argument() {
     let model = &robots::quadruped(); // nq 19, nv 18, 14 bodies including the world
@@ -137,7 +137,7 @@ fn wrong_lengths_name_the_argument() {
     expect(bad_armature, message(|| drop(robots::quadruped().with_armature(short_v))));
 }
 
-/// Every function that takes a `Data` rejects the `Data` of another robot, before it computes wrong results.
+/// Every function that takes a `Data` panics if the `Data` was made for another robot.
 #[test]
 fn data_of_another_model() {
     let [arm, quadruped, humanoid] = embedded();
@@ -154,7 +154,8 @@ fn data_of_another_model() {
     }
 }
 
-/// The same numbers of bodies, columns and coordinates in another order: the tree stored in a `Data` would not fit.
+/// A `Data` is also rejected if the other robot has the same numbers of bodies, columns and coordinates, but another
+/// tree.
 #[test]
 fn data_of_another_tree() {
     let robot = |parents: [usize; 3]| {
@@ -171,7 +172,7 @@ fn data_of_another_tree() {
     let found = message(|| drop(minv(&fork, &mut Data::new(&chain), &[0.0; 3]).clone()));
     let sizes = "(4, 3, 3) bodies, joint axes and coordinates, found (4, 3, 3)";
     assert_eq!(found, format!("data: made for a model of {sizes} in another tree"));
-    // the same tree with other constants is accepted
+    // a `Data` is accepted for the same tree with other constants
     let heavy = chain.with_inertias(|_, I| I.scale(2.0)).unwrap();
     minv(&heavy, &mut Data::new(&chain), &[0.0; 3]);
     assert_eq!(heavy.total_mass(), 2.0 * chain.total_mass());
@@ -192,7 +193,7 @@ fn models_are_shared_between_threads() {
     });
 }
 
-/// JSON restores the same robot to the last bit, with or without limits (JSON has no infinity).
+/// A robot stored as JSON and read again is the same to the last bit, with or without limits. (JSON has no infinity.)
 #[test]
 fn serde_round_trip() {
     for (seed, model) in all_models(3).iter().enumerate() {
@@ -226,7 +227,7 @@ fn names() {
     assert_eq!(arm.frames()[arm.frame("base").unwrap()].body, 0);
 }
 
-/// Threads share models, and scratch can move between threads; both can be cloned.
+/// Threads can share models, and a `Data` can move to another thread. Both types can be cloned.
 #[test]
 fn types_are_cloned_and_cross_threads() {
     use condyle_dynamics::{Batch, BatchConstraints, ConstraintSet, Data, DivideConquer, Matrices, Model, StateMatrix};

@@ -1,4 +1,4 @@
-//! The algorithms compared with each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
+//! Algorithms compared with each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
 
 use crate::common;
 
@@ -12,7 +12,7 @@ use rand::RngExt;
 
 /// Tolerance of some hundreds of operations, relative to the largest effort.
 const ROUNDING: f64 = 1e-12;
-/// Tolerance of the same times the condition number of M, which is 1e2 to 1e5 in these robots.
+/// Tolerance of some hundreds of operations times the condition number of M, which is 1e2 to 1e5 for these robots.
 const INVERTED: f64 = 1e-10;
 const STATES: usize = 1000;
 const TREES: u64 = 30;
@@ -21,8 +21,8 @@ fn vector(x: &[f64]) -> DVector<f64> {
     DVector::from_column_slice(x)
 }
 
-/// rnea = M a + h, M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1, ∂q̈ = −M⁻¹ ∂τ: each side by another algorithm. What one
-/// algorithm gives by construction is in `by_construction`.
+/// Checks rnea = M a + h, M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1 and ∂q̈ = −M⁻¹ ∂τ. Both sides of each equation
+/// come from different algorithms. Identities that hold within one algorithm are in `by_construction`.
 fn check(model: &Model, states: usize, seed: u64) {
     let mut inverse = Worst::new("M a + h = rnea", ROUNDING);
     let mut identity = Worst::new("M M⁻¹ = 1", INVERTED);
@@ -83,10 +83,10 @@ fn random_trees_with_mimics() {
     }
 }
 
-/// h = rnea(q, v, 0), g = rnea(q, 0, 0) and M = Mᵀ, to the bit. They hold by construction, as the first two are the
-/// same passes and the triangle below the diagonal is copied: this keeps them so, and checks no physics. h, g and M
-/// themselves are checked by `book` (another formulation), `energy` (g and M as derivatives of energies),
-/// `closed_forms`, and in the peers' tests against Pinocchio.
+/// h = rnea(q, v, 0), g = rnea(q, 0, 0) and M = Mᵀ, to the bit. These identities hold by construction: h and g are
+/// computed by the passes of rnea, and one triangle of M is copied. So this test only protects the construction, and
+/// checks no physics. Other tests check h, g and M themselves: `book` (another formulation), `energy` (g and M as
+/// derivatives of energies), `closed_forms`, and the comparisons with Pinocchio.
 #[test]
 fn by_construction() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
@@ -101,7 +101,7 @@ fn by_construction() {
     }
 }
 
-/// M is positive definite, on every branching and joint.
+/// M is positive definite, for trees of all shapes and with every kind of joint.
 #[test]
 fn inertia_matrix_is_positive() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
@@ -111,8 +111,8 @@ fn inertia_matrix_is_positive() {
     }
 }
 
-/// Joints that follow others are joints of the free robot under a constraint: v_joint = G v, τ = Gᵀ τ_joint, M = Gᵀ
-/// M_joint G.
+/// A robot with mimic joints equals the robot without mimics under the constraint v_joint = G v: τ = Gᵀ τ_joint and M =
+/// Gᵀ M_joint G.
 #[test]
 fn mimics_are_a_projection() {
     let mut efforts = Worst::new("τ = Gᵀ rnea(G q + o, G v, G a)", ROUNDING);
@@ -142,8 +142,9 @@ fn mimics_are_a_projection() {
     }
 }
 
-/// The same robot has other body frames: any orientation, any origin on the axis of a hinge, any origin at all on a
-/// slide. The coordinates are the same, and so are efforts, accelerations and M.
+/// The same robot is described with other body frames: with any orientation, with any origin on the axis of a hinge,
+/// and with any origin for a slide. The coordinates do not change, so efforts, accelerations and M do not change
+/// either.
 #[test]
 fn frames_do_not_matter() {
     let mut efforts = Worst::new("rnea in other frames", ROUNDING);
@@ -155,7 +156,7 @@ fn frames_do_not_matter() {
         let rng = &mut rng(seed);
         let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
         let mut other = tree.clone();
-        // oXn: the placement of the new frame of each body in the old one
+        // placement oXn of each body's new frame in the old frame
         let mut news = vec![Se3::identity()];
         for part in &mut other.parts {
             let axis = part.joint.axis().map(|a| a.scale(1.0 / a.norm_squared().sqrt()));
@@ -208,7 +209,7 @@ fn frames_do_not_matter() {
     }
 }
 
-/// A floating robot and gravity are rotated and moved together: results in the robot's own frames do not change.
+/// If a floating robot and gravity are rotated and moved together, results in the frames of the robot do not change.
 #[test]
 fn moved_as_a_whole() {
     let mut slopes = ["∂τ/∂q", "∂τ/∂v", "∂τ/∂a"].map(|name| Worst::new(name, ROUNDING));
@@ -241,7 +242,7 @@ fn moved_as_a_whole() {
     }
 }
 
-/// The placements of bodies equal a product of textbook matrices, in the given frames.
+/// The placements of bodies equal products of matrices from textbooks, in the frames of the model.
 #[test]
 fn placements() {
     let mut worst = Worst::new("oX_i = oX_λ X_T X_J", ROUNDING);

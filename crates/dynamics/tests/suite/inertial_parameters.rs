@@ -1,4 +1,4 @@
-//! Physical validity of inertias, and the parametrisation that only has valid ones.
+//! Physical validity of inertias, and the log-Cholesky parametrisation, which can only describe valid inertias.
 
 use crate::common;
 
@@ -25,7 +25,7 @@ fn ten_numbers_there_and_back() {
     }
 }
 
-/// J is the sum Σ m (x, 1)(x, 1)ᵀ over mass points.
+/// The pseudo-inertia J is the sum Σ m (x, 1)(x, 1)ᵀ over mass points.
 #[test]
 fn pseudo_inertia_is_the_second_moment() {
     for seed in 0..CASES {
@@ -36,11 +36,11 @@ fn pseudo_inertia_is_the_second_moment() {
             J += 0.7 * x * x.transpose();
         }
         assert!((pseudo_inertia(I) - J).amax() < ROUNDING * (1.0 + J.amax()));
-        assert!(check(I).is_ok()); // four points span space
+        assert!(check(I).is_ok()); // four points that are not in a plane have a volume
     }
 }
 
-/// The check agrees with the eigenvalues of J.
+/// The check for physical validity agrees with the eigenvalues of the pseudo-inertia J.
 #[test]
 fn physical_is_positive_definite() {
     let mut refused = 0;
@@ -69,7 +69,7 @@ fn what_is_wrong_is_said() {
     assert!(check(Inertia::from_com(1.0, Vec3::zero(), rod)).is_err()); // no volume
 }
 
-/// Every body of the embedded robots is physical.
+/// Every body of the embedded robots has a physically valid inertia.
 #[test]
 fn our_robots_are_physical() {
     for model in [robots::arm7(), robots::quadruped(), robots::humanoid()] {
@@ -79,7 +79,7 @@ fn our_robots_are_physical() {
     }
 }
 
-/// The maps θ → π → θ and π → θ → π are identities.
+/// The maps between log-Cholesky parameters θ and inertial parameters π are inverses of each other.
 #[test]
 fn log_cholesky_there_and_back() {
     for seed in 0..CASES {
@@ -94,7 +94,7 @@ fn log_cholesky_there_and_back() {
     }
 }
 
-/// J = U Uᵀ, with the matrix U of the paper.
+/// The pseudo-inertia is J = U Uᵀ, with the matrix U of the paper on the log-Cholesky parametrisation.
 #[test]
 fn log_cholesky_is_the_factor() {
     for seed in 0..CASES {
@@ -123,7 +123,7 @@ fn log_cholesky_is_the_factor() {
     }
 }
 
-/// ∂π/∂θ equals the derivative by dual numbers.
+/// The Jacobian ∂π/∂θ of the log-Cholesky map equals the derivative by dual numbers.
 #[test]
 fn log_cholesky_jacobian_is_the_derivative() {
     for seed in 0..CASES {

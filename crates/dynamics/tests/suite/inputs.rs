@@ -10,7 +10,8 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
+/// condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 6;
 const SMOOTHING: f64 = 0.3;
@@ -61,8 +62,8 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     [eps(&effort), eps(aba(&seeded, &mut data, &q, &v, &tau, &f_ext))]
 }
 
-/// Computes the loss of a coordinate for a unit of damping or friction, by a law for one component. A free joint has
-/// losses along its parent's axes.
+/// Computes the efforts of coordinate k for one unit of damping or friction, by a law for one component of the
+/// velocity. The linear losses of a free joint act along the axes of its parent.
 fn lost(model: &Model, s: &State, k: usize, law: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut loss = vec![0.0; model.nv()];
     let is_linear = |body: &&Body| body.joint == Joint::FreeFlyer && (body.idx_v..body.idx_v + 3).contains(&k);

@@ -1,4 +1,4 @@
-//! Several robots in one model: robots that no constraint connects are computed as if each were alone.
+//! Several robots in one model. Robots that are not connected by constraints are computed as if each robot were alone.
 
 use crate::common::{Worst, normal, random_pose, rng};
 use condyle_dynamics::{
@@ -9,10 +9,10 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Tolerance of sums of the same numbers in another order, times the condition numbers of M and of J M⁻¹ Jᵀ.
+/// Tolerance between sums of the same numbers in different orders, times the condition numbers of M and of J M⁻¹ Jᵀ.
 const SAME: f64 = 1e-9;
 
-/// Robot, its contact frames, and whether all their six directions are constrained.
+/// Robot, the contact frames of the robot, and whether contacts constrain all six directions of these frames.
 struct Part {
     model: Model,
     feet: &'static [&'static str],
@@ -41,7 +41,7 @@ fn together(parts: &[Part]) -> Model {
     builder.build().unwrap()
 }
 
-/// Creates the model of one robot alone, at its placement in the whole model's world.
+/// Creates the model of one robot alone, at the same placement in the world as in the whole model.
 fn alone(k: usize, parts: &[Part]) -> Model {
     let (mut builder, mut rng) = (ModelBuilder::new("one"), rng(7));
     let placement = (0..=k).map(|_| random_pose(&mut rng)).last().unwrap();
@@ -73,7 +73,7 @@ fn pick(of: &[f64], at: &[usize]) -> Vec<f64> {
     at.iter().map(|&k| of[k]).collect()
 }
 
-/// Returns the entries of a matrix in some rows and columns; checks that all others in these rows are zero.
+/// Returns the entries of a matrix in the given rows and columns. Checks that all other entries in these rows are zero.
 fn block(of: &Matrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
     let beside = |column: &usize| !columns.contains(column);
     let zeros = (0..of.ncols()).filter(beside).all(|column| rows.iter().all(|&row| of[(row, column)] == 0.0));
@@ -81,8 +81,8 @@ fn block(of: &Matrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
     columns.iter().flat_map(|&column| rows.iter().map(move |&row| of[(row, column)])).collect()
 }
 
-/// Compares each function on the whole model with the function on each robot alone, with branches in parallel lanes,
-/// and body by body. A constraint set that connects two robots used the same `Data` before.
+/// Compares each function on the whole model with the same function on each robot alone. Branches are computed in
+/// parallel lanes, and body by body. The `Data` was used before with a constraint set that connects two robots.
 #[test]
 fn each_robot_is_as_it_is_alone() {
     let (parts, mut worst) = (parts(), Worst::new("robots alone and together", SAME));
@@ -153,8 +153,8 @@ fn each_robot_is_as_it_is_alone() {
     }
 }
 
-/// Constraints are in any order, and loops connect robots, with damping and several iterations. The order decides where
-/// islands can be separated, but only changes the order of the rows.
+/// Other orders of the constraints only change the order of the rows, although islands depend on the order. Here loops
+/// connect robots, with a proximal parameter and several iterations.
 #[test]
 fn the_order_of_constraints_changes_nothing() {
     let (parts, mut worst) = (parts(), Worst::new("orders of constraints", SAME));
@@ -198,7 +198,7 @@ fn the_order_of_constraints_changes_nothing() {
     }
 }
 
-/// A robot with NaN does not affect the others.
+/// A robot with NaN in its state does not affect the other robots.
 #[test]
 fn a_robot_that_is_not_a_number_stays_alone() {
     let parts = parts();
@@ -218,7 +218,7 @@ fn a_robot_that_is_not_a_number_stays_alone() {
     }
 }
 
-/// Creates two arms with seven coordinates each, and two quadrupeds with eighteen.
+/// Creates one model of two arms with seven coordinates each, and two quadrupeds with eighteen coordinates each.
 fn four() -> Model {
     let mut builder = ModelBuilder::new("all");
     for (name, robot) in
@@ -229,7 +229,8 @@ fn four() -> Model {
     builder.build().unwrap()
 }
 
-/// Returns the islands of some contacts, given by frame names, each optionally with a second frame.
+/// Returns the islands for given contacts. Each contact is given by the name of a frame and, optionally, of a second
+/// frame.
 fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Range<usize>)> {
     let frame = |name: &str| model.frame(name).unwrap();
     let contact = |(one, other): &(&str, Option<&str>)| ContactConstraint {
@@ -244,15 +245,15 @@ fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Ran
 fn trees_and_what_ties_them() {
     let model = &four();
     assert_eq!(islands(model, &[]), [(0..7, 0..0), (7..14, 0..0), (14..32, 0..0), (32..50, 0..0)]);
-    // each robot alone, in any order of the contacts
+    // contacts with the world, in any order, keep the robots separate
     let apart = [("cLF_foot", None), ("cRF_foot", None), ("atool", None), ("dLF_foot", None)];
     assert_eq!(islands(model, &apart), [(0..7, 6..9), (7..14, 0..0), (14..32, 0..6), (32..50, 9..12)]);
-    // two robots connected by a constraint
+    // a constraint connects two robots, which then form one island
     assert_eq!(islands(model, &[("atool", Some("btool"))])[0], (0..14, 0..3));
-    // robots between two connected robots join their island, and so do rows between the rows of one robot
+    // an island is a range of indices, so it includes robots and rows whose indices are between connected ones
     assert_eq!(islands(model, &[("atool", Some("cLF_foot"))]), [(0..32, 0..3), (32..50, 0..0)]);
     let mixed = [("cLF_foot", None), ("dLF_foot", None), ("cRF_foot", None)];
     assert_eq!(islands(model, &mixed), [(0..7, 0..0), (7..14, 0..0), (14..50, 0..9)]);
-    // a foot constrained to another foot of the same robot
+    // a constraint between two feet of one robot does not connect robots
     assert_eq!(islands(model, &[("cLF_foot", Some("cRF_foot"))])[2], (14..32, 0..3));
 }

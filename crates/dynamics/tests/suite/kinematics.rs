@@ -10,11 +10,11 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance of products of some ten matrices.
+/// Tolerance of products of about ten matrices.
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 10;
 
-/// Returns a moving pose's value, and its velocity in its own frame.
+/// Returns the value of a moving pose, and the velocity of the pose in its own frame.
 fn velocity(X: Se3<Dual64>) -> (Se3<f64>, Motion<f64>) {
     let re = |x: Vec3<Dual64>| Vec3::from(x.to_array().map(|x| x.re));
     let rate = |x: Vec3<Dual64>| Vec3::from(x.to_array().map(|x| x.eps));
@@ -80,7 +80,7 @@ fn external_forces() {
     }
 }
 
-/// q ⊕ (q₁ ⊖ q) = q₁ and (q ⊕ v) ⊖ q = v for rotations of less than π; q ⊕ 0 = q.
+/// q ⊕ (q₁ ⊖ q) = q₁, (q ⊕ v) ⊖ q = v for rotations of less than π, and q ⊕ 0 = q.
 #[test]
 fn integrate_and_difference() {
     let mut there = Worst::new("q ⊕ (q₁ ⊖ q) = q₁", ROUNDING);
@@ -92,7 +92,7 @@ fn integrate_and_difference() {
             let mut d = vec![0.0; model.nv()];
             difference(model, &q, &q1, &mut d);
             let arrived = moved(model, &q, &d);
-            // a quaternion and its negative are the same rotation, so placements are compared
+            // a quaternion and its negative describe the same rotation, so placements are compared instead
             let (mut one, mut two) = (Data::new(model), Data::new(model));
             let (one, two) = (forward_kinematics(model, &mut one, &arrived), forward_kinematics(model, &mut two, &q1));
             for i in 0..model.bodies().len() {
@@ -166,7 +166,8 @@ fn jacobians_of_difference() {
     }
 }
 
-/// Random positions are within the limits, have unit length where required, and are the same for the same generator.
+/// Random positions are within the limits and have unit length where required. Generators with the same seed give the
+/// same positions.
 #[test]
 fn random_configurations() {
     for model in all_models(TREES) {
@@ -177,7 +178,7 @@ fn random_configurations() {
             let (lower, upper) = (bound(model.limits().lower[k], -3.0), bound(model.limits().upper[k], 3.0));
             assert!(lower <= q && q <= upper, "{k}: {q} on\n{model}");
         }
-        // on the manifold: a zero step changes only rounding
+        // positions are on the manifold, so a step of zero changes only rounding
         assert!(relative(&moved(&model, &q, &vec![0.0; model.nv()]), &q) < 1e-15);
     }
 }

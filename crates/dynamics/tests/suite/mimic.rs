@@ -1,4 +1,4 @@
-//! Joints that follow others: compared with Pinocchio, over full turns, and with their own rotors.
+//! Joints that follow other joints: comparisons with Pinocchio, full turns, and rotors of followers.
 
 use crate::common;
 
@@ -9,9 +9,9 @@ use condyle_dynamics::{
 };
 use serde_json::Value;
 
-/// Tolerance of some hundred products, in another order.
+/// Tolerance between some hundred products in different orders.
 const ROUNDING: f64 = 1e-13;
-/// Tolerance after some hundred turns, each of which adds as much.
+/// Tolerance after some hundred turns; each turn adds one more error of the size of `ROUNDING`.
 const TURNS_ROUNDING: f64 = 1e-11;
 
 fn floats(value: &Value) -> Vec<f64> {
@@ -19,8 +19,9 @@ fn floats(value: &Value) -> Vec<f64> {
     all.flat_map(|x| x.as_f64().map_or_else(|| floats(x), |x| vec![x])).collect()
 }
 
-/// Compares placements, efforts, M and limits of effort, for every pair of joint types that Pinocchio supports as
-/// leader and follower. Other limits and losses of a follower act on its leader; Pinocchio drops them.
+/// Placements, efforts, M and effort limits equal Pinocchio's, for every pair of joint types that Pinocchio supports as
+/// leader and follower. Here, position limits, velocity limits and losses of a follower act on the leader, but
+/// Pinocchio ignores them.
 #[test]
 fn as_in_pinocchio() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
@@ -64,7 +65,7 @@ fn body(mass: f64) -> Inertia<f64> {
     Inertia::from_com(mass, Vec3::new(0.1, 0.2, -0.1), Sym3::diagonal(0.05))
 }
 
-/// Creates a leader with an oblique axis, and followers with other axes.
+/// Creates a leader with an oblique axis, and followers whose axes have other directions.
 fn geared(leader: fn(Vec3<f64>) -> Joint, follower: fn(Vec3<f64>) -> Joint, options: &JointOptions) -> Model {
     let mut builder = ModelBuilder::new("gears");
     let axis = Vec3::new(0.3, -0.5, 0.8);
@@ -79,8 +80,8 @@ fn geared(leader: fn(Vec3<f64>) -> Joint, follower: fn(Vec3<f64>) -> Joint, opti
     builder.build().unwrap()
 }
 
-/// A continuous leader moves all followers as a revolute leader does, for both kinds of followers, also after many
-/// turns.
+/// A continuous leader moves all followers like a revolute leader, even after many turns. Followers are continuous and
+/// revolute joints.
 #[test]
 fn continuous_is_revolute() {
     type Kind = fn(Vec3<f64>) -> Joint;
@@ -105,8 +106,8 @@ fn continuous_is_revolute() {
     }
 }
 
-/// Each joint has a rotor. The rotors of followers count with the square of their ratio, also in a part of another
-/// robot.
+/// The rotor of a follower counts with the square of the follower's ratio, also when the robot becomes a part of
+/// another robot.
 #[test]
 fn rotors_of_followers() {
     let revolute = |axis| Joint::Revolute { axis };

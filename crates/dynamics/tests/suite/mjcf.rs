@@ -1,10 +1,10 @@
-//! Dynamics of models from MJCF, compared with MuJoCo's numbers (data/make_mujoco.py).
+//! Dynamics of models from MJCF, compared with results of MuJoCo (`data/make_mujoco.py`).
 
 use condyle_dynamics::{Data, FrameKind, Joint, MjcfOptions, Model, Vec3, crba, forward_kinematics, rnea};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Relative tolerance; both sides sum some hundred products, MuJoCo through principal axes that it computes by
+/// Relative tolerance. Both libraries sum some hundred products. MuJoCo uses principal axes, which it computes by
 /// iteration.
 const AGREES: f64 = 1e-10;
 
@@ -28,13 +28,14 @@ fn close(what: &str, ours: &[f64], theirs: &[f64]) {
     assert!(error <= AGREES, "{what}: {error:e}");
 }
 
-/// Returns the position, and the rotation by rows.
+/// Returns the position, then the rotation matrix by rows.
 fn flat(X: &condyle_dynamics::Se3<f64>) -> Vec<f64> {
     let (p, R) = (X.translation, X.rotation.transpose());
     [p, R.x, R.y, R.z].iter().flat_map(|v| v.to_array()).collect()
 }
 
-/// Compares placements, M and nonlinear effects with MuJoCo's, after conversion of its quaternions and free joints.
+/// Compares placements, M and nonlinear effects with MuJoCo's results, after conversion of MuJoCo's quaternions and
+/// free joints.
 fn against_mujoco(name: &str) {
     let model = Model::from_mjcf(data(&format!("{name}.xml")), &MjcfOptions::default()).unwrap();
     let reference: Value = serde_json::from_str(&text(&format!("{name}_mujoco.json"))).unwrap();
@@ -98,7 +99,7 @@ fn against_mujoco(name: &str) {
         }
         close("M", M.as_slice(), &floats(&state["M"]));
     }
-    // MuJoCo merges bodies without joints into their parents, so compare sums of masses
+    // Condyle merges bodies without joints into their parents, so the test compares sums of masses
     let masses: f64 = reference["bodies"].as_object().unwrap().values().filter_map(Value::as_f64).sum();
     if free {
         close("mass", &[model.total_mass()], &[masses]);
@@ -115,7 +116,8 @@ fn quadruped_equals_mujoco() {
     against_mujoco("quadruped");
 }
 
-/// Joints that follow by equality constraints, rotors of followers, and inertias that the compiler corrects.
+/// The gripper has joints that follow by equality constraints, rotors of followers, and inertias that MuJoCo's compiler
+/// corrects.
 #[test]
 fn gripper_equals_mujoco() {
     let options = MjcfOptions { mimic: true, strict: true, ..MjcfOptions::default() };
@@ -135,5 +137,5 @@ fn gripper_equals_mujoco() {
         }
     }
     let free = Model::from_mjcf(data("gripper.xml"), &MjcfOptions::default()).unwrap();
-    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // an inactive constraint does not count
+    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // inactive equality constraints are ignored
 }

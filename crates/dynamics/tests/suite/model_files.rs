@@ -1,4 +1,4 @@
-//! Models in files, as users may edit them: any file gives a working model, or an error with the reason.
+//! Model files that users have edited: each file gives a working model, or an error with the reason.
 
 use crate::common;
 
@@ -17,7 +17,7 @@ fn arm() -> Value {
     serde_json::to_value(&embedded()[0]).unwrap()
 }
 
-/// Checks the error of a file in which the value at `pointer` is replaced.
+/// Checks the error for a file in which the value at `pointer` is replaced.
 #[track_caller]
 fn expect(pointer: &str, value: Value, message: &str) {
     let mut file = arm();
@@ -65,7 +65,7 @@ fn mistakes_have_names() {
     assert!(read(&file).unwrap_err().starts_with("unknown field `nodes`"));
 }
 
-/// Edited values are used in computations.
+/// Values that are edited in a file are used in computations.
 #[test]
 fn edits_count() {
     let mut file = arm();

@@ -11,7 +11,7 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods, some hundred roundings each.
+/// Tolerance between two exact methods with some hundred roundings each.
 const EXACT: f64 = 1e-12;
 const TREES: u64 = 5;
 const FRAMES: [ReferenceFrame; 3] = [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned];
@@ -34,7 +34,7 @@ fn by_duals(
     DMatrix::from_fn(columns[0].len(), nv, |i, k| columns[k][i])
 }
 
-/// Returns a 6 × nv matrix of NaN, in which unwritten entries are visible.
+/// Returns a 6 × nv matrix of NaN, so that entries that are not written are visible.
 fn six(model: &Model) -> DMatrix<f64> {
     DMatrix::from_element(6, model.nv(), f64::NAN)
 }

@@ -1,4 +1,4 @@
-//! A panic for a caller's mistake names the mistake, and reports a line of the caller's file.
+//! Panics for mistakes of the caller: each names the mistake, and reports a line of the caller's file.
 
 use crate::common::panics::{Panic, assert_panic, panic_of};
 use crate::common::rng;
@@ -21,10 +21,10 @@ const HERE: &str = "tests/suite/panics.rs";
 /// Functions without an argument that could have a wrong length.
 const WITHOUT_LENGTHS: &[&str] = &["log-Cholesky parameters"];
 
-/// Arguments that rows of the table copy to a matrix of nalgebra, which panics itself.
+/// Arguments (function, name) that the table copies to a matrix of nalgebra. For wrong lengths, nalgebra itself panics.
 const COPIED: &[(&str, &str)] = &[("transport", "x")];
 
-/// Calls every function of the table with each argument too short by one number.
+/// Calls every function of the table with one number too few in each argument.
 fn wrong_lengths<S: Scalar>() {
     for model in [robots::arm7(), robots::quadruped()] {
         let right = Input::<S>::random(&model, &mut rng(1));
@@ -65,7 +65,7 @@ fn wrong_lengths_of_dual_numbers_are_reported_at_the_call() {
     wrong_lengths::<Dual64>();
 }
 
-/// Indices of bodies and frames that do not exist are named in the panic.
+/// If a body or a frame does not exist, the panic names its index.
 #[test]
 fn missing_bodies_and_frames_are_named() {
     let arm = robots::arm7();
@@ -113,7 +113,7 @@ fn missing_bodies_and_frames_are_named() {
     assert_panic(HERE, "dJ: expected 6 × 7", || moving.frame_jacobian_rate(1, World, small));
 }
 
-/// Other invalid arguments of functions are reported at the call.
+/// Other invalid arguments of functions are reported at the line of the call.
 #[test]
 fn other_mistakes_are_reported_at_the_call() {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
@@ -168,7 +168,7 @@ fn other_mistakes_are_reported_at_the_call() {
     });
 }
 
-/// Calls of a batch and of its results, each with a wrong argument, are reported at the call.
+/// Wrong arguments of the functions of a batch, and of its results, are reported at the line of the call.
 #[test]
 fn mistakes_with_batches_are_reported_at_the_call() {
     let arm = robots::arm7();
@@ -220,7 +220,7 @@ fn mistakes_with_batches_are_reported_at_the_call() {
     assert_panic(HERE, "to: expected 49 numbers", || M.write_rows(&mut [0.0; 48]));
 }
 
-/// A robot whose inertia matrix is singular is reported at the call, in a batch too.
+/// A robot whose inertia matrix is singular is reported at the line of the call, also by a batch.
 #[test]
 fn singular_robots_are_reported_at_the_call() {
     use condyle_dynamics::{Inertia, Joint, WORLD};
@@ -236,11 +236,11 @@ fn singular_robots_are_reported_at_the_call() {
     _ = batch.crba(&light, &[0.0; 2]);
 }
 
-/// Folders and files of kernels, whose functions take arguments that their callers have checked.
+/// Folders and files with internal functions, whose arguments were already checked by the calling functions.
 const KERNELS: [&str; 4] =
     ["spatial/src/simd/", "linalg/src/outer.rs", "linalg/src/runs.rs", "linalg/src/threads/parts.rs"];
 
-/// Every public function that is documented to panic reports the caller's line.
+/// Every public function that is documented to panic has `#[track_caller]`, so that a panic reports the caller's line.
 #[test]
 fn functions_that_panic_track_their_callers() {
     let mut without = Vec::new();
@@ -290,7 +290,7 @@ fn mistakes_with_simulations_and_scratch_are_reported_at_the_call() {
     assert_panic(HERE, "tangent: expected 7 numbers, found 3", || {
         condyle_dynamics::distance(&arm, &[0.0; 7], &[0.0; 7], &mut [0.0; 3]);
     });
-    // a joint that moves no mass: M is singular
+    // a joint that moves no mass makes M singular
     let massless = crate::validity::massless_tip();
     assert_panic(HERE, "singular", || {
         let _ = Simulation::new(&massless, Settings::default()).step(&vec![0.0; massless.nv()], &[]);

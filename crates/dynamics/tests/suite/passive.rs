@@ -1,4 +1,4 @@
-//! Passive efforts: damping and friction only take power, all derivatives are exact, and no other function adds these
+//! Passive efforts: damping and friction only take power, and all derivatives are exact. No other function adds passive
 //! efforts.
 
 use crate::common;
@@ -16,7 +16,7 @@ use num_dual::Dual64;
 const ROUNDING: f64 = 1e-14;
 const SMOOTHING: f64 = 0.01;
 
-/// Creates a chain with or without losses at each joint.
+/// Creates a chain, with or without damping and friction at each joint.
 fn chain(losses: bool) -> Model {
     let mut builder = ModelBuilder::new("chain");
     let mut parent = WORLD;
@@ -66,8 +66,8 @@ fn friction_is_smoothed() {
     assert!(torque(0.3).iter().zip(torque(-0.3)).all(|(a, b)| *a == -b));
 }
 
-/// The derivatives equal dual numbers, for every kind of joint with springs, polynomial damping, friction and gravity
-/// compensation, and for joints that follow others.
+/// The derivatives equal derivatives by dual numbers, for every kind of joint, with springs, polynomial damping,
+/// friction and gravity compensation, and for mimic joints.
 #[test]
 fn slopes_are_the_derivatives() {
     let mut worst = Worst::new("∂(passive torque)", 1e-12);
@@ -112,7 +112,7 @@ fn friction_of_a_free_joint() {
     assert!((force - Vec3::new(-2.0, 2.0, 0.0)).norm_squared() < 1e-20, "{force:?}");
 }
 
-/// Dynamics does not change with damping and friction, unless they are requested.
+/// Damping and friction do not change the results of dynamics, unless the caller adds passive efforts.
 #[test]
 fn acts_only_where_asked_for() {
     let (with, without) = (chain(true), chain(false));
@@ -122,7 +122,8 @@ fn acts_only_where_asked_for() {
     assert_eq!(aba(&with, &mut data, &q, &v, &tau, &[]), aba(&without, &mut other, &q, &v, &tau, &[]));
 }
 
-/// In a simulation with friction switched on, a sliding body stops at the expected point, and energy only falls.
+/// In a simulation with friction switched on, a sliding body stops at the expected point, and the energy only
+/// decreases.
 #[test]
 fn simulations_lose_energy() {
     const DT: f64 = 1e-3;

@@ -1,4 +1,4 @@
-//! Points of bodies and frames, compared with frames at these points, and with derivatives by dual numbers.
+//! Points on bodies and frames, compared with frames at these points, and with derivatives by dual numbers.
 
 use crate::common::{State, all_models, dual, eps, lift, moved, normal3, relative, rng};
 use condyle_dynamics::{
@@ -14,7 +14,8 @@ fn flat(v: Vec3<f64>) -> [f64; 3] {
     v.to_array()
 }
 
-/// A frame at the point has the same Jacobian and velocity in its linear rows, on every body of every kind of robot.
+/// A point has the Jacobian and velocity of a frame at this point, in the linear rows. The test uses every body of all
+/// kinds of robots.
 #[test]
 fn points_are_frames_put_there() {
     for (seed, model) in all_models(4).iter().enumerate() {
@@ -87,8 +88,8 @@ fn forces_at_points() {
     }
 }
 
-/// Constraints and contacts can use a frame that was added to a robot; prepared constraint sets detect that it is
-/// another robot.
+/// Constraints can use a frame that was added to a robot. A constraint set that was made before is rejected for the
+/// robot with the new frame.
 #[test]
 fn frames_can_be_added() {
     let arm = robots::arm7();
@@ -107,7 +108,7 @@ fn frames_can_be_added() {
     let motion = condyle_dynamics::forward_accelerations(&with, &mut data, &[0.3; 7], &[0.0; 7], &acceleration);
     let still = motion.frame_classical_acceleration(tip, ReferenceFrame::LocalWorldAligned);
     assert!(still.linear.norm() < 1e-8, "{still:?}");
-    // a constraint set of the same tree with other frames
+    // a constraint set made for the same tree with other frames is rejected
     let old = std::panic::catch_unwind(|| {
         let mut set = ConstraintSet::new(&arm, &[ContactConstraint::point(arm.frame("tool").unwrap())]).unwrap();
         let _ = constrained_dynamics(&with, &mut Data::new(&with), &mut set, &[0.3; 7], &[0.0; 7], &[0.0; 7], &[]);
@@ -139,7 +140,8 @@ fn frames_that_cannot_be() {
     assert_eq!(said("", "tool".into(), here), "frame ``: a frame without a name cannot be found");
 }
 
-/// A model equals its clone and itself read back from a file; it does not equal a model with another number.
+/// A model equals its clone, and the model read back from its file. It does not equal a model in which one number
+/// differs.
 #[test]
 fn models_are_compared() {
     for model in all_models(2) {

@@ -1,4 +1,4 @@
-//! Dynamics and energies are linear in the inertial parameters.
+//! Regressors: dynamics and energies are linear in the inertial parameters.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ use num_dual::Dual64;
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 8;
 
-/// Returns π of all bodies except the world.
+/// Returns the inertial parameters π of all bodies except the world.
 fn parameters(model: &Model) -> DVector<f64> {
     DVector::from_iterator(
         10 * (model.bodies().len() - 1),
@@ -22,7 +22,7 @@ fn parameters(model: &Model) -> DVector<f64> {
     )
 }
 
-/// τ = Y π + armature a.
+/// Efforts are τ = Y π + armature · a, with the regressor Y.
 #[test]
 fn torques() {
     let mut worst = Worst::new("Y π = rnea", ROUNDING);
@@ -81,7 +81,7 @@ fn energies() {
     }
 }
 
-/// Y is the same after other calls on the same data: no results are left over.
+/// The regressor Y does not contain results of earlier calls with the same `Data`.
 #[test]
 fn nothing_is_left_over() {
     let model = robots::quadruped();

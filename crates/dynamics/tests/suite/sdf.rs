@@ -9,7 +9,7 @@ const ROUNDING: f64 = 1e-12;
 
 const LINKAGE: &str = include_str!("../data/linkage.sdf");
 
-/// The same robot as URDF, with poses computed by hand: each link frame is at its joint.
+/// URDF of the same robot, with poses computed by hand: in URDF, the frame of each link is at its joint.
 const URDF: &str = r#"<robot name="linkage">
   <link name="base"><inertial><mass value="4"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.25"/></inertial></link>
   <link name="crank"><inertial><origin xyz="0.2 0 0" rpy="0 0 0.3"/><mass value="1"/><inertia ixx="0.01" ixy="0.001" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
@@ -62,7 +62,7 @@ fn equals_the_same_robot_as_urdf() {
     }
 }
 
-/// A screw is given by either of its pitches, right-handed: 2 mm per turn.
+/// A right-handed screw with 2 mm per turn is described by either of SDF's two elements for the pitch.
 #[test]
 fn screws() {
     for pitch in ["screw_thread_pitch>0.002</screw_thread_pitch", "thread_pitch>-3141.592653589793</thread_pitch"] {
@@ -81,7 +81,7 @@ fn screws() {
     }
 }
 
-/// An axis follows another one, also of a universal joint: multiplier · (leader − reference) + offset.
+/// An axis follows another axis: multiplier · (leader − reference) + offset. Both may be axes of universal joints.
 #[test]
 fn axes_that_follow() {
     let mimic = |inside: &str, ratio: &str| {
@@ -133,9 +133,9 @@ fn drake(model: &Model, q: &[f64], v: &[f64], (M, h): (&[f64], &[f64]), (frame, 
     close(frame, &placements.frame(model.frame(frame).unwrap()).translation.to_array(), &at);
 }
 
-/// A model contains a model: poses relative to models, frames and links inside, a placement frame, axes in other
-/// frames. The reference numbers come from Drake 1.51: `CalcMassMatrix`, `CalcBiasTerm` −
-/// `CalcGravityGeneralizedForces`, with the base welded at its pose.
+/// A model contains another model. Poses are relative to the inner model and its frames and links; there is a placement
+/// frame, and axes are expressed in other frames. The reference numbers come from Drake 1.51: `CalcMassMatrix`,
+/// `CalcBiasTerm` − `CalcGravityGeneralizedForces`, with the base welded at its pose.
 #[test]
 fn a_model_in_a_model_is_drakes() {
     let (base, arm) = (link("base", ""), link("arm", "0 0 0.4 0 0 0"));
@@ -159,8 +159,8 @@ fn a_model_in_a_model_is_drakes() {
     drake(&model, &[0.3, -0.4], &[0.5, 0.7], (&M, &h), ("inner::tip", tip));
 }
 
-/// A merged model keeps its frame, under the placement frame that it contains. The reference numbers come from Drake,
-/// as above.
+/// A merged model keeps its model frame, which is placed by a placement frame inside the model. The reference numbers
+/// come from Drake 1.51.
 #[test]
 fn a_merged_model_is_drakes() {
     let folder = std::env::temp_dir().join(format!("condyle_merged_{}", std::process::id()));
@@ -190,7 +190,7 @@ fn a_merged_model_is_drakes() {
     drake(&model, &q, &v, (&M, &h), ("flange", [0.20867700229444647, -0.07692029983644436, -0.005975034974713755]));
 }
 
-/// A joint that is traversed from its child keeps its position. The reference numbers come from Drake, as above.
+/// A joint whose child link is nearer to the root keeps its position. The reference numbers come from Drake 1.51.
 #[test]
 fn a_reversed_joint_is_drakes() {
     let links =
@@ -218,7 +218,8 @@ fn a_reversed_joint_is_drakes() {
     drake(&model, &[0.3, -0.4, 0.2], &[0.5, 0.7, -0.3], (&M, &h), ("d", d));
 }
 
-/// A universal joint is traversed from its child: the inverse of R_y(q₁) R_x(q₂) is R_x(−q₂) R_y(−q₁).
+/// A universal joint is reversed if its child link is nearer to the root: the inverse of R_y(q₁) R_x(q₂) is R_x(−q₂)
+/// R_y(−q₁).
 #[test]
 fn a_reversed_universal_joint_moves_the_same() {
     let cross = |[parent, child]: [&str; 2], [first, second]: [&str; 2]| {

@@ -10,18 +10,20 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::HyperDual64;
 
-/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
+/// condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 5;
 
-/// Function that returns λᵀ times an algorithm's result at (q, v, x), where x is an acceleration or an effort.
+/// Function φ that returns λᵀ times the result of an algorithm at (q, v, x), where x is an acceleration or an effort.
 type Phi = fn(&Model, &mut Data<HyperDual64>, [&[HyperDual64]; 3], &[Force<HyperDual64>], &[f64]) -> HyperDual64;
 
 fn dot(x: &[HyperDual64], lambda: &[f64]) -> HyperDual64 {
     x.iter().zip(lambda).map(|(&x, &l)| x * l).sum()
 }
 
-/// Computes ∂²φ/∂(argument)∂(argument) by seeding one direction in each of the two dual parts.
+/// Computes a block of second derivatives of φ with respect to two arguments (`blocks`). Each of the two dual parts
+/// carries one direction.
 fn by_hyper_duals(
     phi: Phi,
     model: &Model,
@@ -88,7 +90,7 @@ fn forward_dynamics() {
     }
 }
 
-/// The contracted tensors agree, and so do the other blocks: v with a, and a twice.
+/// The tensors of second derivatives, contracted with λ, equal the Hessian of λᵀ τ.
 #[test]
 fn tensors() {
     let mut worst = Worst::new("Σ λ_i ∂²τ_i", EXACT);

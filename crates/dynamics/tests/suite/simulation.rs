@@ -1,4 +1,4 @@
-//! Integrators: their order, and the quantities that they conserve.
+//! Integrators: the order of each method, and the quantities that each method conserves.
 
 use crate::common::{self, State as Random, Tree, lift, moved, normal, relative, rng};
 use crate::counting::allocations;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 const ALL: [(Integrator, f64); 3] =
     [(Integrator::SemiImplicitEuler, 1.0), (Integrator::RungeKutta4, 4.0), (Integrator::Variational, 2.0)];
 
-/// Tolerance of an observed order: the next power of h still has an effect at these step lengths.
+/// Tolerance of an observed order. At these step lengths h, errors of the next power of h still have an effect.
 const ORDER: f64 = 0.15;
 /// Tolerance of sums over all bodies and some thousand steps, relative to the largest number.
 const ROUNDING: f64 = 1e-10;
@@ -23,7 +23,7 @@ fn settings(integrator: Integrator, dt: f64) -> Settings {
     Settings { integrator, dt, ..Settings::default() }
 }
 
-/// Returns position and velocity of the robot after some time without efforts.
+/// Returns the position and the velocity of the robot after the given time without efforts.
 fn simulate(model: &Model, settings: Settings, (q, v): (&[f64], &[f64]), time: f64) -> (Vec<f64>, Vec<f64>) {
     let mut simulation = Simulation::new(model, settings);
     simulation.set_state(q, v).unwrap();
@@ -52,7 +52,8 @@ fn double_pendulum(options: &JointOptions) -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// Creates a free body in free space, with principal moments A = A ≠ C.
+/// Creates a symmetric body that moves freely in free space. Two of its principal moments of inertia are equal (A), the
+/// third is C.
 fn top() -> Model {
     let mut builder = ModelBuilder::new("top");
     builder.gravity(Vec3::zero());
@@ -74,7 +75,8 @@ fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     assert!((observed - order).abs() < ORDER, "{what}: {observed}");
 }
 
-/// The free symmetric body has a closed form: with L = I ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
+/// The motion of a free symmetric body has a closed form: with L = I ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A)
+/// e₃).
 #[test]
 fn order_on_a_free_body() {
     let model = top();
@@ -99,7 +101,8 @@ fn order_on_a_free_body() {
     }
 }
 
-/// Compares with fine steps, for every kind of joint, mimic joints, efforts, external forces, damping and friction.
+/// Each integrator has its order on random trees, compared with fine steps. The trees have every kind of joint, mimic
+/// joints, efforts, external forces, damping and friction.
 #[test]
 fn order_on_trees() {
     let losses = JointOptions { damping: 0.2, friction: 0.3, armature: 0.1, ..JointOptions::default() };
@@ -134,7 +137,8 @@ fn order_on_trees() {
     }
 }
 
-/// The period of a pendulum of large swing is 4 K(sin(θ₀/2)) √(I/(m g l)), by the arithmetic-geometric mean.
+/// A pendulum that swings by a large angle θ₀ has the period 4 K(sin(θ₀/2)) √(I/(m g l)). The arithmetic-geometric mean
+/// gives the elliptic integral K.
 #[test]
 fn period_of_a_pendulum() {
     let mut builder = ModelBuilder::new("pendulum");
@@ -182,8 +186,8 @@ fn energy_does_not_drift() {
     assert!(largest.iter().all(|&x| x < 1.2 * largest[0] && x < 2e-2));
 }
 
-/// A step with reversed velocity undoes a step, up to rounding; the velocity is reversed because time only runs
-/// forwards.
+/// After the velocity is reversed, a second step undoes the first step, up to rounding. The test reverses the velocity,
+/// because negative time steps are rejected.
 #[test]
 fn variational_steps_are_symmetric() {
     for seed in 0..4 {
@@ -201,8 +205,8 @@ fn variational_steps_are_symmetric() {
     }
 }
 
-/// Newton's method doubles the number of correct digits in each iteration, which requires the exact derivative of its
-/// equation.
+/// Newton's method doubles the number of correct digits in each iteration. This is only possible with the exact
+/// derivative of the equation.
 #[test]
 fn variational_steps_converge_quadratically() {
     let trees = (0..8).map(|seed| Tree { smooth: true, ..Tree::random_with_mimics(&mut rng(seed)) }.build());
@@ -235,7 +239,7 @@ fn time_runs_forwards() {
     }
 }
 
-/// Returns the momentum of a robot in the world, about the origin.
+/// Returns the momentum of a robot in the world's frame, about the origin of the world.
 fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 6] {
     let velocities = forward_velocities(model, data, q, v);
     let of = |i: usize| {
@@ -245,7 +249,7 @@ fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 
     (1..model.bodies().len()).fold(Force::zero(), |sum, i| sum + of(i)).to_array()
 }
 
-/// Without gravity, the momentum of a free robot is constant, whatever its joints do.
+/// Without gravity, the momentum of a free robot is constant, for any motion of the joints.
 #[test]
 fn momentum_is_conserved() {
     let model = robots::humanoid().with_gravity(Vec3::zero()).unwrap();
@@ -271,7 +275,7 @@ fn momentum_is_conserved() {
     assert!(fine < 1e-6 && observed_order(coarse, fine) > 3.5, "{coarse:.1e} {fine:.1e}");
 }
 
-/// A falling humanoid's centre of mass follows a parabola, however its joints move.
+/// The centre of mass of a falling humanoid follows a parabola, for any motion of the joints.
 #[test]
 fn centre_of_mass_falls_along_a_parabola() {
     let model = robots::humanoid();
@@ -302,7 +306,7 @@ fn centre_of_mass_falls_along_a_parabola() {
     }
 }
 
-/// A force on a body acts like the equivalent efforts.
+/// An external force on a body acts like the equivalent joint efforts.
 #[test]
 fn external_forces_act() {
     for (integrator, _) in ALL {
@@ -391,7 +395,7 @@ fn failures_are_typed() {
     }
 }
 
-/// Dual numbers passed through a step give its derivatives.
+/// Dual numbers that pass through a step give the derivatives of the step.
 #[test]
 fn a_step_can_be_differentiated() {
     const STEP: f64 = 1e-5; // step of central differences, which balances rounding and curvature

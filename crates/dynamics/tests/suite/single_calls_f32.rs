@@ -6,10 +6,11 @@ use condyle_dynamics::{
     rnea_derivatives,
 };
 
-/// Tolerance: 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
+/// Tolerance of 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
 const ROUNDINGS: f64 = 1e3 * f32::EPSILON as f64;
 
-/// Returns the results of calls at a state that both precisions represent exactly, each with whether it contains M⁻¹.
+/// Returns the results of several calls, each with a flag that says whether the result depends on M⁻¹. Both precisions
+/// represent the state exactly.
 fn results<S: Scalar>(model: &Model, state: &State) -> Vec<(Vec<S>, bool)> {
     let round = |x: &[f64]| lift::<S>(&x.iter().map(|&x| f64::from(x as f32)).collect::<Vec<_>>());
     let (q, v, x) = (round(&state.q), round(&state.v), round(&state.a));

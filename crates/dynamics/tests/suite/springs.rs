@@ -1,4 +1,4 @@
-//! Springs and gravity compensation: their laws, their energies, and MuJoCo's numbers.
+//! Springs and gravity compensation: laws, energies, and comparisons with MuJoCo.
 
 use crate::common;
 
@@ -14,7 +14,8 @@ use num_dual::Dual64;
 
 const SMOOTHING: f64 = 0.01;
 
-/// At the rest position of all springs, without compensated weight, no effort acts, and the derivatives are finite.
+/// At the rest position of all springs, and without gravity compensation, passive efforts are 0 and derivatives are
+/// finite.
 #[test]
 fn springs_at_rest() {
     let mut builder = ModelBuilder::new("at rest");
@@ -43,14 +44,15 @@ fn springs_at_rest() {
     assert!((dq + DMatrix::identity(nv, nv) * 2.0).amax() < 1e-13);
 }
 
-/// The spring of a follower uses the follower's own displacement; its effort is multiplied by the ratio.
+/// The spring of a follower acts on the displacement of the follower. The effort on the leader is the spring's effort
+/// times the ratio.
 #[test]
 fn springs_of_followers() {
     const AXIS: Vec3<f64> = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
     let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
     let (endless, hinge) = (Joint::Continuous { axis: AXIS }, Joint::Revolute { axis: AXIS });
-    // (leader, follower, its rest, ratio); the position of a follower of a joint without limits is known up to full
-    // turns
+    // Cases (leader, follower, rest position of the follower, ratio, turns). If the leader or the follower is a
+    // continuous joint, the follower's position is known only up to full turns.
     for (leads, follows, rest, ratio, turns) in [
         (hinge, hinge, vec![0.4], -0.7, false),
         (hinge, Joint::Prismatic { axis: AXIS }, vec![0.4], 1.5, false),
@@ -79,8 +81,8 @@ fn springs_of_followers() {
     }
 }
 
-/// If all weights are compensated, the efforts equal the efforts that hold the robot still; for half of the weights,
-/// half of them.
+/// If all weights are compensated, the passive efforts equal the efforts that hold the robot still. If half of each
+/// weight is compensated, the passive efforts are half as large.
 #[test]
 fn gravity_that_is_compensated() {
     for seed in 0..10 {
@@ -94,7 +96,7 @@ fn gravity_that_is_compensated() {
                 let names = (name.as_str(), name.as_str());
                 let options = JointOptions::default();
                 ids.push(builder.body_with(names, ids[body.parent], body.joint, body.placement, body.inertia, options));
-                // half of the body is a part with another ratio, in its own frame
+                // half of a body is a second part with another ratio of compensation, in a frame of its own
                 let X = Se3 { translation: Vec3::new(0.3, -0.2, 0.5), ..Se3::identity() };
                 builder.compensate_gravity(ids[i], 2.0 * factor);
                 builder.compensate_gravity_of_part(ids[i], X, X.act_inv(body.inertia).scale(0.5), 0.0);
@@ -118,8 +120,8 @@ fn gravity_that_is_compensated() {
     }
 }
 
-/// The compensated weight depends on the inertia: its efforts are linear in the masses, and their derivative with
-/// respect to a mass is exact.
+/// Efforts of gravity compensation are linear in the masses of the bodies, and derivatives with respect to a mass are
+/// exact.
 #[test]
 fn compensation_has_derivatives_with_respect_to_masses() {
     let model = like_mujoco();
@@ -179,7 +181,7 @@ fn like_mujoco() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// M, bias and passive efforts equal MuJoCo's, for a robot from a builder and for the file.
+/// M, bias and passive efforts equal MuJoCo's results, for a robot from a builder and for the robot read from the file.
 #[test]
 fn the_numbers_of_mujoco() {
     let text = include_str!("../data/passive_mujoco.json");
@@ -204,8 +206,8 @@ fn the_numbers_of_mujoco() {
     }
 }
 
-/// Computes the energy of springs, −∫ τ of each: k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4. For a joint with one degree of freedom, r
-/// is the displacement; for others, r is the length of the displacement.
+/// Computes the energy of all springs. Each spring has the energy −∫ τ dr = k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4. For a joint
+/// with one degree of freedom, r is the displacement; for other joints, r is the length of the displacement.
 fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     let mut energy = 0.0;
     for spring in model.springs() {
@@ -238,7 +240,7 @@ fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     energy
 }
 
-/// Computes the energy of the compensated weights.
+/// Computes the potential energy of the compensated weights.
 fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
@@ -250,7 +252,7 @@ fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     model.gravity_compensation().iter().map(energy).sum()
 }
 
-/// Efforts of springs and of gravity compensation are minus the gradient of an energy.
+/// Efforts of springs and of gravity compensation are the negative gradient of an energy.
 #[test]
 fn springs_have_an_energy() {
     let step = 1e-6;
@@ -269,7 +271,7 @@ fn springs_have_an_energy() {
     }
 }
 
-/// With springs and compensated weights, but without losses, a simulation conserves energy, to the order of its
+/// With springs and gravity compensation, but without losses, a simulation conserves energy up to the error of the
 /// integrator.
 #[test]
 fn simulations_keep_the_energy_of_springs() {

@@ -1,4 +1,4 @@
-//! Dynamics of models from URDF: root joints, joints that follow others, and the embedded robots.
+//! Dynamics of models from URDF: root joints, mimic joints, and the embedded robots.
 
 use crate::common;
 
@@ -24,7 +24,7 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, inside: &str) -> Str
     )
 }
 
-/// Links fixed to the world belong to body 0, and their mass counts.
+/// Links that are fixed to the world belong to body 0, and their mass is part of the total mass.
 #[test]
 fn root_joints() {
     let fixed = robots::arm7();
@@ -46,8 +46,8 @@ fn root_joints() {
     }
 }
 
-/// Mimic joints are free by default. With the option, their coordinate is the leader's, wherever the leader is in the
-/// file.
+/// By default, mimic joints are free joints. With the option, a mimic joint uses the coordinate of its leader, which
+/// may be anywhere in the file.
 #[test]
 fn mimic_joints() {
     let links: String = ["base", "left", "right"].map(link).concat();
@@ -65,7 +65,7 @@ fn mimic_joints() {
     assert_eq!(crba(&model, &mut data, &[0.1])[(0, 0)], 5.0); // 1 + 2²
 }
 
-/// The embedded robots match their documentation.
+/// The properties of the embedded robots match the documentation of the robots.
 #[test]
 fn embedded_robots() {
     let [arm, quadruped, humanoid] = [robots::arm7(), robots::quadruped(), robots::humanoid()];

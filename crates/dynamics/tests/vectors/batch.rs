@@ -1,4 +1,4 @@
-//! Many states at once give the same bits as single states.
+//! Batches: many states at once give the same bits as single states.
 
 use crate::common::panics::{Panic, panic_of};
 use crate::common::table::Input;
@@ -20,18 +20,18 @@ fn states(model: &Model, n: usize, seed: u64) -> States<f64> {
     States::of(&random(model, n, seed))
 }
 
-/// Tolerance of two ways of rounding, relative to the largest entry: some hundred roundings of a matrix with condition
-/// number 1e3.
+/// Tolerance between two computations with different rounding, relative to the largest entry: some hundred roundings of
+/// a matrix with condition number 1e3.
 const ROUNDING: f64 = 1e-11;
 
-/// Matrices written by rows have the entries of each state's matrix, in full groups and in one that is not full.
+/// Matrices that are written by rows have the entries of each state's matrix. The last group of states is not full.
 #[test]
 fn matrices_by_rows() {
     for model in models(2) {
         let (n, count) = (model.nv(), 19);
         let s = states(&model, count, 5);
         let mut batch = Batch::new(&model, count, 2);
-        // symmetric matrices may be written by columns, which equal rows up to rounding
+        // symmetric matrices may be written by columns, which equal the rows up to rounding
         let check = |matrices: Matrices<'_, f64>, symmetric: bool| {
             let mut rows = vec![f64::NAN; count * n * n];
             matrices.write_rows(&mut rows);
@@ -54,7 +54,7 @@ fn matrices_by_rows() {
     }
 }
 
-/// A writer writes the results that the batch returns, by rows; on one thread without allocating.
+/// A writer writes the same results that the batch returns, by rows. On one thread, it does not allocate.
 #[test]
 fn written_to_places() {
     const COUNT: usize = 19;
@@ -128,9 +128,9 @@ fn a_place_that_is_missing() {
     );
 }
 
-/// Holds for any number of states and threads, and for full and partial groups. On one thread, it does not allocate
-/// after the first call of a function. On an emulated processor (`CONDYLE_EMULATED`), two robots and the first partial
-/// group represent all.
+/// Each state of a batch has the bits of a single call, for any number of states and threads, and for full and partial
+/// groups. On one thread, a batch does not allocate after the first call of a function. On an emulated processor
+/// (`CONDYLE_EMULATED`), the test uses only two robots and few states.
 #[test]
 fn every_state_is_a_single_call() {
     const MOST: usize = 19;
@@ -176,7 +176,7 @@ fn every_state_is_a_single_call() {
     });
 }
 
-/// In each function, a state with NaN does not affect the others.
+/// In each function, a state with NaN does not affect the other states.
 #[test]
 fn a_state_that_is_not_a_number_stays_alone() {
     const STATES: usize = 9;
@@ -205,7 +205,7 @@ fn a_state_that_is_not_a_number_stays_alone() {
     });
 }
 
-/// Results for a robot without coordinates are empty; the number of states is given by the forces or the capacity.
+/// Results for a robot without coordinates are empty. The number of forces or the capacity gives the number of states.
 #[test]
 fn no_coordinates() {
     let model = &fixed();
@@ -286,7 +286,7 @@ fn another_robot() {
     _ = Batch::<f64>::new(&arm, 2, 1).gravity(&quadruped, &condyle_dynamics::neutral(&quadruped));
 }
 
-/// The expected results of a whole robot are also correct without coordinates.
+/// Every function gives the results of single calls for a robot without coordinates too.
 #[test]
 fn every_function_without_coordinates() {
     let model = &fixed();
@@ -303,14 +303,14 @@ fn every_function_without_coordinates() {
                 (row.one)(model, &mut data, &mut set, input, &mut expected);
             }
             (row.many)(model, &mut batch, &mut constraints, &States::of(&inputs), &mut found);
-            // ignores the sign of NaN
+            // compare bits without the sign, because the sign of NaN may differ
             let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>();
             assert_eq!(bits(&found), bits(&expected), "{}, {level}", row.name);
         }
     });
 }
 
-/// A changed target applies to all states.
+/// A changed target of a constraint applies to all states.
 #[test]
 fn targets_of_constraints() {
     let _best = best_level();
@@ -343,7 +343,7 @@ fn constraints_of_another_batch() {
     _ = Batch::<f64>::new(model, 2, 1).constrained_dynamics(model, &mut constraints, &q, &v, &v, &[]);
 }
 
-/// A copy has the results of the original, computes the same bits, and shares no memory with it.
+/// A copy of a batch computes the same bits as the original, and shares no memory with the original.
 #[test]
 fn copies_compute_alone() {
     let _best = best_level();
@@ -361,7 +361,7 @@ fn copies_compute_alone() {
     let (mut one, mut constraints) = (copy.clone(), held(model, &copy));
     let first = one.constrained_dynamics(model, &mut constraints.clone(), &s.q, &s.v, &s.x, &[]).a.to_vec();
     assert_eq!(copy.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a, first);
-    // with forces for the first time, in a copy of a batch that was never called with forces
+    // copy a batch that was never called with forces; the first call with forces must not allocate
     let (mut without, rnea) = (Batch::new(model, 11, 1), batch.rnea(model, &s.q, &s.v, &s.x, &s.f_ext).to_vec());
     without.rnea(model, &s.q, &s.v, &s.x, &[]);
     let mut with = without.clone();

@@ -1,4 +1,4 @@
-//! Hand-written derivatives in several directions at a time.
+//! Derivatives by dual numbers in several directions at a time, compared with hand-written derivatives.
 
 use crate::common::table::Input;
 use crate::common::{Worst, rng};
@@ -7,7 +7,8 @@ use condyle_dynamics::{
     Data, Force, LaneJacobian, Matrix, Model, Scalar, StateFunction, aba, aba_derivatives, rnea, rnea_derivatives,
 };
 
-/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
+/// condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 5;
 
@@ -63,7 +64,7 @@ fn of_dynamics() {
     });
 }
 
-/// Selected columns equal the columns of the whole Jacobian, in any requested order; the others are zero.
+/// Selected columns equal the columns of the whole Jacobian, in any requested order; the other columns are zero.
 #[test]
 fn along_some_directions() {
     let models = models(TREES);

@@ -24,10 +24,10 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Permission that vectors may be used at their SIMD level.
+/// Marker with which this test may name vector types.
 struct Here;
 
-// SAFETY: `each_level` runs what this processor has.
+// SAFETY: `each_level` only runs SIMD levels that this processor supports.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Here {}
 
@@ -64,7 +64,7 @@ fn knots_are_single_calls<S: Vector>(models: &[Model]) {
                 let found: Vec<f64> = found.numbers.iter().map(|x| x.unpack()[k]).collect();
                 assert!(found == expected.numbers, "{name} has other bits in lane {k} of {}, on\n{model}", S::LANES);
             }
-            // a lane with NaN does not affect the others
+            // a lane with NaN does not affect the other lanes
             let mut broken = knots.clone();
             broken[1] = broken[1].map(|_| f64::NAN);
             let mut beside = Output::new(model);

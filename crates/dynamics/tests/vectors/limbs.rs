@@ -1,5 +1,5 @@
-//! Branches (limbs) of one robot in parallel lanes give the numbers of a computation body by body. (At the baseline
-//! level, both are computed body by body.)
+//! Branches (limbs) of one robot in parallel lanes, compared with a computation body by body. (At the baseline SIMD
+//! level, both computations are body by body.)
 
 use crate::best_level;
 use crate::common::contacts::random_constraints;
@@ -12,12 +12,12 @@ use condyle_dynamics::{
 };
 use nalgebra::DMatrix;
 
-/// Tolerances of sums in another order, over at most some tens of bodies; results that contain M⁻¹ also depend on its
-/// condition number.
+/// Tolerances between sums in different orders, over at most some tens of bodies. The tolerance of results with M⁻¹
+/// includes the condition number of M.
 const TOLERANCE: f64 = 1e-12;
 const TOLERANCE_ABA: f64 = 1e-8;
 
-/// Creates robots with three to six limbs of random joints on a random base, some of them with branches.
+/// Creates a robot with three to six limbs of random joints on a base with the joint `root`. One limb has branches.
 fn many_limbs(seed: u64, root: Joint) -> Model {
     let mut rng = rng(seed);
     let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into(), smooth: false };
@@ -49,7 +49,7 @@ fn many_limbs(seed: u64, root: Joint) -> Model {
     tree.build()
 }
 
-/// Returns the errors to be compared: of sums, and of results that contain M⁻¹.
+/// Returns two error records: for sums, and for results that contain M⁻¹.
 fn sums_and_inverses() -> [Worst; 2] {
     [Worst::new("sums", TOLERANCE), Worst::new("inverses", TOLERANCE_ABA)]
 }
@@ -151,7 +151,7 @@ fn the_numbers_of_body_after_body() {
     }
 }
 
-/// Compares q̈, λ and J; the residuals agree up to rounding.
+/// Compares q̈, λ and J with limbs in lanes and body by body. The residuals agree up to rounding.
 fn compare_constrained(
     m: &Model,
     constraints: &[ContactConstraint],
@@ -177,7 +177,8 @@ fn compare_constrained(
     }
 }
 
-/// Constrains all kinds of pairs of bodies, including the base and the world.
+/// Constrained dynamics equals a computation body by body, for constraints between all kinds of bodies, including the
+/// base and the world.
 #[test]
 fn constrained_dynamics_of_body_after_body() {
     let _level = best_level();
@@ -196,7 +197,8 @@ fn constrained_dynamics_of_body_after_body() {
     }
 }
 
-/// One sole of the humanoid is constrained twice, so that six rows are redundant, and the other sole by points.
+/// One sole of the humanoid is constrained twice, so that six rows are redundant. The other sole is constrained by
+/// points.
 #[test]
 fn redundant_constraints_of_body_after_body() {
     let _level = best_level();
@@ -212,7 +214,7 @@ fn redundant_constraints_of_body_after_body() {
     compare_constrained(&model, &[], ProximalSettings::default(), &mut worst, &state);
 }
 
-/// The same `Data` works with changed armature, gravity or inertia.
+/// A `Data` can also be used with a copy of its robot that has another armature, gravity or inertia.
 #[test]
 fn of_the_model_that_is_given() {
     let _level = best_level();
@@ -235,7 +237,7 @@ fn of_the_model_that_is_given() {
     }
 }
 
-/// Scratch that was cloned before a force was first given computes the same.
+/// A clone of a `Data` that has never been used with forces computes the same bits, with and without forces.
 #[test]
 fn with_cloned_data() {
     let _level = best_level();
@@ -252,7 +254,7 @@ fn with_cloned_data() {
     }
 }
 
-/// NaN in one limb only affects the results of that limb and of the base.
+/// A NaN in one limb only affects the results of this limb and of the base.
 #[test]
 fn what_is_not_a_number_stays_in_its_limb() {
     let _level = best_level();
@@ -277,7 +279,8 @@ fn a_robot_of_loose_bodies() {
     compare(&builder.build().expect("it is well-formed"), &mut worst, 0);
 }
 
-/// Some bodies do not exist in all lanes, and the first bodies are not computed first.
+/// The fingers of a hand have different lengths. So some steps do not have a body in each lane, and the order of steps
+/// is not the order of bodies.
 #[test]
 fn fingers_of_all_lengths() {
     let _level = best_level();
@@ -295,8 +298,8 @@ fn fingers_of_all_lengths() {
     }
 }
 
-/// The placements stored by a call belong to its position, for each algorithm. After a call that needs no placements,
-/// none are stored.
+/// After each algorithm, the stored placements are the placements at the position of the last call. After a call that
+/// needs no placements, no placements are stored.
 #[test]
 fn calls_leave_their_placements() {
     let _level = best_level();
@@ -333,7 +336,7 @@ fn calls_leave_their_placements() {
     }
 }
 
-/// Placements stored in lanes are rejected for a robot with another placement of its base.
+/// Placements that are stored in lanes are rejected for a robot whose base has another placement.
 #[test]
 fn placements_of_limbs_know_their_robot() {
     let _level = best_level();
@@ -346,7 +349,7 @@ fn placements_of_limbs_know_their_robot() {
     aba(&quadruped, &mut data, &q, &o, &o, &[]);
     assert_panic("tests/vectors/limbs.rs", "another robot than `raised`", || _ = data.placements(&raised));
     assert!(data.placements(&quadruped).is_some());
-    // in the lanes again, with other inertias
+    // placements stored in lanes are accepted for the same robot with other inertias
     aba(&quadruped, &mut data, &q, &o, &o, &[]);
     assert!(data.placements(&quadruped.with_inertias(|_, I| I.scale(2.0)).unwrap()).is_some());
 }

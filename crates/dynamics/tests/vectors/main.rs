@@ -1,4 +1,5 @@
-//! Several states in a vector register, at every SIMD level that this processor has, and several branches of one state.
+//! Tests of several states in a vector register, and of several branches of one state, at every SIMD level of this
+//! processor.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]
@@ -16,17 +17,17 @@ use condyle_dynamics::Model;
 use condyle_dynamics::level::{Level, pin};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
-/// Lock of the SIMD level, which all threads share: either one test goes through all levels, or several tests use the
-/// best.
+/// Lock of the SIMD level, which all threads share. Either one test uses all levels in turn, or several tests use the
+/// best level.
 static LEVEL: RwLock<()> = RwLock::new(());
 
-/// Returns all kinds of robots, computed body by body: with branches in parallel lanes, a single call adds in another
+/// Returns all kinds of robots without limbs, because single calls with branches in parallel lanes add in another
 /// order.
 fn models(trees: u64) -> Vec<Model> {
     common::all_models(trees).into_iter().map(|model| model.with_limbs(false)).collect()
 }
 
-/// Runs a test at each SIMD level, and prints the levels that could not be run.
+/// Runs a test at each SIMD level, and prints the levels that this processor does not support.
 fn each_level(test: impl Fn(Level)) {
     let _alone = LEVEL.write().unwrap_or_else(PoisonError::into_inner);
     for level in Level::ALL {

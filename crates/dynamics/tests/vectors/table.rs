@@ -1,4 +1,5 @@
-//! Table of every function of a batch and the same function for a single state, with their results in one order.
+//! Table of every function of a batch, each with the same function for a single state. The results of both functions
+//! have the same order.
 
 use crate::common::table::Input;
 use condyle_dynamics::{
@@ -31,7 +32,7 @@ impl<T: Copy> States<T> {
     }
 }
 
-/// Results: for each result, the numbers of all states.
+/// Results of a function: for each result, the numbers of all states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Found<T> {
     pub(crate) results: Vec<Vec<T>>,
@@ -39,7 +40,7 @@ pub(crate) struct Found<T> {
 }
 
 impl<T: Copy> Found<T> {
-    /// Appends numbers to the next result: of all states, or of one more state.
+    /// Appends numbers to the next result. They are the numbers of all states, or of one more state.
     fn extend(&mut self, numbers: impl Iterator<Item = T>) {
         if self.results.len() == self.next {
             self.results.push(Vec::new());
@@ -48,7 +49,7 @@ impl<T: Copy> Found<T> {
         self.next += 1;
     }
 
-    /// Starts again at the first result.
+    /// Starts again with the first result.
     pub(crate) fn again(&mut self) {
         self.next = 0;
     }
@@ -59,7 +60,7 @@ impl<T: Copy> Found<T> {
     }
 }
 
-/// Result of a function, for one state or for many.
+/// Result of a function, for one state or for many states.
 trait Put<T> {
     fn put(self, to: &mut Found<T>);
 }
@@ -98,7 +99,7 @@ macro_rules! arrays {
 }
 arrays!(Vec3, Motion, Force);
 
-/// Stores [m 1, 0; 0, Ī].
+/// Stores the 6 × 6 matrix [m 1, 0; 0, Ī] by columns.
 impl<T: Scalar> Put<T> for Inertia<T> {
     fn put(self, to: &mut Found<T>) {
         let (o, axes) = (T::zero(), self.rotational.full().columns().map(Vec3::to_array));
@@ -127,7 +128,7 @@ fn count<T: Real>(m: &Model, b: &Batch<T>, s: &States<T>) -> usize {
 type Many<T> = fn(&Model, &mut Batch<T>, &mut BatchConstraints<T>, &States<T>, &mut Found<T>);
 type One<T> = fn(&Model, &mut Data<T>, &mut ConstraintSet<T>, &Input<T>, &mut Found<T>);
 
-/// Function for all states by a batch, and for one state.
+/// Row of the table: a function for all states by a batch, and the same function for one state.
 pub(crate) struct Row<T: Real> {
     pub(crate) name: &'static str,
     pub(crate) many: Many<T>,
@@ -152,8 +153,8 @@ macro_rules! argument {
     };
 }
 
-/// Creates a row for each function, with its arguments and the members of its result: first arrays, then members that
-/// are plain numbers for a single state.
+/// Creates a row for each function. An entry lists the arguments and the fields of the result: first arrays, then
+/// fields that are plain numbers for a single state.
 macro_rules! rows {
     ($($name:ident($($argument:ident),*) $({ $($($member:ident).+),+ $(; $($number:ident),+)? })?;)*) => { vec![$(Row {
         name: stringify!($name),
@@ -175,8 +176,8 @@ macro_rules! rows {
     };
 }
 
-/// Creates a row for each function of the last frame or the last body, in each reference frame; filled matrices have
-/// names.
+/// Creates a row for each function of a frame or a body. The row uses the last frame or body, and each reference frame.
+/// Names after `fills` are matrices that the function fills.
 macro_rules! questions {
     ($T:ident; $($name:ident($of:ident) after $pass:ident($($argument:ident),*) $(fills [$($member:ident),+])?;)*) => {
         vec![$(Row {
@@ -210,7 +211,7 @@ macro_rules! questions {
     };
 }
 
-/// Creates a row for each sum over the bodies; sums that are single numbers are marked.
+/// Creates a row for each sum over the bodies. The marker `[number]` is for sums that are single numbers.
 macro_rules! sums {
     ($($name:ident after $pass:ident($($argument:ident),*) $([$number:ident])?;)*) => { vec![$(Row {
         name: stringify!($name),
@@ -238,7 +239,8 @@ fn last_body(model: &Model) -> usize {
 const SMOOTHING: f64 = 0.1;
 const RESTITUTION: f64 = 0.3;
 
-/// Returns all kinds of inputs for which a robot with these bodies has derivatives.
+/// Returns all kinds of inputs for which a robot has derivatives. Only robots with moving bodies have derivatives with
+/// respect to an inertia.
 fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
     use condyle_dynamics::Input::*;
     let last = last_body(model);
@@ -247,7 +249,8 @@ fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
         .chain((last > 0).then_some(Inertia(last)))
 }
 
-/// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move.
+/// Returns a contact and a loop, with one more iteration than needed. For a robot that cannot move, returns no
+/// constraints.
 pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, ProximalSettings) {
     let (bodies, proximal) = (model.bodies().len(), ProximalSettings { mu: 1e-6, iterations: 2 });
     if bodies == 1 {

@@ -1,20 +1,20 @@
-//! Dynamics under constraints of a robot with limbs, without M.
+//! Dynamics under constraints of a robot with limbs, computed without M.
 //!
 //! Source: Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the
 //! operational-space inertia matrix* (2012), based on Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1.
-//! Let U = Iᴬ S and D belong to the articulated bodies. A force f on a body causes the effort Y_d = S_dᵀ f at column d
-//! of its joint, and f − U_d D_d⁻¹ Y_d is passed on to the parent. If the unit forces of the rows of J are propagated
-//! to the root in this way, then
+//! Let U = Iᴬ S and D be quantities of the articulated-body algorithm. A force f on a body causes the effort Y_d = S_dᵀ
+//! f at column d of its joint, and f − U_d D_d⁻¹ Y_d is passed on to the parent. If the unit forces of the rows of J
+//! are propagated to the root in this way, then
 //!
 //! ```text
 //! J M⁻¹ Jᵀ = Σ Y_d D_d⁻¹ Y_dᵀ,           J q̈ + γ = Σ Y_d D_d⁻¹ u_d + Σ f_iᵀ c_i + f₀ᵀ a₀ + γ'       for λ = 0,
 //! ```
 //!
-//! Here u and c belong to the articulated-body algorithm, and f_i is the force that remains beyond body i. a₀ is the
-//! world's acceleration, and γ' is the part of γ that is not the acceleration of a body. The last pass of that
-//! algorithm, with u + Yᵀ λ instead of u, gives q̈ = M⁻¹ (τ − h + Jᵀ λ). The articulated-body algorithm has limbs in
-//! its lanes. The forces have rows in their lanes: the rows of one constraint up to the root, and all rows from there
-//! on.
+//! Here u and c are quantities of the articulated-body algorithm, and f_i is the force that body i passes on to the
+//! parent. a₀ is the acceleration of the world. γ' is γ without the accelerations of bodies. The last pass of the
+//! articulated-body algorithm, with u + Yᵀ λ instead of u, gives q̈ = M⁻¹ (τ − h + Jᵀ λ). Lanes of the articulated-body
+//! algorithm are limbs. Lanes of the forces are rows: the rows of one constraint on the path to the root, and all rows
+//! at the root.
 
 use super::forces::Left;
 use super::lanes::Four;
@@ -30,7 +30,7 @@ use condyle_spatial::gate::FusedF64;
 use condyle_spatial::gate::Rename;
 use condyle_spatial::{Scalar, moves};
 
-/// Returns xᵀ y of N vectors, in every lane.
+/// Returns xᵀ y, for x and y of N vector registers each. Each lane of the result has the same sum.
 #[inline(always)]
 fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
     let mut sum = Four::load(x) * Four::load(y);
@@ -85,7 +85,7 @@ impl ConstraintLanes {
         }
     }
 
-    /// Replaces u by u + Yᵀ λ.
+    /// Replaces u by u + Yᵀ λ, for all columns.
     #[inline(always)]
     pub(crate) fn push(&self, plan: &Plan, constraints: &[ConstraintPlan], u: &mut [f64]) {
         let All { root, nv, stride, Y, x: lambda, .. } = &self.all;

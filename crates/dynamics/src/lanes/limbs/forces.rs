@@ -1,4 +1,4 @@
-//! Propagation of the unit forces of the rows of J through the articulated bodies to the root: see `constrained.rs`.
+//! Propagation of unit forces through the articulated bodies to the root, for the rows of J: see `constrained.rs`.
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, numbers};
@@ -34,12 +34,12 @@ impl<'a> Left<'a> {
     pub(crate) fn new(plan: &'a Plan, model: &Model, w: &'a World<Four>, d: &'a aba::Workspace<Four>) -> Self {
         // SAFETY: poses, motions and forces consist of vectors.
         let [oX, S, U, v, c] = unsafe { [numbers(&w.oX), numbers(&w.S), numbers(&d.U), numbers(&d.v), numbers(&d.c)] };
-        // SAFETY: the elements are vectors.
+        // SAFETY: the elements of both arrays are vectors.
         let [D_inv, u] = unsafe { [numbers(&d.D_inv), numbers(&d.u)] };
         Self { plan, oX, S, U, D_inv, u, v, c, world: (-*model.gravity()).to_array() }
     }
 
-    /// Returns ₀X of a body.
+    /// Returns the placement of a body in the world.
     #[inline(always)]
     pub(crate) fn pose(self, body: usize) -> Se3<FusedF64> {
         let (step, lane) = self.plan.place(body);
@@ -65,7 +65,8 @@ impl<'a> Left<'a> {
     }
 }
 
-/// Returns the slice in which every `LANES`-th number is one of the six of a motion or a force.
+/// Returns a slice that begins with the first number of a motion or force in a lane. Each of the other five numbers
+/// follows `LANES` entries after the previous one.
 #[inline(always)]
 pub(crate) fn six(of: &[f64], (at, lane): (usize, usize)) -> &[f64] {
     &of[6 * LANES * at + lane..][..5 * LANES + 1]
@@ -87,7 +88,7 @@ fn write<V: Block<Number = f64>, const N: usize>(x: [V; N], to: &mut [f64]) {
     }
 }
 
-/// Force of each of several rows.
+/// Forces of several rows, one force per row.
 type Forces<V, const N: usize> = [[V; N]; 6];
 
 #[inline(always)]
@@ -123,8 +124,8 @@ fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [
     sum
 }
 
-/// Passes the forces f through a column of a joint and returns Y and Y D⁻¹. f becomes the remaining forces, and Y D⁻¹ u
-/// is added to x, the partial sum of J q̈ + γ.
+/// Passes the forces f through one column of a joint, and returns Y and Y D⁻¹. Subtracts from f the force that the
+/// joint does not pass on. Adds Y D⁻¹ u to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn take<V: Block<Number = f64>, const N: usize>(
     left: Left<'_>,
@@ -149,7 +150,7 @@ fn take<V: Block<Number = f64>, const N: usize>(
     [Y, YD]
 }
 
-/// Adds f_iᵀ c_i to x.
+/// Adds f_iᵀ c_i of body i to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64], x: &mut [V; N]) {
     let by_c = dot(f, c);
@@ -158,7 +159,7 @@ fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64],
     }
 }
 
-/// Adds f₀ᵀ a₀ to x.
+/// Adds f₀ᵀ a₀ of the world to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 3], x: &mut [V; N]) {
     for r in 0..3 {
@@ -169,14 +170,14 @@ fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 
 }
 
 impl Rows {
-    /// Computes the unit forces and γ'.
+    /// Computes the unit forces of a constraint's rows, and γ'.
     #[inline(always)]
     pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<FusedF64>, gamma: [FusedF64; 6]) {
         let rigid = plan.kind == ConstraintKind::Rigid;
         let axes = if plan.aligned() { Mat3::identity() } else { ends.x1.rotation }.columns();
         for (end, (x, sign)) in [(ends.x1, 1.0), (ends.x2, -1.0)].into_iter().enumerate() {
-            // A rigid constraint acts at one point of both bodies; a point constraint acts at the point's position on
-            // each body.
+            // A rigid constraint acts on both bodies at the same point. A point constraint acts at the position of its
+            // point on each body.
             let p = if rigid { ends.x1.translation } else { x.translation };
             for r in 0..3 {
                 let n = axes[r].scale(FusedF64(sign));
@@ -195,7 +196,7 @@ impl Rows {
         }
     }
 
-    /// Propagates the unit forces to the root.
+    /// Propagates the unit forces of a constraint's rows to the root.
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &self,
@@ -245,8 +246,9 @@ impl Rows {
         write(x, &mut all.x[plan.row..]);
     }
 
-    /// Adds the contributions of the slots beyond the root, which this and another constraint share, to three columns
-    /// of J M⁻¹ Jᵀ. The columns start at row r of the other constraint. The rows belong to this constraint.
+    /// Adds contributions to three columns of J M⁻¹ Jᵀ. The columns start at row r of the other constraint, and the
+    /// rows belong to this constraint. The contributions come from the slots, except the root's, that both constraints
+    /// share.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(
         &self,
@@ -293,7 +295,7 @@ impl Rows {
 }
 
 impl All {
-    /// Writes zeros after the last row.
+    /// Writes zeros after the last row of each array.
     #[inline(always)]
     pub(crate) fn end<V: Block<Number = f64>, const N: usize>(&mut self, rows: usize) {
         let zeros = [V::zero(); N];

@@ -1,15 +1,16 @@
-//! M⁻¹ of a robot with limbs, without M.
+//! Inverse M⁻¹ of a robot with limbs, computed without M.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. Let U = Iᴬ S and D = Sᵀ U belong to the
-//! articulated bodies. Consider a unit acceleration of column e that no other joint resists. It reaches the bodies
-//! further out as a motion T, which starts as T = S_e. Column d moves by Z_de = −D_d⁻¹ U_dᵀ T, and T + S_d Z_de is
-//! passed on. Z is L⁻¹ of M = Lᵀ D L, with the zeros of the tree and ones on its diagonal. So
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. Let U = Iᴬ S and D = Sᵀ U be the
+//! quantities of the articulated-body algorithm. Consider a unit acceleration of column e that no other joint resists.
+//! It moves the bodies further out: T is the motion of a body, and starts as T = S_e. Column d moves by Z_de = −D_d⁻¹
+//! U_dᵀ T, and the motion T + S_d Z_de is passed on to the next body. Z is the inverse of L in M = Lᵀ D L. Its diagonal
+//! is 1, and it has the zeros of the tree. So
 //!
 //! ```text
 //! M⁻¹ = Z D⁻¹ Zᵀ
 //! ```
 //!
-//! takes one product for each pair of columns and each column that carries both. None of these products waits for
+//! takes one product for each pair of columns and each column e that carries both. The products do not depend on one
 //! another.
 #![allow(unsafe_code)]
 
@@ -24,19 +25,21 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::FusedF64;
 use condyle_spatial::{Motion, Scalar};
 
-/// Number of vectors of each row that are summed at once.
+/// Number of vector registers per row that are summed at once.
 const SIDE: usize = 3;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     sizes: Sizes,
-    /// T. Shape: support of all steps. Written by: `carry`.
+    /// Motions T. Shape: support of all steps. Written by: `carry`.
     T: Vec<Motion<Four>>,
-    /// Z D⁻¹, row by row, with the columns in order from the root. Shape: `Sizes`, plus one. Written by: `carry`.
+    /// Z D⁻¹, row by row; each row has the columns in order from the root. Shape: `Sizes`, plus one. Written by:
+    /// `carry`.
     ZD: Vec<f64>,
-    /// Zᵀ, row by row, including its zeros and ones. Shape: `Sizes`, plus one. Written by: `carry`, `new`.
+    /// Zᵀ, row by row, including zeros and the ones on the diagonal. Shape: `Sizes`, plus one. Written by: `carry`,
+    /// `new`.
     Zt: Vec<f64>,
-    /// M⁻¹, each row up to the diagonal. Shape: same as Zt. Written by: `multiply`.
+    /// M⁻¹, each row up to the diagonal. Shape: shape of `Zt`. Written by: `multiply`.
     rows: Vec<f64>,
 }
 
@@ -59,7 +62,8 @@ impl Scratch {
         self.T.len() == plan.columns.support.len() && self.sizes == plan.columns.sizes
     }
 
-    /// Computes M⁻¹, after `aba::factorize` or `aba::pass`, for columns that are shared.
+    /// Computes M⁻¹ from the results of `aba::factorize` or `aba::pass`. `broadcast` must already have copied `D_inv`
+    /// to the shared columns.
     #[inline(always)]
     pub(crate) fn inverse<V: Block<Number = f64>>(
         &mut self,
@@ -109,7 +113,7 @@ impl Scratch {
         }
     }
 
-    /// Computes M rows of M⁻¹, up to the diagonal and slightly beyond.
+    /// Computes several rows of M⁻¹ (as many as the constant parameter M), up to the diagonal and slightly beyond.
     #[inline(always)]
     fn multiply<V: Block<Number = f64>, const M: usize>(&mut self, block: &ColumnBlock) {
         let (mut start, end) = (0, block.first + M);
@@ -124,7 +128,7 @@ impl Scratch {
         }
     }
 
-    /// Computes N vectors of each of M rows, starting at a column.
+    /// Computes N vector registers in each of M rows, from column `start` on.
     #[inline(always)]
     fn part<V: Block<Number = f64>, const M: usize, const N: usize>(&mut self, block: &ColumnBlock, start: usize) {
         let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, rows: n }, .. } = self;
@@ -164,7 +168,7 @@ impl Scratch {
     }
 }
 
-/// Writes the number of each lane to its index.
+/// Writes the number of each lane of x to the index of the lane in `at`.
 #[inline(always)]
 fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
     let x = x.to_array();
@@ -175,7 +179,7 @@ fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
     }
 }
 
-/// Computes a symmetric matrix from its rows up to the diagonal.
+/// Computes a symmetric matrix X from `rows`, which are given up to the diagonal.
 #[inline(always)]
 fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF64]) {
     assert!(n <= width && rows.len() >= n * width && X.len() >= n * n);
@@ -187,7 +191,7 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
                 // SAFETY: k + r < n, and j + LANES ≤ n.
                 block[r] = Four::load(unsafe { rows.get_unchecked((k + r) * width + j..(k + r) * width + j + LANES) });
             }
-            // SAFETY: as above.
+            // SAFETY: the block's rows are inside X, by the same inequalities.
             unsafe { write(X, k * n + j, n, &block) };
             Four::transpose(&mut block);
             if j < k {
@@ -209,15 +213,15 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
     }
 }
 
-/// Writes a block of rows, n numbers apart, starting at entry `at`.
+/// Writes the rows of a block to X: the first row at entry `at`, each other row n entries after the previous one.
 ///
 /// # Safety
-/// X has at least the entries up to the end of the last row.
+/// The block's last row must end inside X.
 #[inline(always)]
 unsafe fn write(X: &mut [FusedF64], at: usize, n: usize, block: &[Four; LANES]) {
     for r in 0..LANES {
         debug_assert!(at + r * n + LANES <= X.len());
-        // SAFETY: by the caller.
+        // SAFETY: the caller guarantees that the rows are inside X.
         let to = unsafe { X.get_unchecked_mut(at + r * n..at + r * n + LANES) };
         to.copy_from_slice(&block[r].to_fused());
     }

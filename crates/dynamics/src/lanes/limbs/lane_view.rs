@@ -1,4 +1,4 @@
-//! Results of a pass over steps, read body by body.
+//! Results of a pass over steps, with functions that read them body by body.
 
 use super::Plan;
 use super::lanes::Four;
@@ -6,7 +6,7 @@ use super::pass::Scratch;
 use condyle_spatial::block::lanes;
 use condyle_spatial::{Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// Results that the derivatives of inverse dynamics need.
+/// View of the results, in lanes, that the derivatives of inverse dynamics need.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LaneView<'d> {
     plan: &'d Plan,
@@ -18,7 +18,7 @@ impl<'d> LaneView<'d> {
         Self { plan, scratch }
     }
 
-    /// Returns oX of body b.
+    /// Returns the placement oX of body b.
     pub(crate) fn pose<S: Scalar>(self, b: usize) -> Se3<S> {
         let (step, lane) = self.plan.place(b);
         let Se3 { rotation: Mat3 { x, y, z }, translation } = &self.scratch.world.oX[step];
@@ -26,20 +26,20 @@ impl<'d> LaneView<'d> {
         Se3::new(rotation, vector(translation, lane))
     }
 
-    /// Returns column k of body b's S.
+    /// Returns column k of S, the motion subspace of body b's joint.
     pub(crate) fn column<S: Scalar>(self, b: usize, k: usize) -> Motion<S> {
         let (step, lane) = self.plan.place(b);
         motion(&self.scratch.world.S[self.plan.steps[step].idx_v + k], lane)
     }
 
-    /// Returns the velocity and the acceleration of body b. The acceleration includes gravity, as the world's
-    /// acceleration.
+    /// Returns the velocity and the acceleration of body b. The acceleration includes gravity, as if the world
+    /// accelerated upwards.
     pub(crate) fn moving<S: Scalar>(self, b: usize) -> (Motion<S>, Motion<S>) {
         let (step, lane) = self.plan.place(b);
         (motion(&self.scratch.bodies.v[step], lane), motion(&self.scratch.bodies.a[step], lane))
     }
 
-    /// Returns Iᶜ of body b.
+    /// Returns the composite inertia Iᶜ of body b.
     pub(crate) fn carried<S: Scalar>(self, b: usize) -> Inertia<S> {
         let (step, lane) = self.plan.place(b);
         let Inertia { mass, mass_com, rotational: r } = &self.scratch.bodies.IC[step];
@@ -50,7 +50,8 @@ impl<'d> LaneView<'d> {
 }
 
 fn number<S: Scalar>(x: &Four, lane: usize) -> S {
-    S::splat(lanes(core::slice::from_ref(x))[lane]) // read from memory: must run on any processor
+    // read from memory, as this code must run on processors without vectors too
+    S::splat(lanes(core::slice::from_ref(x))[lane])
 }
 
 fn vector<S: Scalar>(v: &Vec3<Four>, lane: usize) -> Vec3<S> {

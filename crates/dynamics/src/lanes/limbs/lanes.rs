@@ -33,42 +33,42 @@ pub(crate) struct Limbs<'a> {
     geometry: u64,
 }
 
-/// Returns the vectors of which a value consists.
+/// Returns the vector registers of which a value consists.
 ///
 /// # Safety
-/// `T` consists of vectors only: a struct of spatial algebra or of kinematics, all `repr(C)`.
+/// `T` must consist of vectors only: a struct of spatial algebra or of kinematics with `repr(C)`.
 #[inline(always)]
 unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
-    // SAFETY: by the caller.
+    // SAFETY: the caller guarantees that `T` consists of vectors.
     unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(x).cast(), size_of::<T>() / size_of::<Four>()) }
 }
 
-/// Returns the numbers of structs; the numbers of a vector are adjacent.
+/// Returns the numbers of an array of structs; the numbers of each vector are adjacent.
 ///
 /// # Safety
-/// As for `vectors`.
+/// `T` must consist of vectors, as for `vectors`.
 #[inline(always)]
 pub(crate) unsafe fn numbers<T>(of: &[T]) -> &[f64] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
-    // SAFETY: by the caller; a vector consists of its numbers.
+    // SAFETY: the caller guarantees that `T` consists of vectors; a vector consists of numbers.
     unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
 }
 
-/// Returns the numbers of structs, mutably.
+/// Returns the numbers of an array of structs as a mutable slice.
 ///
 /// # Safety
-/// As for `vectors`.
+/// `T` must consist of vectors, as for `vectors`.
 #[inline(always)]
 pub(crate) unsafe fn numbers_mut<T>(of: &mut [T]) -> &mut [f64] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
-    // SAFETY: by the caller; a vector consists of its numbers.
+    // SAFETY: the caller guarantees that `T` consists of vectors; a vector consists of numbers.
     unsafe { core::slice::from_raw_parts_mut(of.as_mut_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
 }
 
 #[inline(always)]
 fn moved<T: Copy>(mut x: T, by: &Move) -> T {
-    // SAFETY: passes store structs of vectors.
+    // SAFETY: `T` consists of vectors, as passes only store structs of vectors.
     let numbers = unsafe { vectors(&mut x) };
     for k in 0..numbers.len() {
         numbers[k] = by.apply::<Gate>(numbers[k]);
@@ -76,13 +76,13 @@ fn moved<T: Copy>(mut x: T, by: &Move) -> T {
     x
 }
 
-/// Sums values of some steps or slots, each number moved to its lane.
+/// Sums values of several steps or slots, after each number has been moved to another lane.
 #[inline(always)]
 fn gathered<T: Copy>(of: &[T], from: &[(usize, Move)]) -> T {
     let mut x = moved(of[from[0].0], &from[0].1);
     for (at, by) in &from[1..] {
         let mut y = moved(of[*at], by);
-        // SAFETY: passes store structs of vectors.
+        // SAFETY: `T` consists of vectors, as passes only store structs of vectors.
         let (x, y) = unsafe { (vectors(&mut x), vectors(&mut y)) };
         for k in 0..x.len() {
             x[k] += y[k];
@@ -161,7 +161,7 @@ impl Layout for Limbs<'_> {
     fn stack_index(&self, i: usize) -> usize {
         i
     }
-    /// Returns all bodies after the last step, and none before.
+    /// Returns all bodies if `i` is the last step, otherwise no bodies.
     #[inline(always)]
     fn subtrees_ending_at(&self, i: usize) -> &[usize] {
         if i + 1 == self.steps.len() { self.closed } else { &[] }
@@ -178,7 +178,7 @@ impl Layout for Limbs<'_> {
     fn sum_lanes<T>(&self, i: usize, x: &mut T) {
         let [first, others @ ..] = &self.steps[i].bodies;
         if others.iter().all(|other| other == first) {
-            // SAFETY: passes store structs of vectors.
+            // SAFETY: `T` consists of vectors, as passes only store structs of vectors.
             let numbers = unsafe { vectors(x) };
             for k in 0..numbers.len() {
                 numbers[k] = sum::<Gate>(numbers[k]);
@@ -202,7 +202,7 @@ impl Layout for Limbs<'_> {
     fn column(&self, i: usize) -> usize {
         self.steps[i].idx_v
     }
-    /// Does nothing: armature torque is added when the lanes' efforts are combined.
+    /// Does nothing: armature torque is added later, when the efforts of all lanes are combined.
     #[inline(always)]
     fn add_armature_torque(&self, _: &[Four], _: &mut [Four]) {}
 }
@@ -229,7 +229,7 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the value at the predecessor of an entry of the support.
+    /// Returns the value of the entry that precedes an entry of the support.
     #[inline(always)]
     pub(crate) fn predecessor<T: Copy>(&self, of: &[T], entry: usize) -> T {
         match &self.predecessors[entry] {
@@ -238,7 +238,7 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the matrix indices of a pair.
+    /// Returns the matrix indices of a pair of columns.
     #[inline(always)]
     pub(crate) fn pair(&self, e: LaneColumn, k: usize) -> &Pair {
         debug_assert!(e.pair + k < self.pairs.len());
@@ -246,14 +246,15 @@ impl<'a> Limbs<'a> {
         unsafe { self.pairs.get_unchecked(e.pair + k) }
     }
 
-    /// Sets the entries of a pair, the first lane's last.
+    /// Sets the matrix entries of a pair of columns. The entry of the first lane is written last, so that it remains if
+    /// several lanes have the same index.
     #[inline(always)]
     fn put(matrix: &mut [FusedF64], at: &[u32; LANES], value: Four) {
         let value = value.to_fused();
         for lane in (0..LANES).rev() {
             debug_assert!((at[lane] as usize) < matrix.len());
-            // SAFETY: a plan's pairs index entries of nv × nv matrices, and all matrices here have this size: see
-            // `clear`.
+            // SAFETY: a plan's pairs are indices of entries in nv × nv matrices. `clear` checks that `matrix` has this
+            // size.
             unsafe { *matrix.get_unchecked_mut(at[lane] as usize) = value[lane] };
         }
     }

@@ -1,4 +1,4 @@
-//! Pass over steps of four bodies.
+//! Scratch of passes over steps of four bodies, and arguments in lanes.
 #![allow(unsafe_code)]
 
 use super::lanes::Four;
@@ -19,7 +19,7 @@ use condyle_spatial::{Array, Force, Inertia, Scalar};
 /// Scratch and results of passes in lanes.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
+    /// Arguments in lanes. Shape: positions, coordinates, coordinates, and steps of the plan. Written by: `load`.
     pub q: Array<Four>,
     pub v: Array<Four>,
     pub x: Array<Four>,
@@ -36,7 +36,7 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// Allocates the scratch for a model with limbs, if the processor supports lanes.
+    /// Allocates the scratch. Returns `None` if the model has no limbs or the processor does not support lanes.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
         let plan = selection::limbs::<S, R>(model)?;
         let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
@@ -75,20 +75,20 @@ impl Scratch {
 pub(crate) struct Arguments<'a, S = FusedF64> {
     pub q: &'a [S],
     pub v: &'a [S],
-    /// Acceleration or effort.
+    /// Accelerations or joint efforts.
     pub x: &'a [S],
     pub f_ext: &'a [Force<S>],
 }
 
 impl<'a, S> Arguments<'a, S> {
-    /// Returns the same numbers as `FusedF64`.
+    /// Returns the same numbers with the type `FusedF64`.
     ///
     /// # Safety
-    /// `S` is `f64`.
+    /// `S` must be `f64`.
     pub(crate) unsafe fn fused(self) -> Arguments<'a> {
-        // SAFETY: by the caller.
+        // SAFETY: the caller guarantees that `S` is `f64`.
         let [q, v, x]: [&[f64]; 3] = unsafe { [same(self.q), same(self.v), same(self.x)] };
-        // SAFETY: as above.
+        // SAFETY: `S` is `f64`, as for the other arguments.
         let f_ext: &[Force<f64>] = unsafe { same(self.f_ext) };
         Arguments { q: q.renamed(), v: v.renamed(), x: x.renamed(), f_ext: f_ext.renamed() }
     }
@@ -125,7 +125,7 @@ pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     }
 }
 
-/// Gathers a vector of the robot into lanes.
+/// Gathers the numbers of a robot's vector x into lanes.
 #[inline(always)]
 fn gather(sources: &[Source], padded: &mut [FusedF64], x: &[FusedF64], to: &mut [Four]) {
     padded[..x.len()].copy_from_slice(x);
@@ -134,7 +134,7 @@ fn gather(sources: &[Source], padded: &mut [FusedF64], x: &[FusedF64], to: &mut 
     for (Source { from: [i, j, k, l], ratio, offset }, to) in sources.iter().zip(to) {
         let number = |at: &usize| {
             debug_assert!(*at < padded.len());
-            // SAFETY: a plan's sources are indices into a vector of the robot, or one past its end.
+            // SAFETY: each source of a plan is an index of a number in x, or x.len(). `padded` is longer than x by one.
             unsafe { padded.get_unchecked(*at) }.0
         };
         let x = Four::from_array([number(i), number(j), number(k), number(l)]);
@@ -142,14 +142,14 @@ fn gather(sources: &[Source], padded: &mut [FusedF64], x: &[FusedF64], to: &mut 
     }
 }
 
-/// Copies a vector in coordinates out of the lanes: the transpose of `gather`.
+/// Copies a vector of coordinates out of the lanes. It is the transpose of `gather`.
 #[inline(always)]
 pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [FusedF64]) {
     let numbers = lanes(from);
     assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         debug_assert!(at < numbers.len());
-        // SAFETY: the plan's indices locate its coordinates in the lanes, and the lanes hold all coordinates.
+        // SAFETY: the plan's indices are valid for the lanes of all coordinates, whose number is checked above.
         *to = FusedF64(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
