@@ -75,11 +75,11 @@ __all__ = [
     "Error",
     "Fddp",
     "FreeDynamics",
+    "FreeInverseDynamics",
     "FrictionCone",
     "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
-    "FreeInverseDynamics",
     "Joint",
     "Limit",
     "Lqr",
@@ -3128,6 +3128,36 @@ class FreeDynamics:
         """Returns the efforts that hold the robot still at the state x, nu numbers."""
 
 @final
+class FreeInverseDynamics:
+    """A knot of a robot whose nv controls are the robot's accelerations: q̈ = u, τ = rnea(q, v, u). Integrator and cost
+    are as for `FreeDynamics`.
+
+    model: the robot.
+    dt: Δt in seconds.
+    costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
+        efforts without actuators.
+    integrator, lower, upper, limits, controls: as for `FreeDynamics`.
+
+    Raises `ProblemError` for a cost or a limit that does not fit the robot.
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        dt: float,
+        costs: Sequence[Cost],
+        integrator: _Scheme = "semi_implicit_euler",
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        limits: Sequence[Limit] | None = None,
+        controls: _Polynomial = "constant",
+    ) -> FreeInverseDynamics: ...
+    @staticmethod
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> FreeInverseDynamics: ...
+    def quasi_static(self, x: ArrayLike) -> _Array:
+        """Returns the accelerations that hold the robot still: nv zeros."""
+
+@final
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper for a force
     f.
@@ -3190,36 +3220,6 @@ class ImpulseDynamics:
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ImpulseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
         """Returns an empty array, since an impact has no controls."""
-
-@final
-class FreeInverseDynamics:
-    """A knot of a robot whose nv controls are the robot's accelerations: q̈ = u, τ = rnea(q, v, u). Integrator and cost
-    are as for `FreeDynamics`.
-
-    model: the robot.
-    dt: Δt in seconds.
-    costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
-        efforts without actuators.
-    integrator, lower, upper, limits, controls: as for `FreeDynamics`.
-
-    Raises `ProblemError` for a cost or a limit that does not fit the robot.
-    """
-
-    def __new__(
-        cls,
-        model: Model,
-        dt: float,
-        costs: Sequence[Cost],
-        integrator: _Scheme = "semi_implicit_euler",
-        lower: ArrayLike | None = None,
-        upper: ArrayLike | None = None,
-        limits: Sequence[Limit] | None = None,
-        controls: _Polynomial = "constant",
-    ) -> FreeInverseDynamics: ...
-    @staticmethod
-    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> FreeInverseDynamics: ...
-    def quasi_static(self, x: ArrayLike) -> _Array:
-        """Returns the accelerations that hold the robot still: nv zeros."""
 
 @final
 class Limit:
@@ -3369,8 +3369,8 @@ class Problem:
         """
 
     def set_knot(self, knot: int, model: _Action) -> None:
-        """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between solves.
-        The solver's next iterations do not allocate.
+        """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between
+        solves. The solver's next iterations do not allocate.
 
         knot: its index, 0 to N − 1.
         model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
@@ -3393,8 +3393,8 @@ class Problem:
         """
 
     def to_json(self) -> str:
-        """Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An infinite bound
-        is written as null.
+        """Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
+        infinite bound is written as null.
 
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
         different robots.
@@ -3554,8 +3554,8 @@ class Sweep:
     knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
     controls.
 
-    Raises `ProblemError` if the shapes of the nodes do not fit together. `run` raises it for a knot with constraint rows, which
-    the sweep does not treat.
+    Raises `ProblemError` if the shapes of the knots do not fit together. `run` raises it for a knot with constraint
+    rows, which the sweep does not treat.
 
     >>> from condyle.optimal import Lqr, Problem, Sweep
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])

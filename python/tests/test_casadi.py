@@ -383,7 +383,8 @@ def test_actions_of_expressions_are_those_that_are_written() -> None:
         np.testing.assert_allclose(solution.xs, solutions[0].xs, rtol=0, atol=ROUNDING)
     for one in nodes:
         for node, expected in zip(one, nodes[0], strict=True):
-            for a, b in zip(node, expected, strict=True):
+            assert node.rows is None and expected.rows is None
+            for a, b in zip(node[:8], expected[:8], strict=True):
                 np.testing.assert_allclose(a, b, rtol=0, atol=1e-12)
 
 

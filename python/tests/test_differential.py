@@ -50,7 +50,8 @@ def test_derivatives_of_calc_are_those_that_were_written(scheme: Any, calc: Any,
     ours = nodes(DifferentialAction(1, 1, calc, 0.1, integrator=scheme))
     expected = nodes(DifferentialAction(1, 1, pendulum, 0.1, pendulum_diff, scheme))
     for one, other in zip(ours, expected, strict=True):
-        for a, b in zip(one, other, strict=True):
+        assert one.rows is None and other.rows is None
+        for a, b in zip(one[:8], other[:8], strict=True):
             np.testing.assert_allclose(a, b, rtol=0, atol=tolerance)
 
 

@@ -296,7 +296,7 @@ def test_tree_shows_who_stands_on_whom() -> None:
 
 def test_help_has_an_index_of_everything() -> None:
     text = condyle.__doc__ or ""
-    index = text[text.index("By theme") :]
+    index = text[text.index("The names by topic") :]
     named = set(re.findall(r"`(\w+)`", index))
     modules = {module.name for module in pkgutil.iter_modules(condyle.__path__) if not module.name.startswith("_")}
     missing = ({name for name in condyle.__all__ if not name.startswith("_")} | modules) - named

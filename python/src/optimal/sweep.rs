@@ -32,10 +32,10 @@ pub(crate) struct Sweep(Vec<LqKnot>);
 #[pymethods]
 impl Sweep {
     #[new]
-    fn new(lq_knots: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
+    fn new(knots: Vec<Bound<'_, PyAny>>) -> PyResult<Self> {
         let read = |(t, knot): (usize, &Bound<'_, PyAny>)| {
             let size = |name: &str| knot.getattr(name).and_then(|part| part.len());
-            let wrong = |error: PyErr| PyValueError::new_err(format!("lq_knots[{t}]: expected an LqKnot: {error}"));
+            let wrong = |error: PyErr| PyValueError::new_err(format!("knots[{t}]: expected an LqKnot: {error}"));
             let most = LqKnot::MOST_SIZE;
             let ndx = within("ndx", size("q").map_err(wrong)?, 1, most)?;
             let nu = within("nu", size("r").map_err(wrong)?, 0, most)?;
@@ -46,18 +46,18 @@ impl Sweep {
             read_rows(&mut to, &knot.getattr("rows")?)?;
             Ok(to)
         };
-        let lq_knots = lq_knots.iter().enumerate().map(read).collect::<PyResult<Vec<_>>>()?;
-        let Some(last) = lq_knots.last() else { return Err(ProblemError::new_err("lq_knots: expected at least one")) };
+        let knots = knots.iter().enumerate().map(read).collect::<PyResult<Vec<_>>>()?;
+        let Some(last) = knots.last() else { return Err(ProblemError::new_err("knots: expected at least one")) };
         if last.nu() > 0 {
-            let (t, nu) = (lq_knots.len() - 1, last.nu());
-            return Err(ProblemError::new_err(format!("lq_knots[{t}]: expected no controls at the end, found {nu}")));
+            let (t, nu) = (knots.len() - 1, last.nu());
+            return Err(ProblemError::new_err(format!("knots[{t}]: expected no controls at the end, found {nu}")));
         }
-        match lq_knots.iter().position(|knot| knot.ndx() != last.ndx()) {
+        match knots.iter().position(|knot| knot.ndx() != last.ndx()) {
             Some(t) => {
-                let (expected, found) = (last.ndx(), lq_knots[t].ndx());
-                Err(ProblemError::new_err(format!("lq_knots[{t}]: expected ndx = {expected}, found {found}")))
+                let (expected, found) = (last.ndx(), knots[t].ndx());
+                Err(ProblemError::new_err(format!("knots[{t}]: expected ndx = {expected}, found {found}")))
             }
-            None => Ok(Self(lq_knots)),
+            None => Ok(Self(knots)),
         }
     }
 
