@@ -107,7 +107,8 @@ pub(crate) fn unpack<S: Block<Number = f64>>(
     scatter_rows(from, &mut parts(to, part)[..count]);
 }
 
-/// Writes a matrix of vectors to rows of `stride` numbers in a part of the data of each knot.
+/// Writes each lane of the matrix `from` to the data of one knot: to the slice that `part` selects, in rows of `stride`
+/// numbers.
 pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     from: &Strided<'_, S>,
     to: &mut [KnotData],
@@ -118,18 +119,18 @@ pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     scatter_matrix(from, &mut parts(to, part)[..count], stride);
 }
 
-/// Memory in which something computes, made when it is first needed, so that an action costs little to make and to
-/// merge with others. A copy makes its own: what was computed in it is not part of what is copied.
+/// Workspace that is allocated when it is first needed, so that actions are cheap to make and to merge. A copy starts
+/// without a workspace: its content is not copied.
 #[derive(Debug)]
 pub(crate) struct OnDemand<T>(Option<Box<T>>);
 
 impl<T> OnDemand<T> {
-    /// Returns the memory; `make` makes it where it is not there.
+    /// Returns the workspace; `make` creates it if it does not exist.
     pub(crate) fn get(&mut self, make: impl FnOnce() -> T) -> &mut T {
         self.0.get_or_insert_with(|| Box::new(make()))
     }
 
-    /// Returns the memory, if it is there.
+    /// Returns the workspace, if it exists.
     pub(crate) fn made(&self) -> Option<&T> {
         self.0.as_deref()
     }
