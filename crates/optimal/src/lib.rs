@@ -31,9 +31,9 @@
 //!   has controls.
 //! - Derivatives are taken in the tangent space: A = ∂φ/∂x is ndx × ndx, whatever nx is.
 //! - The gap at a knot is f = φ(x, u) ⊖ x⁺; at the start x̂₀ ⊖ x₀. A warm start may have gaps.
-//! - The feedback around a trajectory x̄, ū is u = ū + α k + K (x ⊖ x̄), with step length α, feed-forward k and gains
-//!   K. In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and Crocoddyl's `SolverFDDP` produce the same
-//!   iterates.
+//! - The feedback is u = ū + α k + K (x ⊖ x̄). Here x̄, ū is the trajectory, α the step length, k the feed-forward and
+//!   K the gains. In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and Crocoddyl's `SolverFDDP` produce
+//!   the same iterates.
 //! - Problems, solvers and solutions are `Send` and `Sync`. A problem is copied by [`Problem::try_clone`].
 //! - A wrong shape inside a program panics at the caller's line, with the argument's name. A wrong problem, warm start
 //!   or setting is an [`Error`] before a solve begins. The outcome of a solve is its [`Status`].

@@ -23,8 +23,7 @@ pub struct Actuation {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Map {
-    /// S = [0; 1]: no control drives the first coordinates, whose number is given; one control drives each other
-    /// coordinate.
+    /// Number of undriven coordinates, which are the first ones: S = [0; 1]. Each other coordinate has one control.
     After(usize),
     /// Any matrix S, nv × nu.
     Matrix(DMatrix<f64>),
@@ -84,8 +83,8 @@ impl Actuation {
         }
     }
 
-    /// Returns the number of undriven coordinates if they are the first ones and one control drives each other
-    /// coordinate; otherwise `None`.
+    /// Returns the number of undriven coordinates if these are the first coordinates and each other coordinate has one
+    /// control; otherwise `None`.
     pub(super) fn passive(&self) -> Option<usize> {
         match self.map {
             Map::After(passive) => Some(passive),
@@ -123,7 +122,7 @@ impl Actuation {
         }
     }
 
-    /// Computes g_u += c (X S)_row for one row of a matrix X = ∂y/∂τ with nv columns.
+    /// Computes g_u += c (X S)_row, where (X S)_row is row `row` of X S and X = ∂y/∂τ has nv columns.
     pub(super) fn add_product_row(&self, X: &DMatrix<f64>, row: usize, c: f64, g_u: &mut [f64]) {
         let (rows, X) = (X.nrows(), X.as_slice());
         match &self.map {
@@ -180,7 +179,7 @@ impl Actuation {
             }
             Map::Matrix(_) => {}
         }
-        // Gram–Schmidt orthonormalisation, the longest column first; it ends when only rounding errors are left
+        // Gram–Schmidt orthonormalisation, the longest column first; the loop ends when only rounding errors are left
         let mut basis = Vec::new();
         loop {
             let squares: Vec<_> = left.column_iter().map(|column| column.norm_squared()).collect();

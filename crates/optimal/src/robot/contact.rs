@@ -5,12 +5,12 @@ use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings
 use condyle_spatial::Scalar;
 use core::ops::Range;
 
-/// Contact of a frame with the world, with a name by which residuals refer to it.
+/// Contact of a frame with the world. Residuals refer to the contact by its name.
 ///
 /// The constraint holds the origin of a frame ([`ContactConstraint::point`]) or the whole frame
-/// ([`ContactConstraint::rigid`]). It also has the axes of its rows and its force, and the gains of its stabilisation.
-/// Crocoddyl's `ContactModel3D` and `ContactModel6D` are these two constraints with `gains = [kp, kd]`. Crocoddyl's
-/// `WORLD` is `LocalWorldAligned` here. Crocoddyl's `ContactModel1D` and `ContactModel2D` are
+/// ([`ContactConstraint::rigid`]). The constraint also has the axes for its rows and its force, and the gains of the
+/// stabilisation. Crocoddyl's `ContactModel3D` and `ContactModel6D` are these two constraints with `gains = [kp, kd]`.
+/// Crocoddyl's `WORLD` is `LocalWorldAligned` here. Crocoddyl's `ContactModel1D` and `ContactModel2D` are
 /// [`ContactConstraint::line`] and [`ContactConstraint::plane`].
 ///
 /// ```
@@ -40,8 +40,8 @@ impl Contact {
     }
 }
 
-/// Damping for contacts whose forces are given. It only makes the check accept several contacts on one body; nothing is
-/// computed with it.
+/// Damping for contacts whose forces are given. A damping above 0 makes the check accept several contacts on one body;
+/// no result depends on this value.
 pub(super) const SHARED: f64 = 1.0;
 
 /// Returns the constraints of `contacts`, with the damping μ in J M⁻¹ Jᵀ + μ 1.

@@ -127,8 +127,8 @@ pub trait ContinuousModel: Send + Sync + 'static {
         let _ = (dq, by_q, by_dq);
     }
 
-    /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`, whose
-    /// state is δ and whose control is ε, nv numbers each. Only the blocks of the [`groups`](Self::groups) are read.
+    /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`. There δ
+    /// is the state and ε the control, with nv numbers each. Only the blocks of the [`groups`](Self::groups) are read.
     /// Returns whether these derivatives were computed. By default they are not: with groups, solvers then treat a step
     /// as linear, even if [`second_order`](crate::Settings::second_order) is set.
     fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {

@@ -34,8 +34,8 @@ impl CostMut<'_> {
     /// Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the residual has no target or a target of another kind, if the length of the reference
-    /// changes, if a number is not finite, or if a matrix is not a rotation.
+    /// [`Error::Cost`] if the residual has no target or a target of another kind, or if the length of the reference
+    /// changes. Also if a number is not finite, or a matrix is not a rotation.
     pub fn set_target<'t>(&mut self, target: impl Into<Target<'t>>) -> Result<(), Error> {
         let target = target.into();
         let wrong = |what| Error::Cost { name: self.cost.name.clone(), what };
@@ -69,8 +69,8 @@ impl CostMut<'_> {
 }
 
 impl Costs {
-    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if it does not
-    /// exist.
+    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if no term has
+    /// this name.
     pub fn cost_mut(&mut self, name: &str) -> Option<CostMut<'_>> {
         let k = self.terms().iter().position(|cost| cost.name == name)?;
         let Self { model, capabilities, terms } = self;
@@ -108,8 +108,9 @@ impl Problem {
         terms_of(self.chosen(index)?)?.costs_mut(None).cost_mut(name)
     }
 
-    /// Returns the cost called `name` of knot t, or of the terminal knot for t = N. It is the knot's own cost if the
-    /// knot has its own costs, else the cost of its model, which other knots share. `None` if the cost does not exist.
+    /// Returns the cost called `name` of knot t, or of the terminal knot for t = N. If knot t has separate costs, the
+    /// result is one of these; otherwise it is a cost of the knot's model, which other knots share. `None` if the cost
+    /// does not exist.
     ///
     /// # Panics
     /// If t > N.

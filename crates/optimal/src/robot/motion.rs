@@ -120,7 +120,8 @@ impl Problem {
         self.motion_at(t, solution.x(t), u)
     }
 
-    /// Computes the same as [`motion`](Self::motion), from a state x and controls u of knot t. At t = N, u is empty.
+    /// Computes the same as [`motion`](Self::motion) at knot t, but from a given state x and given controls u. At t =
+    /// N, u is empty.
     ///
     /// # Panics
     /// If t > N, or x or u has a wrong length.

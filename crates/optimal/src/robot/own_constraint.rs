@@ -6,9 +6,9 @@ use crate::error::Error;
 use crate::problem::leave_a_value;
 use nalgebra::DMatrix;
 
-/// [`PathConstraint`] lower ≤ r(t, x, u) ≤ upper on a user-defined residual r, with the same bounds at every knot. It
-/// is for actions that are not knots of a robot. Knots of a robot accept a [`Limit`](crate::robot::Limit) of the same
-/// residual, which takes less time.
+/// [`PathConstraint`] lower ≤ r(t, x, u) ≤ upper on a user-defined residual r, with the same bounds at every knot. Use
+/// this constraint for actions that are not knots of a robot. Knots of a robot accept a [`Limit`](crate::robot::Limit)
+/// of the same residual, which takes less time.
 ///
 /// ```
 /// use condyle_dynamics::robots;

@@ -73,7 +73,8 @@ impl GroupHessian {
             for (delta, &dq) in delta.iter_mut().zip(dq) {
                 *delta = LaneDual::splat(dq);
             }
-            // E has one block for each group, so one coordinate of each group is differentiated at the same time
+            // E has a separate block for each group: one coordinate of each group can be differentiated in the same
+            // call
             for group in groups.iter().filter(|group| k < group.len()) {
                 delta[group.start + k].eps = 1.0;
             }

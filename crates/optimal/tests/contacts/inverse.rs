@@ -170,7 +170,7 @@ pub(super) fn standing(model: &Model) -> Vec<f64> {
 }
 
 /// Quasi-static contact forces hold the robot still: the undriven efforts of the base are 0, and the joint efforts
-/// equal those of forward dynamics.
+/// equal the efforts of forward dynamics.
 #[test]
 fn forces_hold_the_robot_still() {
     let model = Arc::new(robots::quadruped());

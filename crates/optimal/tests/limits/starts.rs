@@ -1,5 +1,5 @@
-//! Warm starts outside the bounds, or far from any solution: the result is within the bounds, or its status reports
-//! that it is not.
+//! Warm starts outside the bounds, or far from any solution: the result is within the bounds, or the status reports a
+//! failure.
 
 use super::{ARM, quadratic};
 use condyle_dynamics::{ContactConstraint as Held, Model, ReferenceFrame, Vec3, neutral, robots};
@@ -19,8 +19,8 @@ fn control() -> Residual {
     Residual::Control { reference: vec![0.0; 7] }
 }
 
-/// Creates the problem of an arm that ends at `end`, with its efforts bounded directly or by limits. Also returns the
-/// efforts that hold the arm still.
+/// Creates the problem of an arm with the terminal action `end`. Efforts are bounded by limits if `limits` is set,
+/// otherwise by control bounds. Also returns the efforts that hold the arm still.
 fn arm(limits: bool, end: FreeDynamics) -> (Problem, Vec<f64>) {
     let costs =
         vec![quadratic("rest", 0.1, Residual::State { reference: ARM.to_vec() }), quadratic("effort", 1e-3, control())];

@@ -57,7 +57,7 @@ pub(crate) enum DynamicsKind {
 pub(crate) struct Group<'a> {
     /// Indices of the knots.
     pub knots: &'a [usize],
-    /// States of the knots, one after the other; so are the controls in `us`.
+    /// States of the knots, one after the other; `us` has the controls of the knots.
     pub xs: &'a [f64],
     pub us: &'a [f64],
     pub what: Evaluation<'a>,
@@ -77,10 +77,10 @@ impl<'a> Group<'a> {
 pub(crate) enum Pass<S> {
     None,
     Free,
-    /// Constraints, and their Jacobian J. Shape: rows × nv.
+    /// Constraints of the contacts, and the Jacobian J of these constraints. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, Matrix<S>),
     Inverse,
-    /// Constraints and their Jacobian J, as in [`Self::Contact`].
+    /// Constraints of the contacts, and the Jacobian J of these constraints. Shape: rows × nv.
     ContactInverse(Box<ConstraintSet<S>>, Matrix<S>),
 }
 
@@ -93,7 +93,7 @@ pub(crate) struct KnotBatch<S> {
     residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
-    /// Output that the controls drive: the efforts τ, or the accelerations q̈ if these are controls.
+    /// Output that the controls drive: the efforts τ, or the accelerations q̈ if accelerations are controls.
     tau: Vec<S>,
     a: Vec<S>,
     lambda: Vec<S>,
@@ -136,7 +136,8 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 
     /// Computes the dynamics of the knots of `group` from the efforts or accelerations in the data of each knot. Also
-    /// computes kinematic residuals of the knots whose residuals are alike the first knot's.
+    /// computes the quantities that residuals read, at the knots whose residuals differ from the first knot's only in
+    /// targets.
     pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: &HorizonTerms, to: &mut [KnotData]) {
         self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
@@ -259,7 +260,8 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.run_residuals(model, group, terms, to);
     }
 
-    /// Computes the quantities that residuals read, at the knots whose residuals are alike the first knot's.
+    /// Computes the quantities that residuals read, at the knots whose residuals differ from the first knot's only in
+    /// targets.
     fn run_residuals(
         &mut self,
         model: &Model,
@@ -291,7 +293,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 }
 
-/// Linear equations of several knots, one knot in each lane.
+/// Linear equations of several knots, with one lane for each knot.
 #[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
@@ -300,7 +302,7 @@ struct LinearEquations<S> {
     tableau: Vec<S>,
     /// Tableau before an elimination.
     before: Vec<S>,
-    /// Inverses B⁻¹ of all blocks of an elimination; `Y` has the matrix Y of one block.
+    /// Inverses B⁻¹ of all blocks of an elimination; `Y` is the matrix Y = B⁻¹ J of one block.
     inverses: Vec<S>,
     Y: Vec<S>,
 }

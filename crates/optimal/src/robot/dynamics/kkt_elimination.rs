@@ -54,7 +54,7 @@ impl Tableau {
 #[derive(Debug)]
 pub(crate) struct KktElimination {
     tableau: Tableau,
-    /// Number of undriven coordinates, which are the first ones.
+    /// Number of undriven coordinates; the first coordinates are the undriven ones.
     passive: usize,
     /// Coordinates that each row of a contact prefers to be solved for.
     preferred: Vec<Vec<usize>>,
@@ -66,7 +66,8 @@ pub(crate) struct KktElimination {
     late: Vec<usize>,
     /// Pivots for which `place` and `runs` were computed.
     laid_out: Vec<usize>,
-    /// For each column of δa and δf: its index among the unknowns, or the row of D or `forces` that gives its value.
+    /// For each column of δa and δf: the index of the unknown that the column is, or the row of D or `forces` that
+    /// gives its value.
     place: Vec<Place>,
     /// Maps from the columns of δa, and from the columns of δf, to the indices of unknowns.
     runs: [Runs; 2],
@@ -203,7 +204,8 @@ impl KktElimination {
             }
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
-            // scale with which entries are compared to detect a dependent row; entries of contact rows are of order one
+            // a row whose pivot is small relative to `scale` depends on other rows; entries of contact rows are of
+            // order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = self.choose(r, row, scale) else { return false };
             self.place[k] = Place::Row(r);

@@ -1,10 +1,10 @@
-//! Elimination in the equations of several knots in contact, one knot in each lane: first of the limb of each contact,
-//! then of the base.
+//! Elimination of unknowns from the equations of several knots in contact, with one lane for each knot: first the limb
+//! of each contact, then the base.
 //!
-//! In the tableau of [`kkt_elimination`](super::kkt_elimination) the rows of a contact have entries for the base, for
-//! the joints between base and limb, and for the limb, whose joints move no other contact. Let B be the block of the
-//! limb's joints. If B is square, the rows are solved for these joints, which are then eliminated from the equations of
-//! motion:
+//! The tableau is described in [`kkt_elimination`](super::kkt_elimination). The rows of a contact have entries for the
+//! base, for the limb, and for joints between both. The joints of the limb move no other contact. Let B be the block of
+//! the limb's joints. If B is square, the rows are solved for these joints, which are then eliminated from the
+//! equations of motion:
 //!
 //! ```text
 //! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i of the equations that the limb is in

@@ -32,7 +32,7 @@ use std::sync::Arc;
 /// Token with which this crate may name vector types.
 struct Gate;
 
-// SAFETY: vectors are used only by the kernels of `condyle_dynamics`, and by code that is entered in the same way.
+// SAFETY: vectors are used only by the kernels of `condyle_dynamics`, and by code that is entered as these kernels are.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Gate {}
 
@@ -59,7 +59,7 @@ pub(crate) struct RobotDynamics {
     work: OnDemand<Work>,
 }
 
-/// Returns the robot of an action; if the action wraps another action, the robot of that one.
+/// Returns the robot of an action; if the action wraps another action, the robot of the wrapped action.
 pub(crate) fn robot_of(action: &mut dyn ActionModel) -> Option<&mut RobotDynamics> {
     innermost(action)?.dynamics()?.downcast_mut()
 }
@@ -242,7 +242,7 @@ impl RobotDynamics {
         Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
     }
 
-    /// Returns the contacts, in the order of their forces in λ.
+    /// Returns the contacts, in the order in which λ has their forces.
     pub(crate) fn contacts(&self) -> &[Contact] {
         match &self.kind {
             DynamicsKind::Contact(contacts, _)
@@ -276,7 +276,7 @@ impl RobotDynamics {
         Parts { model, actuation, terms, capabilities, groups, work }
     }
 
-    /// Moves the costs and limits of `other` here if it is a robot with the same dynamics. Returns whether the dynamics
+    /// Moves the costs and limits of `other` to this robot if both have the same dynamics. Returns whether the dynamics
     /// are the same.
     pub(crate) fn merge(&mut self, other: &mut Self, place: Option<usize>) -> bool {
         let same = Arc::ptr_eq(&self.model, &other.model)
@@ -376,8 +376,9 @@ impl RobotDynamics {
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
 
-    /// Returns the number of accelerations and forces from which the equations of inverse dynamics start, and the
-    /// maximum numbers of dependent coordinates and of rows of costs; `None` without such equations.
+    /// Returns sizes for the equations of inverse dynamics: the number of accelerations and forces at which they are
+    /// evaluated, the maximum number of dependent coordinates, and the maximum number of rows of costs. Returns `None`
+    /// without such equations.
     pub(crate) fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         let layout = self.terms.layout(); // Hessians without rows are in Q, S and R, with respect to the controls
         let elimination = self.work.made()?.elimination.as_ref()?;

@@ -8,8 +8,8 @@ use crate::robot::residuals::rows::Row;
 
 /// Derivatives of the outputs of a knot, computed from the derivatives in the knot's data.
 pub(crate) struct DynamicsSensitivities<'a> {
-    /// Output that equals S u. If it is the acceleration, it equals the first nv controls; contact forces follow as
-    /// further controls.
+    /// Output that equals S u. If this output is the acceleration, it equals the first nv controls; the other controls
+    /// are contact forces.
     pub given: Output,
     pub data: &'a KnotData,
     pub actuation: &'a Actuation,

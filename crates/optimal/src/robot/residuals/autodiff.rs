@@ -8,10 +8,9 @@ use condyle_spatial::Scalar;
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Residual r(t, x, u) of a robot that is written for any [`Scalar`], so that [`OwnResidual::autodiff`] differentiates
-/// it.
+/// Residual r(t, x, u) of a robot, written for any [`Scalar`], so that [`OwnResidual::autodiff`] can differentiate r.
 ///
-/// Mark `calc` with `#[inline(always)]`: it is then compiled for the vector registers in which the Jacobian is
+/// Mark `calc` with `#[inline(always)]`: `calc` is then compiled for the vector registers in which the Jacobian is
 /// computed.
 pub trait GenericResidual: Any + Send + Sync {
     /// Returns the number of entries of r.

@@ -114,8 +114,8 @@ impl FrictionCone {
     /// Checks the numbers of the cone. Problems that contain the cone also make this check.
     ///
     /// # Errors
-    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation
-    /// is invalid, or no normal force satisfies the bounds.
+    /// [`Error::Cone`] if μ is negative or not finite, or if the number of sides is odd, below 4 or above 1000. Also if
+    /// the rotation is invalid, or no normal force satisfies the bounds.
     pub fn check(&self) -> Result<(), Error> {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }

@@ -1,4 +1,5 @@
-//! Layout of the residuals of a knot: how each residual is computed, what it reads, and where its numbers are stored.
+//! Layout of the residuals of a knot: how each residual is computed, which quantities it reads, and where its entries
+//! are stored.
 #![allow(non_snake_case)] // W
 
 use super::residual::{Part, Residual};
@@ -14,7 +15,7 @@ pub(crate) struct Plan {
     pub n: usize,
     /// Number of entries of all terms before this one.
     pub first: usize,
-    /// Index of a kinematic residual among the kinematic residuals of its knot.
+    /// Index of a kinematic residual among the kinematic residuals of the knot.
     pub index: usize,
     /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
@@ -156,7 +157,7 @@ pub(crate) const STRIDE: usize = 8;
 /// Number of entries of the Jacobian of a residual for each coordinate: six rows with respect to v and q.
 pub(crate) const ROWS: usize = 12;
 
-/// Quantities that the residuals of a knot read; those that its terms do not require are not written.
+/// Quantities that the residuals of a knot read. Quantities that no term of the knot requires are not written.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ResidualData {
     /// Kinematic residuals of costs, then of limits.
@@ -173,7 +174,7 @@ pub(crate) struct ResidualData {
     pub is_written: bool,
 }
 
-/// Kinematic residuals and the rows of their Jacobians, stored by the `index` of their plans.
+/// Kinematic residuals and the rows of their Jacobians. Each residual is stored at the `index` of its plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KinematicData {
     pub r: Vec<f64>,

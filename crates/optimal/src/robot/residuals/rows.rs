@@ -1,5 +1,5 @@
 //! Rows of the Jacobians of residuals. All rows of a knot are collected. Then the gradient and the Gauss–Newton Hessian
-//! are written once, with each entry of Q, S and R as a sum of products of row entries.
+//! are written once. Each entry of Q, S and R is a sum of products of row entries.
 #![allow(non_snake_case)] // names of matrices follow the literature
 
 use crate::lq::LqKnot;

@@ -16,7 +16,7 @@ use nalgebra::DMatrix;
 /// Workspace of the residuals of a knot.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Residual r; `d` and `dd` have the gradient and the diagonal of the Hessian of its objective.
+    /// Residual r. `d` is the gradient and `dd` the diagonal of the Hessian of the residual's objective.
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
