@@ -39,7 +39,7 @@ pub enum Error {
     /// The terminal model has controls, which only earlier knots may have.
     #[error("terminal: expected an action without controls (a robot's has no duration), found one of nu = {nu}")]
     TerminalControls {
-        /// Number of its controls.
+        /// Number of controls of the terminal model.
         nu: usize,
     },
 
@@ -83,7 +83,7 @@ pub enum Error {
     NotFinite {
         /// Name of the argument.
         name: &'static str,
-        /// Index in the flat argument.
+        /// Index of the entry in the flat list of all knots.
         index: usize,
         /// Value of the entry.
         value: f64,
@@ -96,7 +96,7 @@ pub enum Error {
         name: &'static str,
         /// Index of the knot.
         knot: usize,
-        /// Description of the fault, with the numbers.
+        /// Description of the fault, including the invalid numbers.
         what: String,
     },
 
@@ -142,7 +142,7 @@ pub enum Error {
     Cost {
         /// Name of the term.
         name: String,
-        /// Description of the fault, with the numbers.
+        /// Description of the fault, including the invalid numbers.
         what: String,
     },
 
@@ -151,32 +151,32 @@ pub enum Error {
     Limit {
         /// Name of the limit.
         name: String,
-        /// Index of the knot, if the limit belongs to one.
+        /// Index of the knot, if the limit belongs to a single knot.
         knot: Option<usize>,
-        /// Description of the fault, with the numbers.
+        /// Description of the fault, including the invalid numbers.
         what: String,
     },
 
     /// A friction or wrench cone is invalid.
     #[error("cone: {what}")]
     Cone {
-        /// Description of the fault, with the numbers.
+        /// Description of the fault, including the invalid numbers.
         what: String,
     },
 
-    /// A contact does not fit the robot, or the contacts before it.
+    /// A contact does not fit the robot, or conflicts with a contact before it.
     #[error("contact `{name}`: {what}")]
     Contact {
         /// Name of the contact, or of a quantity that all contacts share.
         name: String,
-        /// Description of the fault, with the numbers.
+        /// Description of the fault, including the invalid numbers.
         what: String,
     },
 
-    /// The drives do not fit the robot, or the robot cannot be driven.
+    /// The actuation does not fit the robot, or the robot cannot be driven.
     #[error("actuation: {what}")]
     Actuation {
-        /// Description of the fault, with the numbers.
+        /// Description of the fault, including the invalid numbers.
         what: String,
     },
 
@@ -206,12 +206,12 @@ pub enum Error {
     },
 }
 
-/// Names the knot of an error.
+/// Returns the end of an error message that names the knot; empty without a knot.
 fn at(knot: Option<usize>) -> String {
     knot.map_or_else(String::new, |t| format!(" of knot {t}"))
 }
 
-/// Names the argument of [`Problem::new`](crate::Problem::new) that an error is about.
+/// Returns the name of the faulty model in the arguments of [`Problem::new`](crate::Problem::new).
 fn model_name(model: Option<usize>) -> String {
     model.map_or_else(|| "terminal".to_owned(), |index| format!("models[{index}]"))
 }
@@ -239,7 +239,8 @@ impl Error {
     }
 }
 
-/// Panics with the argument's name if its length is wrong. For calls inside a program; also checked in release builds.
+/// Panics, also in release builds, with the argument's name if its length is wrong. A wrong length is a fault of the
+/// calling program.
 #[track_caller]
 pub(crate) fn assert_length(name: &str, found: usize, expected: usize) {
     assert!(found == expected, "`{name}` has length {found}, expected {expected}");

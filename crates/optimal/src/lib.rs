@@ -13,24 +13,27 @@
 //!   value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
-//! - [`AugmentedLagrangian`] repeats this until general constraints hold: the constraints of [`Constrained`] actions
-//!   and a robot's [`Limit`](robot::Limit)s.
+//! - [`AugmentedLagrangian`] repeats such solves until general constraints hold: the constraints of [`Constrained`]
+//!   actions and a robot's [`Limit`](robot::Limit)s.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
 //! - [`AutoDiff`] turns dynamics and a cost that are written for any scalar into an action with exact derivatives by
 //!   dual numbers. [`AutoDiffConstraint`] does the same for a path constraint, [`robot::OwnResidual::autodiff`] for a
 //!   robot's residual.
 //! - [`NumDiff`] differentiates any action by finite differences: a reference for tests of hand-written derivatives.
 //!
-//! Only the module [`robot`] depends on robots. Everywhere else a state is a list of nx numbers, on which an action may
-//! define ⊕ and ⊖ ([`integrate`](ActionModel::integrate), [`difference`](ActionModel::difference)), with ndx numbers
-//! for a change.
+//! Only the module [`robot`] depends on robots. In all other modules a state is a list of nx numbers, and a change of a
+//! state has ndx numbers. An action may define how a change is added to a state, ⊕
+//! ([`integrate`](ActionModel::integrate)), and how two states are subtracted, ⊖
+//! ([`difference`](ActionModel::difference)).
 //!
 //! # Conventions
-//! - Trajectories are flat: x₀ … x_N one after the other, then u₀ … u_{N−1}, each with the nu of its knot.
-//! - Derivatives are taken in the tangent space: A is ndx × ndx, whatever nx is.
+//! - Trajectories are flat: x₀ … x_N one after the other, then u₀ … u_{N−1}, each with as many numbers (nu) as its knot
+//!   has controls.
+//! - Derivatives are taken in the tangent space: A = ∂φ/∂x is ndx × ndx, whatever nx is.
 //! - The gap at a knot is f = φ(x, u) ⊖ x⁺; at the start x̂₀ ⊖ x₀. A warm start may have gaps.
-//! - The feedback is u = ū + α k + K (x ⊖ x̄). In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and
-//!   Crocoddyl's `SolverFDDP` produce the same iterates.
+//! - The feedback is u = ū + α k + K (x ⊖ x̄). Here x̄, ū is the trajectory, α the step length, k the feed-forward and
+//!   K the gains. In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and Crocoddyl's `SolverFDDP` produce
+//!   the same iterates.
 //! - Problems, solvers and solutions are `Send` and `Sync`. A problem is copied by [`Problem::try_clone`].
 //! - A wrong shape inside a program panics at the caller's line, with the argument's name. A wrong problem, warm start
 //!   or setting is an [`Error`] before a solve begins. The outcome of a solve is its [`Status`].

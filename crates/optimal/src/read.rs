@@ -1,5 +1,5 @@
-//! Matrices from files of serde's formats, as nalgebra writes them: (numbers column after column, rows, columns). The
-//! number of entries must equal rows × columns.
+//! Matrices in files, as nalgebra writes them with serde: the entries column after column, then the numbers of rows and
+//! columns. The number of entries must equal rows × columns.
 
 use crate::lq::LqKnot;
 use nalgebra::DMatrix;

@@ -1,4 +1,4 @@
-//! Clock of a solve: the system's, or in a browser, where Rust lacks one, a clock given by the host.
+//! Clock of a solve: the clock of the system. In a browser Rust has no clock, so the host provides one.
 
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 mod host;

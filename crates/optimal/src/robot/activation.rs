@@ -18,47 +18,48 @@ pub enum Activation {
     Quadratic,
     /// ½ Σ wᵢ rᵢ².
     Weighted(
-        /// w, a number of at least 0 for each entry of the residual.
+        /// Weights w: a number of at least 0 for each entry of the residual.
         Vec<f64>,
     ),
-    /// ½ Σ (excess of rᵢ over its bounds)²: nothing inside them.
+    /// ½ Σ (excess of rᵢ over its bounds)²; zero inside the bounds.
     Barrier {
-        /// Least values; −∞ for none.
+        /// Lower bounds; −∞ for an entry without a lower bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
         lower: Vec<f64>,
-        /// Greatest values; ∞ for none.
+        /// Upper bounds; ∞ for an entry without an upper bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
         upper: Vec<f64>,
     },
-    /// ½ Σ wᵢ (excess of rᵢ over its bounds)². (Crocoddyl has the square of wᵢ in its value.)
+    /// ½ Σ wᵢ (excess of rᵢ over its bounds)². (In Crocoddyl the value contains wᵢ² instead of wᵢ.)
     WeightedBarrier {
-        /// Least values; −∞ for none.
+        /// Lower bounds; −∞ for an entry without a lower bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
         lower: Vec<f64>,
-        /// Greatest values; ∞ for none.
+        /// Upper bounds; ∞ for an entry without an upper bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
         upper: Vec<f64>,
-        /// w, numbers of at least 0.
+        /// Weights w: a number of at least 0 for each entry of the residual.
         weights: Vec<f64>,
     },
-    /// Σ rᵢ: of a number that is a cost by itself. Its Gauss–Newton Hessian is zero: what there is comes from the
-    /// residual ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
+    /// Σ rᵢ, for a residual that is itself a cost. The Gauss–Newton Hessian of this activation is zero; only the
+    /// residual contributes second derivatives
+    /// ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
     Sum,
     /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
     Smooth1 {
-        /// ε, above 0; 1 in Crocoddyl unless given.
+        /// Smoothing ε, above 0; the default of Crocoddyl is 1.
         epsilon: f64,
     },
-    /// √(ε + ‖r‖²): nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least eigenvalue of the exact
-    /// one (for ε = 1 as in Crocoddyl).
+    /// √(ε + ‖r‖²): nearly ‖r‖. Its Hessian is approximated by ε/a³ times the identity, with the value a of the
+    /// activation. The factor ε/a³ is the smallest eigenvalue of the exact Hessian (for ε = 1 as in Crocoddyl).
     Smooth2 {
-        /// ε, above 0; 1 in Crocoddyl unless given.
+        /// Smoothing ε, above 0; the default of Crocoddyl is 1.
         epsilon: f64,
     },
 }
 
 impl Activation {
-    /// a(r).
+    /// Returns the value a(r).
     ///
     /// # Panics
     /// If a weight or bound for an entry of r is missing.
@@ -73,7 +74,7 @@ impl Activation {
         sum
     }
 
-    /// Panics if there is no weight or bound for some of n entries.
+    /// Panics if a weight or bound is missing for one of n entries.
     #[track_caller]
     fn assert_fits(&self, n: usize) {
         let found = match self {
@@ -88,7 +89,7 @@ impl Activation {
         );
     }
 
-    /// Writes a′ᵢ and a″ᵢ, the gradient and the diagonal of the Hessian.
+    /// Computes the gradient a′ᵢ into `d` and the diagonal a″ᵢ of the Hessian into `dd`.
     pub(super) fn derivatives(&self, r: &[f64], d: &mut [f64], dd: &mut [f64]) {
         let (d, dd) = (&mut d[..r.len()], &mut dd[..r.len()]);
         match self {
@@ -101,12 +102,12 @@ impl Activation {
         }
     }
 
-    /// Calls a function for each entry of r with its part of the value, and that part's derivatives, for sums over
-    /// entries.
+    /// Calls `visit` for each entry rᵢ with the entry's term of the activation and the first and second derivative of
+    /// this term. Only for activations that are sums over entries.
     #[inline(always)]
     fn each(&self, r: &[f64], mut visit: impl FnMut(usize, [f64; 3])) {
         let beyond = |i: usize, lower: &[f64], upper: &[f64]| {
-            let e = (r[i] - lower[i]).min(0.0) + (r[i] - upper[i]).max(0.0); // with its sign
+            let e = (r[i] - lower[i]).min(0.0) + (r[i] - upper[i]).max(0.0); // negative below the lower bound
             [0.5 * e * e, e, f64::from(u8::from(e != 0.0))]
         };
         let entries = 0..r.len();
@@ -126,7 +127,7 @@ impl Activation {
         }
     }
 
-    /// Returns a message for what does not fit a residual of n numbers.
+    /// Returns an error message if this activation is invalid or does not fit a residual of n numbers.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
             true if numbers.iter().any(|x| x.is_nan()) => Some(format!("its {name} holds a NaN")),

@@ -1,13 +1,13 @@
-//! Actuation: what efforts of the joints the controls make.
+//! Actuation: the linear map from controls to joint efforts.
 
 use crate::Error;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// Length below which a direction is rounding, relative to the longest direction.
+/// Length, relative to the longest direction, below which a direction counts as rounding error.
 const LEAST: f64 = 1e-9;
 
-/// τ = S u: how the controls drive the joints.
+/// Linear map τ = S u from controls u to joint efforts τ.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -23,14 +23,15 @@ pub struct Actuation {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Map {
-    /// S = [0; 1]: all coordinates but the first ones, each by one control.
+    /// Number of undriven coordinates, which are the first ones: S = [0; 1]. Each other coordinate has one control.
     After(usize),
-    /// Any S, nv × nu.
+    /// Any matrix S, nv × nu.
     Matrix(DMatrix<f64>),
 }
 
 impl Actuation {
-    /// Creates drives of every joint by its own controls, except a free-flyer at the root, which is not driven.
+    /// Creates the actuation with one control for each coordinate, except a free-flyer at the root, which is not
+    /// driven.
     pub fn joints(model: &Model) -> Self {
         let passive = match model.bodies().get(1) {
             Some(root) if root.joint == Joint::FreeFlyer => 6,
@@ -39,10 +40,10 @@ impl Actuation {
         Self { nv: model.nv(), map: Map::After(passive) }
     }
 
-    /// Any linear map S, nv × nu: rotors, tendons, joints without motors.
+    /// Creates the actuation with any matrix S, nv × nu, for example for rotors, tendons or joints without motors.
     ///
     /// # Errors
-    /// [`Error::Actuation`] if S does not have nv rows or a number in it is not finite.
+    /// [`Error::Actuation`] if S does not have nv rows or has an entry that is not finite.
     pub fn matrix(model: &Model, S: DMatrix<f64>) -> Result<Self, Error> {
         let (rows, columns) = S.shape();
         if rows != model.nv() {
@@ -55,7 +56,7 @@ impl Actuation {
         Ok(Self { nv: rows, map: Map::Matrix(S) })
     }
 
-    /// Refuses drives of another robot.
+    /// Returns an error if this actuation does not have as many coordinates as the robot.
     pub(super) fn check(&self, model: &Model) -> Result<(), Error> {
         let (found, nv) = (self.nv, model.nv());
         match found == nv {
@@ -64,12 +65,12 @@ impl Actuation {
         }
     }
 
-    /// Returns a drive for each coordinate.
+    /// Returns the actuation with one control for each coordinate.
     pub(super) fn all(model: &Model) -> Self {
         Self { nv: model.nv(), map: Map::After(0) }
     }
 
-    /// No drives.
+    /// Returns the actuation without controls.
     pub(super) fn none(model: &Model) -> Self {
         Self { nv: model.nv(), map: Map::After(model.nv()) }
     }
@@ -82,8 +83,8 @@ impl Actuation {
         }
     }
 
-    /// Returns the number of coordinates, the first ones, that nothing drives, if each of the others has a control of
-    /// its own.
+    /// Returns the number of undriven coordinates if these are the first coordinates and each other coordinate has one
+    /// control; otherwise `None`.
     pub(super) fn passive(&self) -> Option<usize> {
         match self.map {
             Map::After(passive) => Some(passive),
@@ -91,7 +92,7 @@ impl Actuation {
         }
     }
 
-    /// τ = S u.
+    /// Computes the joint efforts τ = S u into `tau`.
     pub(super) fn effort(&self, u: &[f64], tau: &mut [f64]) {
         tau.fill(0.0);
         match &self.map {
@@ -104,7 +105,7 @@ impl Actuation {
         }
     }
 
-    /// (Sᵀ τ)ₖ.
+    /// Returns (Sᵀ τ)ₖ, the share of the efforts τ along control k.
     pub(super) fn along(&self, k: usize, tau: &[f64]) -> f64 {
         match &self.map {
             Map::After(passive) => tau[passive + k],
@@ -112,7 +113,7 @@ impl Actuation {
         }
     }
 
-    /// g_u += c S_row: the gradient of the effort of one coordinate, times c.
+    /// Computes g_u += c S_row, where S_row is the gradient of the effort of coordinate `row` with respect to u.
     pub(super) fn add_row(&self, row: usize, c: f64, g_u: &mut [f64]) {
         match &self.map {
             Map::After(passive) if row < *passive => {}
@@ -121,7 +122,7 @@ impl Actuation {
         }
     }
 
-    /// g_u += c Σ X[row, i] S_i for the row of a matrix with nv columns, X = ∂y/∂τ.
+    /// Computes g_u += c (X S)_row, where (X S)_row is row `row` of X S and X = ∂y/∂τ has nv columns.
     pub(super) fn add_product_row(&self, X: &DMatrix<f64>, row: usize, c: f64, g_u: &mut [f64]) {
         let (rows, X) = (X.nrows(), X.as_slice());
         match &self.map {
@@ -139,7 +140,8 @@ impl Actuation {
         }
     }
 
-    /// X S, rows × nu, column after column, of a matrix X with nv columns; in `scratch` unless S selects.
+    /// Returns X S (rows × nu, column after column) for a matrix X with nv columns. The result is in `scratch`, or a
+    /// slice of X if each control drives one coordinate.
     pub(super) fn columns<'a>(&self, X: &'a DMatrix<f64>, scratch: &'a mut [f64]) -> &'a [f64] {
         let (rows, X) = (X.nrows(), X.as_slice());
         match &self.map {
@@ -156,7 +158,7 @@ impl Actuation {
         }
     }
 
-    /// Returns the scratch that `columns` needs for nv rows.
+    /// Returns the workspace that `columns` needs for a matrix X with nv rows.
     pub(super) fn scratch(&self) -> Vec<f64> {
         match &self.map {
             Map::After(_) => Vec::new(),
@@ -164,8 +166,8 @@ impl Actuation {
         }
     }
 
-    /// Returns an orthonormal basis of the efforts that no control makes, row after row: Nᵀ with Nᵀ S = 0, unit vectors
-    /// where S selects.
+    /// Returns an orthonormal basis of the joint efforts that no control can produce: Nᵀ with Nᵀ S = 0, row after row.
+    /// The rows are unit vectors if each control drives one coordinate.
     pub(super) fn undriven(&self) -> Vec<f64> {
         let nv = self.nv;
         let mut left = DMatrix::identity(nv, nv);
@@ -177,7 +179,7 @@ impl Actuation {
             }
             Map::Matrix(_) => {}
         }
-        // Gram and Schmidt, the longest first; a projection has columns of length 1, or of rounding
+        // Gram–Schmidt orthonormalisation, the longest column first; the loop ends when only rounding errors are left
         let mut basis = Vec::new();
         loop {
             let squares: Vec<_> = left.column_iter().map(|column| column.norm_squared()).collect();
@@ -189,7 +191,7 @@ impl Actuation {
         }
     }
 
-    /// Returns the smallest (u, λ) that comes nearest to S u + Jᵀλ = τ.
+    /// Returns the least-squares solution (u, λ) of S u + Jᵀλ = τ that has the smallest norm.
     pub(super) fn quasi_static(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
         let nu = self.nu();
         let mut map = DMatrix::zeros(self.nv, nu + J.nrows());

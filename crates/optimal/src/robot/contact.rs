@@ -1,17 +1,17 @@
-//! Contacts of a knot, by name, and what makes a set of them singular.
+//! Named contacts of a knot, and the check that contacts are not singular together.
 
 use crate::Error;
 use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings};
 use condyle_spatial::Scalar;
 use core::ops::Range;
 
-/// Contact of a frame with the world, and the name by which residuals call it.
+/// Contact of a frame with the world. Residuals refer to the contact by its name.
 ///
-/// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it
-/// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its
-/// stabilisation. Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is
-/// `LocalWorldAligned` here. Its `ContactModel1D` and `ContactModel2D` are [`ContactConstraint::line`] and
-/// [`ContactConstraint::plane`].
+/// The constraint holds the origin of a frame ([`ContactConstraint::point`]) or the whole frame
+/// ([`ContactConstraint::rigid`]). The constraint also has the axes for its rows and its force, and the gains of the
+/// stabilisation. Crocoddyl's `ContactModel3D` and `ContactModel6D` are these two constraints with `gains = [kp, kd]`.
+/// Crocoddyl's `WORLD` is `LocalWorldAligned` here. Crocoddyl's `ContactModel1D` and `ContactModel2D` are
+/// [`ContactConstraint::line`] and [`ContactConstraint::plane`].
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
@@ -27,9 +27,9 @@ use core::ops::Range;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Contact {
-    /// Name by which residuals call it.
+    /// Name by which residuals refer to the contact.
     pub name: String,
-    /// Constraint that it imposes.
+    /// Constraint that the contact imposes.
     pub constraint: ContactConstraint,
 }
 
@@ -40,10 +40,11 @@ impl Contact {
     }
 }
 
-/// Damping for contacts whose forces are given, which may share them as they like: it is not used.
+/// Damping for contacts whose forces are given. A damping above 0 makes the check accept several contacts on one body;
+/// no result depends on this value.
 pub(super) const SHARED: f64 = 1.0;
 
-/// Returns the constraints of some contacts, with the damping μ of J M⁻¹ Jᵀ + μ 1.
+/// Returns the constraints of `contacts`, with the damping μ in J M⁻¹ Jᵀ + μ 1.
 pub(super) fn constraint_set<S: Scalar>(
     model: &Model,
     contacts: &[Contact],
@@ -56,7 +57,7 @@ pub(super) fn constraint_set<S: Scalar>(
     Ok(set)
 }
 
-/// Returns an error of the constraints of some contacts, with the contact's name.
+/// Converts an error about a constraint into an error that names the contact.
 fn named(contacts: &[Contact], error: condyle_dynamics::Error) -> Error {
     match error {
         condyle_dynamics::Error::Constraint { constraint, what } => {
@@ -66,14 +67,15 @@ fn named(contacts: &[Contact], error: condyle_dynamics::Error) -> Error {
     }
 }
 
-/// Refuses contacts of which there can be no set.
+/// Returns an error for contacts that cannot form a set of constraints.
 pub(super) fn check_contacts(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     check_together(model, contacts, damping)?;
     let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
     ConstraintSet::<f64>::check_all(model, &constraints).map_err(|error| named(contacts, error))
 }
 
-/// Refuses contacts that are named twice or are singular together, and damping that is no number of at least 0.
+/// Returns an error if two contacts have the same name or are singular together, or if the damping is negative or not
+/// finite.
 fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     if !(damping >= 0.0 && damping.is_finite()) {
         return Err(Error::Contact { name: "damping".to_owned(), what: format!("μ is {damping}, not at least 0") });
@@ -88,10 +90,11 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
             return wrong(format!("there is no frame {}; the robot has {}", c.frame, model.frames().len()));
         };
         if c.other.is_some() {
-            continue; // a loop
+            continue; // a closed loop between two bodies
         }
-        // Two contacts on one body are singular: even two points leave only five rows of six that say something, and
-        // points on a line never hold the turn about it. Damping shares the forces. Single directions may fit together.
+        // Two contacts on one body are singular: only five of the six rows of two points are independent, because
+        // points on a line do not prevent the rotation about this line. With damping, the contacts share the forces.
+        // Constraints of one or two directions may be independent, so they are accepted.
         let directions = |c: &ContactConstraint| c.kind.rows() < 3;
         let same = |other: &&Contact| {
             other.constraint.other.is_none()
@@ -110,7 +113,7 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
     Ok(())
 }
 
-/// Returns the names of contacts, and the rows of each in λ.
+/// Returns the name of each contact, and the rows of λ that belong to it.
 pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     let mut row = 0;
     let rows = contacts.iter().map(|Contact { name, constraint }| {
@@ -120,7 +123,7 @@ pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     rows.collect()
 }
 
-/// Returns the coordinates that move each row of all contacts.
+/// Returns, for each row of all contacts, the coordinates that move the frames of its contact.
 pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     let rows = contacts.iter().flat_map(|Contact { constraint, .. }| {
         let frames = [Some(constraint.frame), constraint.other].into_iter().flatten();
@@ -129,7 +132,7 @@ pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     rows.collect()
 }
 
-/// Returns the coordinates that move some frames, in order.
+/// Returns the coordinates that move at least one of the frames, in increasing order.
 pub(super) fn coordinates_of(model: &Model, frames: impl IntoIterator<Item = usize>) -> Vec<usize> {
     let mut coordinates = Vec::new();
     for frame in frames {
@@ -140,7 +143,7 @@ pub(super) fn coordinates_of(model: &Model, frames: impl IntoIterator<Item = usi
     coordinates
 }
 
-/// Returns the coordinates of a body's joint and of those before it, up to the world.
+/// Returns the coordinates of all joints between a body and the world.
 pub(super) fn path(model: &Model, body: usize) -> Vec<usize> {
     let (mut path, mut body) = (Vec::new(), body);
     while body > 0 {

@@ -5,13 +5,13 @@ use core::any::Any;
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// Dynamics in continuous time: q̈ = a(q, v, u), ℓ̇ = ℓ(x, u), with x = (q, v).
+/// Dynamics in continuous time: acceleration q̈ = a(q, v, u) and cost ℓ(x, u) per second, with x = (q, v).
 ///
-/// [`Integrated`](super::Integrated) makes a knot of it. The models of a robot are
+/// [`Integrated`](super::Integrated) makes a knot from such dynamics. The models of a robot are
 /// [`FreeAcceleration`](super::FreeAcceleration), [`ContactAcceleration`](super::ContactAcceleration),
 /// [`ControlledAcceleration`](super::ControlledAcceleration) and
-/// [`ControlledContactAcceleration`](super::ControlledContactAcceleration). Write your own for anything that moves with
-/// accelerations.
+/// [`ControlledContactAcceleration`](super::ControlledContactAcceleration). Implement this trait for any other system
+/// that moves with accelerations.
 ///
 /// ```
 /// use condyle_optimal::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};
@@ -56,15 +56,15 @@ pub trait ContinuousModel: Send + Sync + 'static {
     /// Returns the number of controls.
     fn nu(&self) -> usize;
 
-    /// Computes a(x, u) (nv numbers) and ℓ(x, u).
+    /// Returns the acceleration a(x, u), nv numbers, and the cost ℓ(x, u) per second.
     fn calc(&mut self, input: KnotInput<'_>) -> (&[f64], f64);
 
-    /// Computes the derivatives of a, and the derivatives of `scale` · ℓ into q, r, Q, S, R of the knot, which are
-    /// overwritten.
+    /// Returns the derivatives of the acceleration a. Overwrites q, r, Q, S and R of the knot with the derivatives of
+    /// `scale` · ℓ, where ℓ is the cost per second.
     fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_>;
 
-    /// Computes the second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, for nv numbers `mu`; returns
-    /// the first derivatives of a. By default `None`: a then counts as linear, even if
+    /// Computes the second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, with μ = `mu` (nv numbers).
+    /// Returns the first derivatives of the acceleration a. By default `None`: solvers then treat a as linear, even if
     /// [`second_order`](crate::Settings::second_order) is set.
     fn hessian(&mut self, input: KnotInput<'_>, mu: &[f64], hessian: &mut Hessian) -> Option<Derivatives<'_>> {
         let _ = (input, mu, hessian);
@@ -75,19 +75,21 @@ pub trait ContinuousModel: Send + Sync + 'static {
     /// [`ActionModel::shift`](crate::ActionModel::shift). Does nothing by default.
     fn shift(&mut self) {}
 
-    /// Passes to `show`, with their names, the vectors that the dynamics compute; by default `acceleration`.
+    /// Calls `show` with the name and the numbers of each vector that the dynamics compute; by default only
+    /// `acceleration`.
     fn outputs(&mut self, input: KnotInput<'_>, show: &mut dyn FnMut(&str, &[f64])) {
         show("acceleration", self.calc(input).0);
     }
 
-    /// Returns the controls that hold a state still, from statics. By default `None`: Newton steps then find them.
+    /// Returns the controls that hold the state x still, computed from statics. By default `None`: Newton steps then
+    /// find these controls.
     fn quasi_static(&mut self, x: &[f64]) -> Option<Vec<f64>> {
         let _ = x;
         None
     }
 
-    /// Returns a copy that computes the same: see [`ActionModel::try_clone`](crate::ActionModel::try_clone). By default
-    /// `None`.
+    /// Returns a copy that computes the same results: see [`ActionModel::try_clone`](crate::ActionModel::try_clone). By
+    /// default `None`.
     fn try_clone(&self) -> Option<Self>
     where
         Self: Sized,
@@ -104,18 +106,18 @@ pub trait ContinuousModel: Send + Sync + 'static {
     /// Checks a position, for example the length of a quaternion. All positions are valid by default.
     ///
     /// # Errors
-    /// The fault, with the numbers.
+    /// A description of the fault, including the invalid numbers.
     fn check_position(&self, q: &[f64]) -> Result<(), String> {
         let _ = q;
         Ok(())
     }
 
-    /// Computes q ⊕ δq into `out` (nq).
+    /// Computes q ⊕ δq into `out` (nq numbers).
     fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
         (0..out.len()).for_each(|k| out[k] = q[k] + dq[k]);
     }
 
-    /// Computes q₁ ⊖ q₀ into `out` (nv).
+    /// Computes q₁ ⊖ q₀ into `out` (nv numbers).
     fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
         (0..out.len()).for_each(|k| out[k] = q1[k] - q0[k]);
     }
@@ -125,22 +127,22 @@ pub trait ContinuousModel: Send + Sync + 'static {
         let _ = (dq, by_q, by_dq);
     }
 
-    /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`, with
-    /// respect to δ (its state) and ε (its control), nv numbers each. Only the blocks of the [`groups`](Self::groups)
-    /// are read. Returns whether it did so. By default it does not: with groups, a step then counts as linear, even if
-    /// [`second_order`](crate::Settings::second_order) is set.
+    /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`. There δ
+    /// is the state and ε the control, with nv numbers each. Only the blocks of the [`groups`](Self::groups) are read.
+    /// Returns whether these derivatives were computed. By default they are not: with groups, solvers then treat a step
+    /// as linear, even if [`second_order`](crate::Settings::second_order) is set.
     fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let _ = (dq, lambda, hessian);
         false
     }
 
-    /// Returns the dynamics of a robot, whose knots are computed in groups.
+    /// Returns the dynamics if they belong to a robot: the knots of a robot are computed in groups.
     #[doc(hidden)]
     fn robot(&self) -> Option<&dyn Any> {
         None
     }
 
-    /// Returns the same robot as [`robot`](Self::robot), for computing.
+    /// Returns the same dynamics as [`robot`](Self::robot), as a mutable reference.
     #[doc(hidden)]
     fn robot_mut(&mut self) -> Option<&mut dyn Any> {
         None
@@ -151,7 +153,7 @@ pub trait ContinuousModel: Send + Sync + 'static {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct KnotInput<'a> {
-    /// Index t.
+    /// Index t of the knot.
     pub t: usize,
     /// State x.
     pub x: &'a [f64],

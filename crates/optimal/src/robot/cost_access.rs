@@ -1,4 +1,4 @@
-//! Access to the costs of a problem's robots by their names, to change targets, weights and activations in place.
+//! Access to the costs of the robots in a problem by name, to change targets, weights and activations in place.
 
 use super::activation::Activation;
 use super::costs::{Cost, Costs, check_weight};
@@ -8,7 +8,8 @@ use super::residuals::target::Target;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
 
-/// Cost term of a robot's knots, to be changed between solves. What does not fit is refused and changes nothing.
+/// Cost term of a robot's knots that may be changed between solves. A change that does not fit the robot or the
+/// residual is an error and has no effect.
 #[derive(Debug)]
 pub struct CostMut<'a> {
     cost: &'a mut Cost,
@@ -24,17 +25,17 @@ impl CostMut<'_> {
         self.cost
     }
 
-    /// Returns the target of its residual; `None` if that has none.
+    /// Returns the target of the residual; `None` if the residual has no target.
     pub fn target(&self) -> Option<Target<'_>> {
         self.cost.residual.target()
     }
 
-    /// Sets the target of its residual: a position, a placement, a reference of as many numbers as before. Allocates
-    /// nothing.
+    /// Sets the target of the residual: a position, a placement, or a reference with as many numbers as before.
+    /// Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the residual has no target or one of another kind, for a reference of another length, numbers
-    /// that are not finite, and what is no rotation.
+    /// [`Error::Cost`] if the residual has no target or a target of another kind, or if the length of the reference
+    /// changes. Also if a number is not finite, or a matrix is not a rotation.
     pub fn set_target<'t>(&mut self, target: impl Into<Target<'t>>) -> Result<(), Error> {
         let target = target.into();
         let wrong = |what| Error::Cost { name: self.cost.name.clone(), what };
@@ -56,7 +57,8 @@ impl CostMut<'_> {
     /// Sets the activation.
     ///
     /// # Errors
-    /// [`Error::Cost`] if its weights or bounds do not have as many numbers as the residual, or make no sense.
+    /// [`Error::Cost`] if the weights or bounds of the activation are invalid or do not have as many numbers as the
+    /// residual.
     pub fn set_activation(&mut self, activation: Activation) -> Result<(), Error> {
         if let Some(what) = activation.wrong(self.n) {
             return Err(Error::Cost { name: self.cost.name.clone(), what });
@@ -67,8 +69,8 @@ impl CostMut<'_> {
 }
 
 impl Costs {
-    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if it does not
-    /// exist.
+    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if no term has
+    /// this name.
     pub fn cost_mut(&mut self, name: &str) -> Option<CostMut<'_>> {
         let k = self.terms().iter().position(|cost| cost.name == name)?;
         let Self { model, capabilities, terms } = self;
@@ -77,16 +79,16 @@ impl Costs {
     }
 }
 
-/// Returns the costs and limits of the robot of an action.
+/// Returns the costs and limits of an action's robot; `None` if the action has no robot.
 fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
     Some(&mut robot_of(action)?.terms)
 }
 
-/// Access to the costs of robots, whatever the dynamics and integrator of a knot, under
-/// [`Constrained`](crate::Constrained) actions too.
+/// Access to the costs of robots with any dynamics and any integrator, also inside [`Constrained`](crate::Constrained)
+/// actions.
 impl Problem {
-    /// Returns the cost called `name` of the model `index`, which all knots of that model share that have no costs of
-    /// their own; `None` if there is no such model or cost, or the model is not of a robot.
+    /// Returns the cost called `name` of the model `index`. All knots of this model share the cost, except knots with
+    /// separate costs. `None` if the model or the cost does not exist, or the model has no robot.
     ///
     /// ```
     /// use condyle_dynamics::{Vec3, robots};
@@ -106,8 +108,9 @@ impl Problem {
         terms_of(self.chosen(index)?)?.costs_mut(None).cost_mut(name)
     }
 
-    /// Returns the cost called `name` of knot t, or of the terminal knot for t = N. It is the knot's own cost if
-    /// the knot has its own costs, else the cost of its model, which other knots share. `None` if it does not exist.
+    /// Returns the cost called `name` of knot t, or of the terminal knot for t = N. If knot t has separate costs, the
+    /// result is one of these; otherwise it is a cost of the knot's model, which other knots share. `None` if the cost
+    /// does not exist.
     ///
     /// # Panics
     /// If t > N.
@@ -121,11 +124,11 @@ impl Problem {
         terms_of(action)?.costs_mut(Some(t)).cost_mut(name)
     }
 
-    /// Calls a function with each cost called `name`: of all models, of knots with costs of their own, and of the
-    /// terminal one. Returns whether there is one.
+    /// Calls `change` with each cost called `name`: in the costs of all models, of knots with separate costs, and of
+    /// the terminal knot. Returns whether such a cost exists.
     ///
     /// # Errors
-    /// The first error of the function; costs that it has changed before keep the change.
+    /// The first error of `change`. Costs that were changed before this error stay changed.
     pub fn change_costs(
         &mut self,
         name: &str,

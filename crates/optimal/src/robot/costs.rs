@@ -31,10 +31,11 @@ impl Cost {
     }
 }
 
-/// Sum of terms, called by their names.
+/// Sum of cost terms, each with a name.
 ///
-/// Derivatives are exact; second derivatives are Gauss–Newton's, w (∂r)ᵀ a″ ∂r. Kinematics that several terms look at
-/// are computed once for a knot, and only where a Jacobian is not zero is anything added.
+/// First derivatives are exact. Second derivatives are the Gauss–Newton approximation w (∂r)ᵀ a″ ∂r, with weight w,
+/// residual r and activation a. Kinematics that several terms need are computed once for each knot. Known zeros of
+/// Jacobians are skipped.
 #[derive(Clone, Debug)]
 pub struct Costs {
     pub(super) model: Arc<Model>,
@@ -53,7 +54,7 @@ impl Term for Cost {
 }
 
 impl Cost {
-    /// Returns the plan of the residual, or what does not fit.
+    /// Returns the plan of the residual, or an error if the term does not fit the robot.
     fn plan(&self, model: &Model, capabilities: &Capabilities) -> Result<Plan, Error> {
         let wrong = |what: String| Error::Cost { name: self.name.clone(), what };
         let plan = Plan::new(model, capabilities, &self.residual).map_err(wrong)?;
@@ -62,8 +63,8 @@ impl Cost {
     }
 }
 
-/// Refuses the weight of the term called `name` if it is negative or not finite: solvers minimise, and take Hessians of
-/// costs to be positive semidefinite.
+/// Returns an error if the weight of the term called `name` is negative or not finite: solvers minimise, and assume
+/// that Hessians of costs are positive semidefinite.
 pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
     if weight >= 0.0 && weight.is_finite() {
         return Ok(());
@@ -72,7 +73,7 @@ pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
     Err(Error::Cost { name: name.to_owned(), what })
 }
 
-/// Factor times w a(r).
+/// Weighted activations w a(r), times a factor that all terms share.
 pub(super) struct WeightedActivations(pub f64);
 
 impl Objective<Cost> for WeightedActivations {
@@ -87,7 +88,7 @@ impl Objective<Cost> for WeightedActivations {
 }
 
 impl Costs {
-    /// Returns the sum of some terms for a robot whose dynamics have some capabilities.
+    /// Creates the sum of the terms `costs`. `capabilities` are the outputs of the robot's dynamics.
     pub(super) fn new(model: Arc<Model>, capabilities: Arc<Capabilities>, costs: Vec<Cost>) -> Result<Self, Error> {
         for (k, cost) in costs.iter().enumerate() {
             if costs[..k].iter().any(|other| other.name == cost.name) {
@@ -111,18 +112,18 @@ impl Costs {
     /// Changes the weight of the term called `name`, between solves; returns whether it exists.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the weight is negative or not finite; the old one then stays.
+    /// [`Error::Cost`] if the weight is negative or not finite; the old weight then stays.
     pub fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
         check_weight(name, weight)?;
         let cost = self.terms.all_mut().iter_mut().find(|cost| cost.name == name);
         Ok(cost.map(|cost| cost.weight = weight).is_some())
     }
 
-    /// Changes what the term called `name` reads, between solves: its target, for example. Allocates.
+    /// Replaces the residual of the term called `name` between solves, for example to change its target. Allocates.
     ///
     /// # Errors
-    /// [`Error::Cost`] if there is no such term, the residual does not fit the robot, or it has another number of
-    /// entries than the one before.
+    /// [`Error::Cost`] if the term does not exist, the residual does not fit the robot, or the residual has another
+    /// number of entries than the old one.
     pub fn set_residual(&mut self, name: &str, residual: Residual) -> Result<(), Error> {
         let wrong = |what: &str| Error::Cost { name: name.to_owned(), what: what.to_owned() };
         let there = self.terms().iter().position(|cost| cost.name == name);

@@ -1,4 +1,4 @@
-//! Horizon: which costs and limits belong to which knot, for all models that one action represents.
+//! Costs and limits of each knot of a horizon, for all models that one action represents.
 
 use super::costs::{Cost, Costs, WeightedActivations, check_weight};
 use super::knot_data::{KnotState, Sensitivities};
@@ -13,19 +13,19 @@ use crate::problem::MOST_KNOTS;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Value for each model that an action stands for, and which of them serves which knot.
+/// One value for each model that an action represents, and the index of each knot's model.
 #[derive(Clone, Debug)]
 pub(crate) struct PerModel<T> {
     /// Value of each model.
     all: Vec<T>,
-    /// Index of the model that serves each knot; 0 beyond its end.
+    /// Index of each knot's model; knots beyond the end of this list have model 0.
     of: Vec<usize>,
-    /// Model that is to be changed.
+    /// Index of the model that setters change.
     chosen: usize,
 }
 
 impl<T> PerModel<T> {
-    /// Returns the value of a single model.
+    /// Creates the value of a single model.
     pub(crate) fn new(only: T) -> Self {
         Self { all: vec![only], of: Vec::new(), chosen: 0 }
     }
@@ -35,7 +35,7 @@ impl<T> PerModel<T> {
         &self.all
     }
 
-    /// Returns all values, to be changed.
+    /// Returns all values as a mutable slice.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all
     }
@@ -45,17 +45,17 @@ impl<T> PerModel<T> {
         self.of.get(t).and_then(|&model| self.all.get(model)).unwrap_or(&self.all[0])
     }
 
-    /// Returns the value of the model that is to be changed.
+    /// Returns the value of the chosen model, which setters change.
     pub(crate) fn chosen_mut(&mut self) -> &mut T {
         &mut self.all[self.chosen]
     }
 
-    /// Chooses the model that is to be changed.
+    /// Chooses the model that setters change.
     pub(crate) fn choose(&mut self, model: usize) {
         self.chosen = model.min(self.all.len() - 1);
     }
 
-    /// Takes over the value of another action's model, as model `place` or as a new one.
+    /// Moves the value of another action's model here, as model `place` or as a new model.
     pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         match (place, other.all.pop()) {
             (Some(place), Some(value)) => self.all[place] = value,
@@ -63,7 +63,7 @@ impl<T> PerModel<T> {
         }
     }
 
-    /// Assigns knot t, of `horizon` knots, to a model. Allocates at the first call only.
+    /// Assigns a model to knot t of a horizon with `horizon` knots. Allocates at the first call only.
     pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         if self.all.len() > 1 {
             self.of.resize(horizon, 0);
@@ -72,19 +72,19 @@ impl<T> PerModel<T> {
     }
 }
 
-/// One value for all knots of a horizon, and others for some of them.
+/// Values of the knots of a horizon: one common value, and separate values for single knots.
 #[derive(Clone, Debug)]
 pub(crate) struct PerKnot<T> {
-    /// Value that knots share, followed by the values of single knots.
+    /// Common value, followed by the separate values of single knots.
     all: Vec<T>,
-    /// Index of the value of each knot; 0 beyond its end.
+    /// Index in `all` of each knot's value; knots beyond the end of this list have index 0, the common value.
     of: Vec<usize>,
-    /// Indices of values whose knots have left the horizon.
+    /// Indices in `all` of values whose knots have left the horizon; new values overwrite them.
     free: Vec<usize>,
 }
 
 impl<T> PerKnot<T> {
-    /// Returns a value for all knots.
+    /// Creates the common value of all knots.
     pub(crate) fn new(common: T) -> Self {
         Self { all: vec![common], of: Vec::new(), free: Vec::new() }
     }
@@ -98,7 +98,7 @@ impl<T> PerKnot<T> {
         &self.all
     }
 
-    /// Returns all values, to be changed.
+    /// Returns all values as a mutable slice.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all
     }
@@ -108,13 +108,13 @@ impl<T> PerKnot<T> {
         &self.all[self.index(Some(t))]
     }
 
-    /// Returns the value of knot t, or the value that knots without their own share.
+    /// Returns the value of knot t; for `None`, the common value.
     pub(crate) fn at_mut(&mut self, t: Option<usize>) -> &mut T {
         let k = self.index(t);
         &mut self.all[k]
     }
 
-    /// Sets the value of knot t, or the value that knots without their own share.
+    /// Sets the value of knot t; for `None`, the common value.
     pub(crate) fn set(&mut self, t: Option<usize>, value: T) {
         let Some(t) = t else {
             self.all[0] = value;
@@ -130,7 +130,7 @@ impl<T> PerKnot<T> {
             Some(old) => *old = value,
             None => {
                 self.all.push(value);
-                self.free.reserve(self.all.len()); // so that a shift need not
+                self.free.reserve(self.all.len()); // so that `shift` does not allocate
             }
         }
     }
@@ -151,14 +151,14 @@ pub(crate) struct HorizonTerms {
     capabilities: Arc<Capabilities>,
     costs: PerModel<PerKnot<Costs>>,
     pub limits: Limits,
-    /// Memory that costs of any knot take, and that limits do.
+    /// Memory layouts of costs and of limits, each large enough for every knot.
     layouts: [KnotLayout; 2],
-    /// Made when it is first needed, and forgotten when the layouts grow.
+    /// Workspace of residuals, made when it is first needed and replaced when the layouts change.
     scratch: Option<Box<Scratch>>,
 }
 
 impl HorizonTerms {
-    /// Terms of a horizon with the same costs at all knots, and no limits.
+    /// Creates the terms of a horizon with the same costs at all knots, and no limits.
     pub(crate) fn new(model: Arc<Model>, capabilities: Capabilities, costs: Vec<Cost>) -> Result<Self, Error> {
         let capabilities = Arc::new(capabilities);
         let costs = Costs::new(model.clone(), capabilities.clone(), costs)?;
@@ -167,23 +167,23 @@ impl HorizonTerms {
         Ok(Self { costs, limits: Limits::none(), layouts, scratch: None, capabilities, model })
     }
 
-    /// Adds limits that hold at every knot, in addition to the given limits.
+    /// Sets the limits that the dynamics require at every knot, in addition to the user's limits.
     pub(crate) fn require(&mut self, limits: Vec<Limit>) -> Result<(), Error> {
         self.limits = Limits::asked_for(limits);
         self.set_limits(None, Vec::new())
     }
 
-    /// Returns the costs of knot t, or the costs that knots without their own share.
+    /// Returns the costs of knot t; for `None`, the common costs of all knots without separate costs.
     pub(crate) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
         self.costs.chosen_mut().at_mut(t)
     }
 
-    /// Returns the costs that knots share, and the costs of single knots.
+    /// Returns the common costs, then the separate costs of single knots.
     pub(crate) fn all_costs_mut(&mut self) -> impl Iterator<Item = &mut Costs> {
         self.costs.chosen_mut().all_mut().iter_mut()
     }
 
-    /// Changes the weights of the terms called `name`, of all knots; returns whether it exists.
+    /// Changes the weight of the term called `name` in the costs of all knots. Returns whether any knot has this term.
     pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
         check_weight(name, weight)?;
         let mut found = false;
@@ -193,7 +193,7 @@ impl HorizonTerms {
         Ok(found)
     }
 
-    /// Gives knot t costs of its own.
+    /// Sets separate costs for knot t, which replace the common costs there.
     pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         Error::check_size("knot", t, MOST_KNOTS)?;
         let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs).map_err(|error| match error {
@@ -205,7 +205,7 @@ impl HorizonTerms {
         Ok(())
     }
 
-    /// Gives knot t limits of its own, or all knots that have none of their own.
+    /// Sets the limits of knot t; for `None`, the common limits of all knots without separate limits.
     pub(crate) fn set_limits(&mut self, t: Option<usize>, limits: Vec<Limit>) -> Result<(), Error> {
         Error::check_size("knot", t.unwrap_or(0), MOST_KNOTS)?;
         self.limits.set(&self.model, &self.capabilities, t, limits)?;
@@ -219,7 +219,7 @@ impl HorizonTerms {
         self.set_layouts([costs, self.limits.layout()]);
     }
 
-    /// Sets the layouts; the scratch is renewed where there was one.
+    /// Sets the layouts. If they differ from the old ones, an existing scratch is replaced.
     fn set_layouts(&mut self, layouts: [KnotLayout; 2]) {
         if self.layouts != layouts {
             self.layouts = layouts;
@@ -229,26 +229,26 @@ impl HorizonTerms {
         }
     }
 
-    /// Makes the scratch, unless it is there.
+    /// Allocates the scratch, unless it already exists.
     pub(crate) fn reserve(&mut self) {
         let Self { model, capabilities, layouts, scratch, .. } = self;
         scratch.get_or_insert_with(|| Box::new(Scratch::new(model, capabilities.nu, layouts[0] + layouts[1])));
     }
 
-    /// Takes over the costs and limits of another action with the same dynamics, as model `place` or as a new model.
+    /// Moves the costs and limits of another action with the same dynamics here, as model `place` or as a new model.
     pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         self.costs.append(&mut other.costs, place);
         self.limits.append(&mut other.limits, place);
         self.set_layouts([0, 1].map(|k| self.layouts[k].or(other.layouts[k])));
     }
 
-    /// Selects the model that is to be changed.
+    /// Selects the model that setters change.
     pub(crate) fn choose(&mut self, model: usize) {
         self.costs.choose(model);
         self.limits.choose(model);
     }
 
-    /// Assigns knot t, of `horizon` knots, to one of the models that the action represents.
+    /// Assigns one of the models of this action to knot t of a horizon with `horizon` knots.
     pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.costs.serve(t, horizon, model);
         self.limits.serve(t, horizon, model);
@@ -260,22 +260,22 @@ impl HorizonTerms {
         self.limits.shift();
     }
 
-    /// Returns the memory that costs of any knot take, and that limits do.
+    /// Returns the memory layouts of costs and of limits, each large enough for every knot.
     pub(crate) fn layouts(&self) -> [KnotLayout; 2] {
         self.layouts
     }
 
-    /// Returns the memory that costs and limits of any knot take together.
+    /// Returns the memory layout of costs and limits together, large enough for every knot.
     pub(crate) fn layout(&self) -> KnotLayout {
         self.layouts[0] + self.layouts[1]
     }
 
-    /// Returns the costs of knot t, and its limits if it is `limited`.
+    /// Returns the costs of knot t and, if `limited`, the limits of knot t.
     pub(crate) fn at(&self, t: usize, limited: bool) -> KnotTerms<'_> {
         KnotTerms([&self.costs.at(t).at(t).terms, self.limits.at(t, limited)])
     }
 
-    /// Computes ℓ at knot t, and the term of its limits if it is `limited`.
+    /// Computes the cost ℓ of knot t and, if `limited`, the term of the knot's limits in the augmented Lagrangian.
     pub(crate) fn calc(&mut self, t: usize, state: KnotState<'_>, limited: bool) -> (f64, f64) {
         self.reserve();
         let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
@@ -291,7 +291,8 @@ impl HorizonTerms {
         (cost, term)
     }
 
-    /// Computes the derivatives of `scale` · ℓ at knot t, and of the term of its limits if it is `limited`.
+    /// Computes the derivatives of `scale` · ℓ at knot t, with the cost ℓ. If `limited`, adds the derivatives of the
+    /// term of the knot's limits in the augmented Lagrangian.
     pub(crate) fn calc_diff(
         &mut self,
         t: usize,

@@ -1,4 +1,4 @@
-//! Data of a knot: the outputs of its dynamics, the quantities that its residuals read, and workspaces for them.
+//! Data of a knot: the outputs of its dynamics, the quantities that its residuals read, and workspaces.
 
 use super::outputs::{Capabilities, Output};
 use super::residuals::layout::ResidualData;
@@ -9,32 +9,34 @@ use nalgebra::DMatrix;
 /// Outputs of the dynamics of a knot, and the quantities that its residuals read.
 #[derive(Clone, Debug)]
 pub(crate) struct KnotData {
-    /// q̈, or v⁺ − v at an impact. Shape: nv.
+    /// Accelerations q̈, or the jump v⁺ − v of the velocities at an impact. Shape: nv.
     pub a: Vec<f64>,
-    /// τ of all joints. Shape: nv.
+    /// Efforts τ of all joints. Shape: nv.
     pub tau: Vec<f64>,
-    /// λ. Shape: rows.
+    /// Forces λ of all contacts, or impulses at an impact. Shape: rows.
     pub lambda: Vec<f64>,
-    /// Derivatives of q̈ by q, v and what the controls drive: τ, or q̈ itself and λ. Shape: nv × nv, the last with a
-    /// column of zeros more for each λ that is a control.
+    /// Derivatives of q̈ with respect to q, v and the quantities that the controls drive: τ, or q̈ and λ. Shape: nv ×
+    /// nv. The last matrix has one more column, of zeros, for each entry of λ that is a control.
     pub da: [DMatrix<f64>; 3],
-    /// Derivatives of λ, written only if a residual reads forces. Shape: rows × nv.
+    /// Derivatives of λ with respect to the same quantities as in `da`, written only if a residual reads forces. Shape:
+    /// rows × nv.
     pub dlambda: [DMatrix<f64>; 3],
-    /// Derivatives of τ by q, v and q̈ where the controls drive q̈, else nothing. Shape: nv × nv.
+    /// Derivatives of τ with respect to q, v and q̈ if the controls drive q̈, else empty. Shape: nv × nv.
     pub dtau: [DMatrix<f64>; 3],
-    /// J q̈ + γ where the controls drive q̈, else nothing. Shape: rows.
+    /// Contact accelerations J q̈ + γ if the controls drive q̈, else empty. Shape: rows.
     pub contact_acceleration: Vec<f64>,
-    /// Derivatives of J q̈ + γ with respect to q, v and q̈; the last is J, and ∂τ/∂λ = −Jᵀ. Shape: rows × nv.
+    /// Derivatives of J q̈ + γ with respect to q, v and q̈; the last matrix is J, and ∂τ/∂λ = −Jᵀ. Shape: rows × nv.
     pub dcontact_acceleration: [DMatrix<f64>; 3],
-    /// Equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
+    /// Derivatives of the equations of motion, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
-    /// Number of eliminations that are done in it, up to the number that the robot has: of the limbs, and of the base.
+    /// Number of eliminations (of limbs and of the base) that are already done in `equations`, at most all eliminations
+    /// of the robot.
     pub eliminations: usize,
     pub residuals: ResidualData,
 }
 
 impl KnotData {
-    /// Zeros, with the derivatives of q̈ that are constants if it is the `given` output.
+    /// Creates data of zeros. If `given` is the acceleration, the constant derivatives of q̈ are set, too.
     pub(crate) fn new(nv: usize, capabilities: &Capabilities, given: Output) -> Self {
         let rows = capabilities.rows();
         let square = || DMatrix::zeros(nv, nv);
@@ -59,7 +61,7 @@ impl KnotData {
     }
 }
 
-/// Knot as its residuals see it.
+/// State, controls and data of a knot, which its residuals read.
 #[derive(Clone, Copy)]
 pub(crate) struct KnotState<'a> {
     pub x: &'a [f64],
@@ -67,26 +69,26 @@ pub(crate) struct KnotState<'a> {
     pub data: &'a KnotData,
 }
 
-/// Derivatives of the outputs of a knot by x and u.
+/// Derivatives of the outputs of a knot with respect to x and u.
 pub(crate) trait Sensitivities {
-    /// g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
+    /// Computes g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>);
 
-    /// g += c · ∂u_k/∂(u, v, q) for a control, or for what stands in its place.
+    /// Computes g += c · ∂u_k/∂(u, v, q) for control k, or for the quantity that replaces the control.
     fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>);
 }
 
-/// Adds a row of a matrix: g += c X[row, :], for as many columns as g has numbers.
+/// Computes g += c X[row, :], for as many columns of X as g has numbers.
 pub(crate) fn add_matrix_row(X: &DMatrix<f64>, row: usize, c: f64, g: &mut [f64]) {
     for (g, column) in g.iter_mut().zip(X.as_slice().chunks_exact(X.nrows())) {
         *g += c * column[row];
     }
 }
 
-/// Most knots that a vector has lanes for.
+/// Maximum number of knots, one for each lane of a vector.
 pub(crate) const WIDEST: usize = 8;
 
-/// Returns the part of the data of each knot that is to be written.
+/// Returns, for each knot, the slice of its data that `part` selects, as a mutable slice.
 pub(crate) fn parts(of: &mut [KnotData], part: impl Fn(&mut KnotData) -> &mut [f64]) -> [&mut [f64]; WIDEST] {
     let mut parts: [&mut [f64]; WIDEST] = Default::default();
     for (to, of) in parts.iter_mut().zip(of) {
@@ -95,7 +97,7 @@ pub(crate) fn parts(of: &mut [KnotData], part: impl Fn(&mut KnotData) -> &mut [f
     parts
 }
 
-/// Writes vectors, with a lane for each knot, to a part of the data of each knot.
+/// Writes each lane of `from` to the data of one knot: to the slice that `part` selects.
 pub(crate) fn unpack<S: Block<Number = f64>>(
     from: &[S],
     to: &mut [KnotData],
@@ -105,7 +107,8 @@ pub(crate) fn unpack<S: Block<Number = f64>>(
     scatter_rows(from, &mut parts(to, part)[..count]);
 }
 
-/// Writes a matrix of vectors to rows of `stride` numbers in a part of the data of each knot.
+/// Writes each lane of the matrix `from` to the data of one knot: to the slice that `part` selects, in rows of `stride`
+/// numbers.
 pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     from: &Strided<'_, S>,
     to: &mut [KnotData],
@@ -116,18 +119,18 @@ pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     scatter_matrix(from, &mut parts(to, part)[..count], stride);
 }
 
-/// Memory in which something computes, made when it is first needed, so that an action costs little to make and to
-/// merge with others. A copy makes its own: what was computed in it is not part of what is copied.
+/// Workspace that is allocated when it is first needed, so that actions are cheap to make and to merge. A copy starts
+/// without a workspace: its content is not copied.
 #[derive(Debug)]
 pub(crate) struct OnDemand<T>(Option<Box<T>>);
 
 impl<T> OnDemand<T> {
-    /// Returns the memory; `make` makes it where it is not there.
+    /// Returns the workspace; `make` creates it if it does not exist.
     pub(crate) fn get(&mut self, make: impl FnOnce() -> T) -> &mut T {
         self.0.get_or_insert_with(|| Box::new(make()))
     }
 
-    /// Returns the memory, if it is there.
+    /// Returns the workspace, if it exists.
     pub(crate) fn made(&self) -> Option<&T> {
         self.0.as_deref()
     }

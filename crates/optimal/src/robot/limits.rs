@@ -9,11 +9,13 @@ use crate::Error;
 use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
-/// Residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
+/// Residual within bounds: lower ≤ r(x, u) ≤ upper. If both bounds are equal, it is an equality; if both lists of
+/// bounds are empty, r(x, u) = 0.
 ///
-/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds it; to [`Fddp`](crate::Fddp) alone it is a cost for
-/// leaving the bounds. It shares dynamics and kinematics with the costs of its knot, and holds at the knot's beginning,
-/// whatever the integrator and its Δt. One penalty serves all numbers, whatever their units.
+/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces the limit; for [`Fddp`](crate::Fddp) alone the limit is
+/// a cost for leaving the bounds. The limit shares dynamics and kinematics with the costs of its knot. It applies at
+/// the beginning of the knot, with any integrator and any Δt. All entries of r have the same penalty, whatever their
+/// units.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -43,30 +45,31 @@ use condyle_dynamics::Model;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Limit {
-    /// Name by which errors call it.
+    /// Name of the limit in error messages.
     pub name: String,
     /// Residual r.
     pub residual: Residual,
-    /// Least values; −∞ for none. Empty, as is `upper`, where r = 0.
+    /// Lower bounds; −∞ for an entry without a lower bound. If both `lower` and `upper` are empty, r = 0.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
-    /// Greatest values; ∞ for none.
+    /// Upper bounds; ∞ for an entry without an upper bound.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
 
 impl Limit {
-    /// lower ≤ residual ≤ upper, called `name`.
+    /// Returns the limit lower ≤ residual ≤ upper, called `name`.
     pub fn new(name: &str, residual: Residual, lower: Vec<f64>, upper: Vec<f64>) -> Self {
         Self { name: name.to_owned(), residual, lower, upper }
     }
 
-    /// residual = 0, called `name`.
+    /// Returns the limit residual = 0, called `name`.
     pub fn equality(name: &str, residual: Residual) -> Self {
         Self::new(name, residual, vec![], vec![])
     }
 
-    /// Returns the plan of the residual, or what does not fit; sets bounds that are left out.
+    /// Returns the plan of the residual, or a text that describes what does not fit the robot. Sets both bounds to 0 if
+    /// both are empty.
     fn plan(&mut self, model: &Model, capabilities: &Capabilities) -> Result<Plan, String> {
         let plan = Plan::new(model, capabilities, &self.residual)?;
         if self.lower.is_empty() && self.upper.is_empty() {
@@ -93,16 +96,16 @@ impl Term for Limit {
 #[derive(Clone, Debug, Default)]
 struct LimitSet {
     terms: Terms<Limit>,
-    /// Bounds of all, one after the other.
+    /// Lower bounds of all limits, one after the other.
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// Name and the rows of each.
+    /// Name and rows of each limit.
     parts: Vec<Part>,
 }
 
 impl LimitSet {
-    /// Returns the set of some limits, of one knot of the horizon or of all, for a robot whose dynamics have some
-    /// capabilities.
+    /// Creates the set of `limits` for one knot; for all knots if `knot` is `None`. `capabilities` are the outputs of
+    /// the robot's dynamics.
     fn new(model: &Model, capabilities: &Capabilities, limits: Vec<Limit>, knot: Option<usize>) -> Result<Self, Error> {
         let mut set = Self::default();
         for mut limit in limits {
@@ -126,26 +129,26 @@ impl LimitSet {
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
-    /// Those that the dynamics ask for at every knot, before those that are given.
+    /// Limits that the dynamics require at every knot; they precede the user's limits.
     own: Vec<Limit>,
-    /// No limits, where they do not count.
+    /// Empty list, for evaluations in which limits do not count.
     none: Terms<Limit>,
     multipliers: Multipliers,
 }
 
 impl Limits {
-    /// No limits.
+    /// Returns an empty set of limits.
     pub(super) fn none() -> Self {
         let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
         Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0) }
     }
 
-    /// Returns the same with the limits that the dynamics ask for at every knot.
+    /// Returns a set without user's limits, with the limits `own` that the dynamics require at every knot.
     pub(super) fn asked_for(own: Vec<Limit>) -> Self {
         Self { own, ..Self::none() }
     }
 
-    /// Sets the limits of knot t, or of all knots without limits of their own. Forgets multipliers.
+    /// Sets the limits of knot t, or the common limits of all knots without separate limits. Deletes the multipliers.
     pub(super) fn set(
         &mut self,
         model: &Model,
@@ -164,24 +167,24 @@ impl Limits {
         self.sets.all().iter().flat_map(PerKnot::all)
     }
 
-    /// Returns the most numbers that a knot's limits have.
+    /// Returns the largest number of limited entries at a knot.
     fn most(&self) -> usize {
         self.all().map(|set| set.terms.len()).max().unwrap_or(0)
     }
 
-    /// Takes over the limits of the models that another action stands for. Forgets multipliers.
+    /// Moves the limits of another action's model here, as model `place` or as a new model. Deletes the multipliers.
     pub(super) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         let most = self.multipliers.size().max(other.multipliers.size());
         self.sets.append(&mut other.sets, place);
         self.multipliers = Multipliers::new(most);
     }
 
-    /// Chooses the model whose limits are to be changed.
+    /// Chooses the model whose limits the setters change.
     pub(super) fn choose(&mut self, model: usize) {
         self.sets.choose(model);
     }
 
-    /// Assigns knot t, of `horizon` knots, to a model.
+    /// Assigns a model to knot t of a horizon with `horizon` knots.
     pub(super) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.sets.serve(t, horizon, model);
     }
@@ -191,31 +194,32 @@ impl Limits {
         self.sets.all_mut().iter_mut().for_each(PerKnot::shift);
     }
 
-    /// Returns the memory that the limits of any knot take.
+    /// Returns the memory layout of limits, large enough for every knot.
     pub(super) fn layout(&self) -> KnotLayout {
         self.all().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
 
-    /// Returns the limits of knot t if it is `limited`: limits count at the first stage of a step only.
+    /// Returns the limits of knot t if `limited`, else no limits. Limits count only at the first stage of an
+    /// integration step.
     pub(super) fn at(&self, t: usize, limited: bool) -> &Terms<Limit> {
         if limited { &self.sets.at(t).at(t).terms } else { &self.none }
     }
 
-    /// Returns the limits as [`at`](Self::at) does, and their term of the augmented Lagrangian.
+    /// Returns the limits as [`at`](Self::at) does, and the term of these limits in the augmented Lagrangian.
     pub(super) fn objective(&mut self, t: usize, limited: bool) -> (&Terms<Limit>, LimitObjective<'_>) {
         let Self { sets, none, multipliers, .. } = self;
         let terms = if limited { &sets.at(t).at(t).terms } else { none };
         (terms, LimitObjective { multipliers, t })
     }
 
-    /// Shows the limits of knot t.
+    /// Calls `visit` with the limits of knot t: bounds, names and multipliers.
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
         let LimitSet { terms, lower, upper, parts } = self.sets.at(t).at(t);
         visit(Bounded { count: terms.len(), lower, upper, parts, multipliers: &mut self.multipliers });
     }
 }
 
-/// Term of the augmented Lagrangian at knot t.
+/// Term of the limits at knot t in the augmented Lagrangian.
 pub(super) struct LimitObjective<'a> {
     pub multipliers: &'a mut Multipliers,
     t: usize,

@@ -1,18 +1,19 @@
 //! Robots as optimal control problems: the state x = (q, v), costs, and the actions of robots that move freely, are in
 //! contact, or hit something.
 //!
-//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]; an action sums several, by name. A [`Limit`] holds a
-//!   residual within bounds, or to zero.
-//! - [`FreeDynamics`] and [`ContactDynamics`] are knots of some duration, [`ImpulseDynamics`] is one without; in
-//!   [`FreeInverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts
-//!   too. An [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a
-//!   [`ControlPolynomial`] says how the controls go through it.
+//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]. An action has the sum of several costs, each with a
+//!   name. A [`Limit`] keeps a residual within bounds, or at zero.
+//! - [`FreeDynamics`] and [`ContactDynamics`] are knots with a duration. [`ImpulseDynamics`] is an impact, a knot
+//!   without duration. In [`FreeInverseDynamics`] the controls are the accelerations; in [`ContactInverseDynamics`]
+//!   they are the accelerations and the contact forces. An [`Actuation`] maps controls to joint efforts, an
+//!   [`Integrator`] integrates over the duration of a knot, and a [`ControlPolynomial`] describes how the controls
+//!   change during a knot.
 //! - A residual of your own is a [`GenericResidual`], written once for any scalar and differentiated exactly
-//!   ([`OwnResidual::autodiff`]), or a [`ResidualFunction`] with its Jacobian. Costs and limits take both.
+//!   ([`OwnResidual::autodiff`]), or a [`ResidualFunction`] with its Jacobian. Costs and limits accept both.
 //! - [`Problem::motion`](crate::Problem::motion) gives the accelerations, efforts and contact forces of a solution;
 //!   [`Problem::cost_mut`](crate::Problem::cost_mut) gives a cost by its name, to change its [`Target`] or weight.
-//! - A [`RobotProblem`] is a problem as data, in a file for example.
-//! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
+//! - A [`RobotProblem`] describes a problem as data, for example in a file.
+//! - [`Integrated`] makes a knot from a [`ContinuousModel`] of your own, too.
 //!
 //! ```
 //! use condyle_dynamics::robots;
@@ -45,7 +46,7 @@
 //! assert_eq!(solution.status, Status::Converged);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // names of matrices follow the literature
 
 mod activation;
 mod actuation;

@@ -5,33 +5,34 @@ use super::dynamics::robot::robot_of;
 use crate::{Problem, Solution};
 use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
 
-/// Accelerations, efforts and forces at a knot, at its beginning.
+/// Accelerations, efforts and contact forces at the beginning of a knot.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct KnotMotion {
     /// Accelerations q̈. Shape: nv; empty at an impact.
     pub acceleration: Vec<f64>,
-    /// Efforts τ of all joints (N, N m): S u. If accelerations are controls, they follow by inverse dynamics, and are 0
-    /// for an undriven base up to the tolerance of the constraints. Shape: nv; empty at an impact and without a robot.
+    /// Efforts τ = S u of all joints (N, N m). If accelerations are controls, inverse dynamics give the efforts; the
+    /// efforts of an undriven base are then 0 up to the tolerance of the constraints. Shape: nv; empty at an impact,
+    /// and for actions without a robot.
     pub effort: Vec<f64>,
     /// Jump of the velocities at an impact, v⁺ − v. Shape: nv; empty at other knots.
     pub velocity_change: Vec<f64>,
-    /// Contacts of the knot, in the order in which the action was given them.
+    /// Forces of the knot's contacts, in the order of the action's contacts.
     pub contacts: Vec<ContactForce>,
 }
 
-/// Force with which the world acts on a contact's body (N, N m); at an impact its impulse (N s, N m s). For a loop,
-/// that on the body of the constraint's first frame.
+/// Force with which the world acts on the body of a contact (N, N m); at an impact, the impulse (N s, N m s). For a
+/// closed loop, the force on the body of the constraint's first frame.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ContactForce {
     /// Name of the contact.
     pub name: String,
-    /// Number of the contact's frame in the robot.
+    /// Index of the contact's frame among the robot's frames.
     pub frame: usize,
-    /// Force along the world's axes; its moment is about the frame's origin. Of a point it has no moment.
+    /// Force along the world's axes, with the moment about the frame's origin. The moment of a point contact is 0.
     pub force: Force<f64>,
-    /// Same along the frame's own axes.
+    /// Same force, along the axes of the contact's frame.
     pub local: Force<f64>,
 }
 
@@ -48,7 +49,7 @@ impl KnotMotion {
 }
 
 impl ContactForce {
-    /// Returns the force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
+    /// Returns the force of a contact from its rows of λ. R is the rotation of the contact's frame in the world.
     fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
         let axes = constraint.axes;
         let along = match *rows {
@@ -67,7 +68,7 @@ impl ContactForce {
     }
 }
 
-/// Returns the forces of some contacts at a position, from the numbers of all their rows.
+/// Returns the force of each contact at the position q. `rows` is λ: the rows of all contacts, one after the other.
 fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<ContactForce> {
     if contacts.is_empty() {
         return Vec::new();
@@ -83,14 +84,14 @@ fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<C
     contacts.iter().map(force).collect()
 }
 
-/// Accelerations, efforts and contact forces of robots, whatever the dynamics and integrator of a knot, under
-/// [`Constrained`](crate::Constrained) actions too.
+/// Accelerations, efforts and contact forces of robots with any dynamics and any integrator, also inside
+/// [`Constrained`](crate::Constrained) actions.
 impl Problem {
-    /// Computes the accelerations, efforts and contact forces of a solution at knot t, 0 to N; `None` at the
-    /// end of a horizon, and for actions that do not belong to a robot and compute no accelerations. Allocates.
+    /// Computes the accelerations, efforts and contact forces of a solution at knot t, from 0 to N. Returns `None` at
+    /// the end of a horizon, and for actions that have no robot and compute no accelerations. Allocates.
     ///
-    /// The solution must be of this problem as it is now. After [`shift`](Self::shift), a solution of before belongs to
-    /// other knots.
+    /// The solution must belong to the current knots of this problem. An earlier solution does not, after
+    /// [`shift`](Self::shift).
     ///
     /// ```
     /// use condyle_dynamics::robots;
@@ -109,7 +110,7 @@ impl Problem {
     /// ```
     ///
     /// # Panics
-    /// If t > N, or the solution is of another horizon or has other dimensions there.
+    /// If t > N, or the solution has another horizon, or other dimensions at knot t.
     #[track_caller]
     pub fn motion(&mut self, solution: &Solution, t: usize) -> Option<KnotMotion> {
         self.assert_knot(t);
@@ -119,8 +120,8 @@ impl Problem {
         self.motion_at(t, solution.x(t), u)
     }
 
-    /// Computes as [`motion`](Self::motion) at a state x of knot t and its controls u: as many as the knot has, none at
-    /// t = N.
+    /// Computes the same as [`motion`](Self::motion) at knot t, but from a given state x and given controls u. At t =
+    /// N, u is empty.
     ///
     /// # Panics
     /// If t > N, or x or u has a wrong length.

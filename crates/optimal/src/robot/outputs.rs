@@ -5,30 +5,30 @@ use core::ops::Range;
 /// Vector that the dynamics of a knot compute besides the next state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output {
-    /// q̈, or v⁺ − v at an impact.
+    /// Accelerations q̈, or the jump v⁺ − v of the velocities at an impact.
     Acceleration,
-    /// τ of all joints.
+    /// Efforts τ of all joints.
     Effort,
-    /// λ, the forces or impulses of all contacts.
+    /// Forces λ, or impulses at an impact, of all contacts.
     Force,
-    /// J q̈ + γ of all contacts, where accelerations are controls.
+    /// Accelerations J q̈ + γ of all contacts, if joint accelerations are controls.
     ContactAcceleration,
 }
 
-/// Outputs that the dynamics of a knot have, known when the knot is made.
+/// Outputs that the dynamics of a knot can compute, known when the knot is made.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Capabilities {
     pub nu: usize,
-    /// Whether there are accelerations and efforts.
+    /// Whether the dynamics compute accelerations and efforts.
     pub effort: bool,
-    /// Whether it is an impact.
+    /// Whether the knot is an impact.
     pub impulse: bool,
     /// Whether accelerations, and forces of contacts, are controls.
     pub inverse: bool,
-    /// Nᵀ: the parts of the efforts that nothing drives, where accelerations are controls. Shape: parts × nv, row after
-    /// row.
+    /// Basis Nᵀ of the joint efforts that no control can produce, if accelerations are controls. Shape: undriven
+    /// efforts × nv, row after row.
     pub undriven: Vec<f64>,
-    /// Contacts' names and rows of λ.
+    /// Name of each contact, and the rows of λ that belong to it.
     pub contacts: Vec<(String, Range<usize>)>,
 }
 
@@ -38,7 +38,7 @@ impl Capabilities {
         self.contacts.last().map_or(0, |(_, rows)| rows.end)
     }
 
-    /// Returns the rows of the contact called `name`, or what is wrong with the name.
+    /// Returns the rows of the contact called `name`, or an error text with the existing names.
     pub(crate) fn contact(&self, name: &str) -> Result<Range<usize>, String> {
         match self.contacts.iter().find(|(n, _)| n == name) {
             Some((_, rows)) => Ok(rows.clone()),

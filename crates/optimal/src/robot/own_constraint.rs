@@ -1,4 +1,4 @@
-//! Path constraints of a robot from residuals of one's own.
+//! Path constraints of a robot from user-defined residuals.
 
 use super::residuals::own::OwnResidual;
 use crate::PathConstraint;
@@ -6,8 +6,9 @@ use crate::error::Error;
 use crate::problem::leave_a_value;
 use nalgebra::DMatrix;
 
-/// Residual of one's own within bounds at every knot, lower ≤ r(t, x, u) ≤ upper, as a [`PathConstraint`]: for actions
-/// that are not a robot's knots. Those take a [`Limit`](crate::robot::Limit) of the same residual, which costs less.
+/// [`PathConstraint`] lower ≤ r(t, x, u) ≤ upper on a user-defined residual r, with the same bounds at every knot. Use
+/// this constraint for actions that are not knots of a robot. Knots of a robot accept a [`Limit`](crate::robot::Limit)
+/// of the same residual, which takes less time.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -36,7 +37,7 @@ pub struct OwnConstraint {
     residual: OwnResidual,
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// ∂r/∂x and ∂r/∂u, row after row. Written by: `calc_diff`.
+    /// Jacobians ∂r/∂x and ∂r/∂u, row after row. Written by: `calc_diff`.
     slopes: [Vec<f64>; 2],
 }
 
@@ -44,7 +45,8 @@ impl OwnConstraint {
     /// Makes the constraint lower ≤ r ≤ upper, with infinite bounds where r is unbounded.
     ///
     /// # Errors
-    /// [`Error::Length`] if a bound does not have as many numbers as r; [`Error::Constraint`] if bounds leave no value.
+    /// [`Error::Length`] if a bound does not have as many numbers as r; [`Error::Constraint`] if no value satisfies the
+    /// bounds of an entry.
     pub fn new(residual: OwnResidual, lower: Vec<f64>, upper: Vec<f64>) -> Result<Self, Error> {
         for (name, bound) in [("lower", &lower), ("upper", &upper)] {
             if bound.len() != residual.size() {

@@ -1,4 +1,4 @@
-//! A problem of a robot as data, as a file holds it.
+//! Optimal control problem of a robot as data, for example in a file.
 
 use super::actuation::Actuation;
 use super::contact::Contact;
@@ -19,10 +19,10 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Optimal control problem of a robot as data, with the robot in it: to keep it in a file, to send it, to solve it
-/// again. [`build`](Self::build) makes the [`Problem`]; what is wrong in it is found there.
+/// Optimal control problem of a robot as data, including the robot. It can be stored in a file, sent, and solved again.
+/// [`build`](Self::build) makes the [`Problem`] and checks the data.
 ///
-/// Any format of serde serves. In JSON a bound that is infinite is `null`.
+/// All formats of serde can be used. In JSON an infinite bound is `null`.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -49,12 +49,12 @@ pub struct RobotProblem {
     pub model: Model,
     /// Initial state (q, v).
     pub x0: Vec<f64>,
-    /// Kinds of knots.
+    /// Different knots that the horizon uses.
     pub knots: Vec<Knot>,
-    /// Index of one of them for each knot of the horizon.
+    /// Index in `knots` for each knot of the horizon.
     #[cfg_attr(feature = "serde", serde(alias = "stages"))]
     pub knot_models: Vec<usize>,
-    /// Knot after the last one: the end, or an impact.
+    /// Terminal knot: the end of the horizon, or an impact.
     pub terminal: Knot,
 }
 
@@ -63,17 +63,17 @@ pub struct RobotProblem {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Knot {
-    /// Rule by which the state goes on.
+    /// Rule that gives the next state.
     pub dynamics: Dynamics,
     /// Costs.
     pub costs: Vec<Cost>,
-    /// Other costs in their place, by the number of a knot of the horizon.
+    /// Costs that replace `costs` at single knots, by the index of the knot in the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
     /// Limits.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub limits: Vec<Limit>,
-    /// Other limits in their place, by the number of a knot of the horizon.
+    /// Limits that replace `limits` at single knots, by the index of the knot in the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub limits_at: BTreeMap<usize, Vec<Limit>>,
     /// Bounds on the controls, if there are any.
@@ -84,8 +84,8 @@ pub struct Knot {
     pub controls: ControlPolynomial,
 }
 
-/// Bounds on the controls of a knot, nu numbers each, infinite for an unbounded control. They hold at each node of a
-/// polynomial.
+/// Bounds on the controls of a knot, nu numbers each, infinite for an unbounded control. If the controls are a
+/// polynomial in time, the bounds hold at each node of the polynomial.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -98,74 +98,76 @@ pub struct ControlBounds {
     pub upper: Vec<f64>,
 }
 
-/// Rule by which the state of a knot goes on. The actuation is S, nv × nu; without one, [`Actuation::joints`].
+/// Rule that gives the next state of a knot. The actuation is the matrix S, nv × nu; without this matrix,
+/// [`Actuation::joints`] is used.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[non_exhaustive]
 pub enum Dynamics {
-    /// [`FreeDynamics`].
+    /// Free motion: [`FreeDynamics`].
     Free {
-        /// S.
+        /// Actuation matrix S, nv × nu.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
         /// Integrator.
         integrator: Integrator,
-        /// Δt (s).
+        /// Duration Δt (s).
         dt: f64,
     },
-    /// [`ContactDynamics`](super::ContactDynamics).
+    /// Motion in contact: [`ContactDynamics`](super::ContactDynamics).
     Contact {
-        /// Contacts that hold.
+        /// Contacts that hold during the knot.
         contacts: Vec<Contact>,
-        /// μ (1/kg).
+        /// Damping μ (1/kg).
         damping: f64,
-        /// S.
+        /// Actuation matrix S, nv × nu.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
         /// Integrator.
         integrator: Integrator,
-        /// Δt (s).
+        /// Duration Δt (s).
         dt: f64,
     },
-    /// [`ImpulseDynamics`].
+    /// Impact: [`ImpulseDynamics`].
     Impulse {
-        /// Contacts that set in.
+        /// Contacts that begin at the impact.
         contacts: Vec<Contact>,
-        /// ε, from 0 to 1.
+        /// Coefficient of restitution ε, from 0 to 1.
         restitution: f64,
-        /// μ (1/kg).
+        /// Damping μ (1/kg).
         damping: f64,
     },
-    /// [`FreeInverseDynamics`](super::FreeInverseDynamics).
+    /// Free motion, with accelerations as controls: [`FreeInverseDynamics`](super::FreeInverseDynamics).
     Inverse {
         /// Integrator.
         integrator: Integrator,
-        /// Δt (s).
+        /// Duration Δt (s).
         dt: f64,
     },
+    /// Motion in contact, with accelerations and contact forces as controls:
     /// [`ContactInverseDynamics`](super::ContactInverseDynamics).
     ContactInverse {
-        /// Contacts that hold.
+        /// Contacts that hold during the knot.
         contacts: Vec<Contact>,
-        /// S.
+        /// Actuation matrix S, nv × nu.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
         /// Integrator.
         integrator: Integrator,
-        /// Δt (s).
+        /// Duration Δt (s).
         dt: f64,
     },
-    /// [`FreeDynamics::terminal`], after the last knot.
+    /// End of the horizon, after the last knot: [`FreeDynamics::terminal`].
     #[cfg_attr(feature = "serde", serde(alias = "end"))]
     Terminal,
 }
 
 impl Dynamics {
-    /// Returns Δt (s); `None` for an impact and the end, which take no time.
+    /// Returns the duration Δt (s); `None` for an impact and the terminal knot, which have no duration.
     pub fn dt(&self) -> Option<f64> {
         match *self {
             Self::Free { dt, .. }
@@ -176,7 +178,7 @@ impl Dynamics {
         }
     }
 
-    /// Sets Δt (s), except for an impact and the terminal knot, which take no time.
+    /// Sets the duration Δt (s), except for an impact and the terminal knot, which have no duration.
     pub fn set_dt(&mut self, seconds: f64) {
         match self {
             Self::Free { dt, .. }
@@ -192,7 +194,7 @@ impl RobotProblem {
     /// Returns the problem. Allocates.
     ///
     /// # Errors
-    /// Those of the knots' constructors and of [`Problem::new`].
+    /// The errors of the knots' constructors and of [`Problem::new`].
     pub fn build(&self) -> Result<Problem, Error> {
         let model = Arc::new(self.model.clone());
         let knots = self.knots.iter().map(|knot| knot.build(&model)).collect::<Result<_, _>>()?;
@@ -201,18 +203,19 @@ impl RobotProblem {
 }
 
 impl Knot {
-    /// Returns a knot with these costs wherever it serves, without limits and bounds.
+    /// Returns a knot with the same costs at every index of the horizon, constant controls, and without limits and
+    /// bounds.
     pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
         let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
         let controls = ControlPolynomial::Constant;
         Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None, controls }
     }
 
-    /// Returns the action. Allocates.
+    /// Returns the action of this knot. Allocates.
     ///
     /// # Errors
-    /// The errors of its constructor; [`Error::Length`] for bounds of another length than nu; [`Error::Actuation`] for
-    /// a polynomial of controls at a knot without controls.
+    /// The errors of the action's constructor; [`Error::Length`] for bounds of another length than nu;
+    /// [`Error::Actuation`] for a polynomial of controls at a knot without controls.
     pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
         let (model, costs) = (model.clone(), self.costs.clone());
         let drives = |actuation: &Option<DMatrix<f64>>| match actuation {
@@ -250,7 +253,7 @@ impl Knot {
         }
     }
 
-    /// Gives an action the limits, and the costs and limits of single knots.
+    /// Adds the limits, and the costs and limits of single knots, to an action.
     fn complete<K: RobotKind>(
         &self,
         mut action: Integrated<RobotAcceleration<K>>,

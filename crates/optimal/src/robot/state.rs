@@ -1,4 +1,4 @@
-//! The state x = (q, v) of a robot, and the linear algebra that its Jacobians' sparsity allows.
+//! State x = (q, v) of a robot: differences of states, and second derivatives of q ⊕ δ.
 
 use crate::lq::Hessian;
 use condyle_dynamics::{
@@ -9,7 +9,7 @@ use condyle_spatial::lane_dual::LaneDual;
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// x₁ ⊖ x₀ = (q₁ ⊖ q₀, v₁ − v₀).
+/// Computes x₁ ⊖ x₀ = (q₁ ⊖ q₀, v₁ − v₀) into `out`.
 pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut [f64]) {
     let (nq, nv) = (model.nq(), model.nv());
     difference(model, &x0[..nq], &x1[..nq], &mut out[..nv]);
@@ -18,23 +18,25 @@ pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut 
     }
 }
 
-/// Returns the coordinates of each joint of a robot whose positions are no vector space: elsewhere the Jacobians of ⊕
-/// and ⊖ are ±1.
+/// Returns the velocity coordinates of each joint whose positions are not a vector space. For all other joints, the
+/// Jacobians of ⊕ and ⊖ are ±1.
 pub fn groups(model: &Model) -> Vec<Range<usize>> {
     let group = |joint| matches!(joint, Joint::Spherical | Joint::Planar | Joint::FreeFlyer);
     model.bodies()[1..].iter().filter(|b| group(b.joint)).map(|b| b.idx_v..b.idx_v + b.joint.nv()).collect()
 }
 
-/// Workspace for the second derivatives of q ⊕ δ along the groups; empty without groups.
+/// Workspace for the second derivatives of q ⊕ δ in the groups: the joints whose positions are not a vector space.
+/// Empty without groups.
 #[derive(Debug)]
 pub(super) struct GroupHessian {
-    /// δ, with one coordinate of each group moving. Shape: nv. Written by: `run`.
+    /// Step δ as dual numbers, differentiated along one coordinate of each group. Shape: nv. Written by: `run`.
     delta: Vec<LaneDual<f64>>,
-    /// E and its derivative along that coordinate. Shape: nv × nv. Written by: `run`.
+    /// Matrix E = J_exp(δ) and its derivative along the same coordinate as in `delta`. Shape: nv × nv. Written by:
+    /// `run`.
     E: DMatrix<LaneDual<f64>>,
-    /// −J_log(−δ). Shape: nv × nv. Written by: `run`.
+    /// Matrix −J_log(−δ). Shape: nv × nv. Written by: `run`.
     back: DMatrix<f64>,
-    /// M. Shape: nv × nv, the blocks of groups. Written by: `run`.
+    /// Matrix M, defined at `run`, in the blocks of groups only. Shape: nv × nv. Written by: `run`.
     M: DMatrix<f64>,
 }
 
@@ -45,17 +47,17 @@ impl GroupHessian {
         Self { delta: vec![zero; n], E: DMatrix::from_element(n, n, zero), back: square.clone(), M: square }
     }
 
-    /// Computes the second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) by δ₀ and ε, at zero, of each
-    /// group.
+    /// Computes, for each group, the second derivatives of θ(δ₀, ε) = λᵀ((q ⊕ δ₀) ⊕ (δ + ε) ⊖ (q ⊕ δ)) with respect to
+    /// δ₀ and ε, at zero.
     ///
-    /// Let E(δ) = J_exp(δ), M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. In the group θ = λᵀ log(exp(Tδ₀) exp(η)), T = Ad exp(−δ), where
-    /// dη = J_log(η) E(δ + ε) dε, thus
+    /// Let E(δ) = J_exp(δ) and M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. In one group, θ = λᵀ log(exp(Tδ₀) exp(η)) with T = Ad exp(−δ)
+    /// and dη = J_log(η) E(δ + ε) dε. This gives
     ///
     /// ```text
     /// θ = λᵀ(T δ₀ + E ε + ½ ∂E[ε] ε + ½ [T δ₀, E ε]) + …      [E e, E ε] = ∂E[ε] e − ∂E[e] ε
     /// ```
     ///
-    /// (the second one is the equation of Maurer and Cartan), and with e = E⁻¹ T δ₀ = J_log(−δ) δ₀ the derivatives are
+    /// The second equation is the equation of Maurer and Cartan. With e = E⁻¹ T δ₀ = J_log(−δ) δ₀ the derivatives are
     /// ∂²θ/∂δ₀∂δ₀ = 0, ∂²θ/∂δ₀∂ε = ½ J_log(−δ)ᵀ (M − Mᵀ), ∂²θ/∂ε∂ε = ½ (M + Mᵀ).
     pub(super) fn run(
         &mut self,
@@ -71,7 +73,8 @@ impl GroupHessian {
             for (delta, &dq) in delta.iter_mut().zip(dq) {
                 *delta = LaneDual::splat(dq);
             }
-            // E has a block a group: all of them can move at the same time
+            // E has a separate block for each group: one coordinate of each group can be differentiated in the same
+            // call
             for group in groups.iter().filter(|group| k < group.len()) {
                 delta[group.start + k].eps = 1.0;
             }

@@ -1,4 +1,4 @@
-//! Clock that the host provides.
+//! Clock that the host of a WebAssembly module provides, for example a browser.
 
 use core::ops::Add;
 use std::sync::OnceLock;

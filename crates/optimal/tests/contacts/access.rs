@@ -30,8 +30,8 @@ impl GenericConstraint for Slow {
     }
 }
 
-/// Creates an arm with a model of each kind: two models represented by one action, one with a constraint, and one with
-/// accelerations as controls.
+/// Creates a problem of an arm with different models: two that one action represents, one with a constraint, and one
+/// with accelerations as controls.
 fn mixed() -> Problem {
     let arm = Arc::new(robots::arm7());
     let costs = |x: f64| {
@@ -80,7 +80,7 @@ fn a_cost_is_found_by_its_name_whatever_the_dynamics() {
         assert_eq!(place(&problem.cost_at_mut(t, "reach").unwrap()), x);
     }
     assert!(problem.cost_mut(0, "grasp").is_none() && problem.cost_mut(5, "reach").is_none());
-    assert!(problem.cost_at_mut(3, "rest").is_none()); // that knot has its own costs
+    assert!(problem.cost_at_mut(3, "rest").is_none()); // knot 3 has separate costs
     let unicycle = condyle_optimal::Unicycle::default();
     let end = Box::new(unicycle.clone().terminal());
     let mut other = Problem::new(vec![0.0; 3], vec![Box::new(unicycle)], vec![0; 2], end).unwrap();
@@ -183,7 +183,7 @@ fn what_is_no_target_is_refused_and_changes_nothing() {
     assert_eq!(problem.cost_mut(0, "turn").unwrap().target(), Some(Target::Rotation(turned)));
 }
 
-/// User-defined action around another one.
+/// User-defined action that wraps another action.
 struct Wrapper(Box<dyn ActionModel>);
 
 impl ActionModel for Wrapper {
@@ -270,7 +270,7 @@ fn an_action_without_a_copy_is_named() {
     assert_eq!(problem.try_clone().unwrap_err(), Error::NoCopy { model: None });
 }
 
-/// Problems of quadrupeds with forces as controls and impacts can be copied, too.
+/// Problems of quadrupeds with impacts, and with contact forces as controls, can be copied, too.
 #[test]
 fn a_copy_of_a_quadrupeds_problem_has_the_same_derivatives() {
     let (model, mut rng) = (Arc::new(robots::quadruped()), StdRng::seed_from_u64(52));

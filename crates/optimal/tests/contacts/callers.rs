@@ -1,5 +1,5 @@
-//! A caller's mistake panics at the caller's line, with the argument, the expected and the found number. Also tests
-//! what users print and share between threads.
+//! A caller's mistake panics at the caller's line; the message has the argument, the expected number and the number
+//! found. Other tests check printed names, and sharing between threads.
 
 use super::*;
 use condyle_optimal::robot::{OwnResidual, RobotProblem};
@@ -8,7 +8,7 @@ use condyle_optimal::{AugmentedLagrangian, DdpMethod, GroupModel, Hessian, Lqr, 
 #[path = "../../../../tests/common/panics.rs"]
 mod panics;
 
-/// Returns the message of a panic, which must occur at a line of this file.
+/// Returns the message of the panic of `call`, which must occur at the given line of this file.
 fn said(what: &str, line: u32, call: impl FnOnce()) -> String {
     let panic = panics::panic_of(call).expect(what);
     assert!(panic.file.ends_with("callers.rs") && panic.line == line, "{what}, line {line}: {panic:?}");
@@ -23,7 +23,7 @@ macro_rules! panics {
 }
 
 #[test]
-#[rustfmt::skip] // the line of a panic must equal the line of its check
+#[rustfmt::skip] // each check must stay on one line, because the line of its panic is compared
 #[allow(clippy::drop_non_drop, dropping_copy_types, clippy::unit_arg)]
 fn a_panic_is_at_the_callers_line() {
     let arm = Arc::new(robots::arm7());
@@ -90,7 +90,7 @@ fn statuses_and_methods_are_printed() {
     assert_eq!(format!("[{:>10}]", Status::Converged), "[ converged]");
     assert_eq!((DdpMethod::Fddp.to_string(), DdpMethod::Ddp.to_string()), ("FDDP".to_owned(), "DDP".to_owned()));
     assert_eq!(Integrator::RungeKutta4.to_string(), "Runge–Kutta 4");
-    // names equal the names in files
+    // names in the program equal the names in files
     for status in [
         Status::Converged,
         Status::MaxIterations,
@@ -130,7 +130,7 @@ fn problems_and_solvers_are_shared_by_threads() {
     shared::<Residual>();
     shared::<Box<dyn ActionModel>>();
     shared::<Hessian>();
-    // several threads copy one problem
+    // several threads copy the same problem at the same time
     let problem = arm_problem(&Arc::new(robots::arm7()));
     let solve = || {
         let mut own = problem.try_clone().unwrap();

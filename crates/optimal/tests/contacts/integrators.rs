@@ -46,8 +46,7 @@ fn derivatives_of_integrators_are_those_of_the_action() {
     }
 }
 
-/// Controls that are the same at all nodes of a polynomial are constant: step, cost and the derivatives with respect to
-/// them agree.
+/// A polynomial with equal controls at all nodes gives the same step, cost and derivatives as constant controls.
 #[test]
 fn equal_controls_of_a_polynomial_are_constant() {
     let mut rng = StdRng::seed_from_u64(23);
@@ -86,7 +85,7 @@ fn equal_controls_of_a_polynomial_are_constant() {
     }
 }
 
-/// One step of Δt is compared with many small ones: halving Δt divides the error by 2^(order + 1).
+/// One step of Δt is compared with many small steps: halving Δt divides the error by 2^(order + 1).
 #[test]
 fn runge_kutta_methods_have_their_order() {
     let mut rng = StdRng::seed_from_u64(15);

@@ -16,16 +16,16 @@ use rand::{SeedableRng, rngs::StdRng};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Tolerance of a solve with M, whose condition number is up to 1e4, followed by the inverse operation.
+/// Tolerance of a solve with M followed by a product with M. The condition number of M is up to 1e4.
 const BACK: f64 = 1e-9;
-/// Tolerance of a sum of some dozen products in another order.
+/// Tolerance for two sums of the same products (a few dozen) in different order.
 const ROUNDING: f64 = 1e-12;
-/// Maximum violation of a solution's equations (N, m/s²), and the resulting difference of forces of some hundred
-/// newtons.
+/// Maximum violation of the equations in a solution (N, m/s²). `FORCES` is the resulting error of forces of a few
+/// hundred newtons.
 const HELD: f64 = 1e-6;
 const FORCES: f64 = 1e-2;
 
-/// Returns contacts of every kind: a line, a plane, a point and a whole frame, with gains.
+/// Returns a contact of each kind, with gains: line, plane, point and whole frame.
 fn all_kinds(model: &Model, reference: ReferenceFrame, rng: &mut StdRng) -> Vec<Contact> {
     let kinds: [fn(usize) -> ContactConstraint; 4] =
         [ContactConstraint::line, ContactConstraint::plane, ContactConstraint::point, ContactConstraint::rigid];
@@ -38,7 +38,7 @@ fn all_kinds(model: &Model, reference: ReferenceFrame, rng: &mut StdRng) -> Vec<
     frames.into_iter().zip(kinds).map(contact).collect()
 }
 
-/// Returns the equations of a knot as weighted costs, so that their derivatives are compared.
+/// Returns the equations of a knot as weighted costs, so that comparisons of derivatives include the equations.
 fn equations(contacts: &[Contact], driven: bool) -> Vec<Cost> {
     let undriven = driven.then(|| Cost::new("undriven", 1e-3, Residual::UndrivenEffort, Activation::Quadratic));
     let holds = contacts.iter().map(|contact| {
@@ -75,7 +75,7 @@ fn derivatives_are_those_of_the_action() {
     }
 }
 
-/// A fully driven arm has no undriven efforts; an arm without contacts equals a free one.
+/// A fully driven arm has no undriven efforts. Without contacts, a knot equals a knot of `FreeInverseDynamics`.
 #[test]
 fn derivatives_of_an_arm_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(42);
@@ -121,8 +121,8 @@ fn outputs_of_all(problem: &mut Problem, xs: &[f64], us: &[f64]) -> Vec<BTreeMap
 }
 
 /// Inverse dynamics receives the accelerations and forces that forward dynamics computes from some controls. The next
-/// state and the costs are then the same, the efforts equal the controls, and the equations hold. This is tested for
-/// drives of single joints, and for drives that mix all coordinates.
+/// state and the costs are then the same, the efforts equal the controls, and the equations hold. This is tested for an
+/// actuation with one control for each joint, and for an actuation that mixes all coordinates.
 #[test]
 fn it_is_forward_dynamics_backwards() {
     let mut rng = StdRng::seed_from_u64(43);
@@ -135,7 +135,7 @@ fn it_is_forward_dynamics_backwards() {
                 true => vec![Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic)],
                 false => contact_costs(&model, &contacts, nu, &mut rng),
             };
-            costs.retain(|cost| cost.name != "effort"); // it depends on the controls
+            costs.retain(|cost| cost.name != "effort"); // this cost depends on the controls, which differ
             let forward =
                 ContactAcceleration::new(model.clone(), drives.clone(), &contacts, 0.0, costs.clone()).unwrap();
             let mut forward = Integrated::new(forward, Integrator::SemiImplicitEuler, DT).unwrap();
@@ -169,8 +169,8 @@ pub(super) fn standing(model: &Model) -> Vec<f64> {
     x
 }
 
-/// Quasi-static forces hold the robot still: no force on the base is missing, and the efforts equal the efforts of
-/// forward dynamics.
+/// Quasi-static contact forces hold the robot still: the undriven efforts of the base are 0, and the joint efforts
+/// equal the efforts of forward dynamics.
 #[test]
 fn forces_hold_the_robot_still() {
     let model = Arc::new(robots::quadruped());
@@ -206,8 +206,8 @@ fn knots_in_lanes_are_single_knots() {
     assert!(largest_difference(&costs, &single) < ROUNDING && largest_difference(&next, &alone) < ROUNDING);
 }
 
-/// A quadruped moves its trunk over its feet, with costs on efforts, forces and accelerations, and a cone. It is solved
-/// by forward dynamics with FDDP, and by inverse dynamics with the augmented Lagrangian.
+/// A quadruped moves its trunk over its feet, with costs of efforts, forces, accelerations and a friction cone. The
+/// problem is solved with forward dynamics by FDDP, and with inverse dynamics by the augmented Lagrangian.
 #[test]
 fn forward_and_inverse_dynamics_have_one_optimum() {
     let model = Arc::new(robots::quadruped());
@@ -283,7 +283,8 @@ fn forward_and_inverse_dynamics_have_one_optimum() {
     }
 }
 
-/// Redundant contacts are valid here: they share the forces, and the efforts are the smallest.
+/// Redundant contacts are valid with inverse dynamics: the contacts share the forces such that the efforts are
+/// smallest.
 #[test]
 fn contacts_may_be_redundant() {
     let model = Arc::new(robots::humanoid());
@@ -295,7 +296,7 @@ fn contacts_may_be_redundant() {
     let x = [neutral(&model), vec![0.0; model.nv()]].concat();
     let u = knot.quasi_static(&x);
     let (sole, point) = u[model.nv()..].split_at(6);
-    assert!(largest_difference(&sole[..3], point) < 1e-8 && point[2] > 1.0); // each bears half
+    assert!(largest_difference(&sole[..3], point) < 1e-8 && point[2] > 1.0); // each contact bears half of the force
 }
 
 #[test]

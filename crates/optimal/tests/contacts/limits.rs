@@ -1,4 +1,4 @@
-//! Limits: the terms that they add to a knot's cost, and exact derivatives.
+//! Limits: the values of the terms that limits add to the cost of a knot, and exact derivatives of these terms.
 
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
@@ -10,15 +10,16 @@ use condyle_optimal::{ActionModel, Error, GroupModel, LqKnot};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Default penalty 1/μ, before a constrained solver chooses another.
+/// Default penalty 1/μ, used until a constrained solver sets another penalty.
 const PENALTY: f64 = 10.0;
-/// Step of central differences: their error is about the square of the step, plus the rounding of the cost divided by
-/// the step.
+/// Step of central differences. The error is about the square of the step, plus the rounding error of the cost divided
+/// by the step.
 const STEP: f64 = 1e-5;
-/// Tolerance of a sum of some dozen squares.
+/// Tolerance of a sum of a few dozen squares.
 const ROUNDING: f64 = 1e-12;
 
-/// Returns the number of entries of a residual of `contact_costs`; `rows` is the number of rows of its contact.
+/// Returns the number of entries of a residual of `contact_costs`; `rows` is the number of rows of the residual's
+/// contact.
 fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     match residual {
         Residual::State { .. } => 2 * model.nv(),
@@ -33,8 +34,8 @@ fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     }
 }
 
-/// Returns a limit for each existing residual. Some entries are held at zero, others are within bounds, others are
-/// free.
+/// Returns a limit for each kind of residual. Of the entries of a limit, some must be zero, some have bounds, and some
+/// are free.
 fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
     let contacts = feet(model, ReferenceFrame::LocalWorldAligned);
     let rows = contacts[1].constraint.kind.rows();
@@ -84,7 +85,8 @@ pub(super) fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &
     }
 }
 
-/// Checks the derivatives of an action with each limit that it accepts, and with all of them. Returns their number.
+/// Checks the derivatives of an action with each single limit that the action accepts, and with all these limits
+/// together. Returns the number of accepted limits.
 fn check<A: ActionModel>(
     what: &str,
     model: &Model,
@@ -148,7 +150,8 @@ fn derivatives_of_limits_of_other_steps_are_those_of_the_terms() {
     assert_eq!(check("inverse dynamics", &model, &all, inverse, 1.0, &mut rng), all.len() - 3);
 }
 
-/// The term of a limit on controls has a closed form; neither Δt nor a stage of the integrator scales it.
+/// The term of a limit on controls has a closed form; the term is not multiplied by Δt or by the weight of an
+/// integrator's stage.
 #[test]
 fn a_limit_costs_what_it_should() {
     let mut rng = StdRng::seed_from_u64(33);
@@ -171,14 +174,14 @@ fn a_limit_costs_what_it_should() {
         let mut limited = free.clone().with_limits(limit()).unwrap();
         let term = limited.calc(0, &x, &u, &mut next) - without;
         assert!((term - expected).abs() < ROUNDING * expected, "{method:?}: {term}, expected {expected}");
-        // knot 2 may have its own limits: here an empty list
+        // knot 2 gets a separate list of limits, which is empty
         limited.set_limits(2, vec![]).unwrap();
         let costs = [1, 2, 3].map(|t| limited.calc(t, &x, &u, &mut next) - without);
         assert_eq!(costs, [term, 0.0, term], "{method:?}");
     }
 }
 
-/// Knots side by side in lanes give the same results as single knots.
+/// Knots in the lanes of a vector give the same results as single knots.
 #[test]
 fn limits_in_lanes_are_those_of_single_knots() {
     let mut rng = StdRng::seed_from_u64(34);

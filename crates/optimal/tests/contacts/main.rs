@@ -1,5 +1,5 @@
-//! Robots in contact, at impacts, and with other drives: exact derivatives, and errors.
-#![allow(non_snake_case)] // the names of the literature
+//! Robots in contact, at impacts, and with other actuations: exact derivatives, and errors.
+#![allow(non_snake_case)] // names of matrices follow the literature
 
 mod access;
 mod callers;
@@ -25,18 +25,18 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance of central differences. For a function with values and derivatives of order one they are accurate to about
-/// 1e-9; contact forces are some hundred times larger than their arguments.
+/// Tolerance of central differences. For a function with values and derivatives of order one, central differences are
+/// accurate to about 1e-9. Contact forces are a few hundred times larger than the arguments.
 const DIFFERENCES: f64 = 1e-6;
 /// Tolerance of optima: both solves stop where the expected decrease of the cost is below 1e-9.
 const OPTIMUM: f64 = 1e-7;
-/// Tolerance of a sum of some dozen products in another order.
+/// Tolerance for two sums of the same products (a few dozen) in different order.
 const ROUNDING: f64 = 1e-13;
-/// Tolerance of two orders of the same sums, through a factorisation.
+/// Tolerance for results of a factorisation whose sums were added in different order.
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
-/// Returns numbers ≥ 0, for weights.
+/// Returns n random numbers from 0 to 1, for weights.
 fn magnitudes(n: usize, rng: &mut StdRng) -> Vec<f64> {
     random(n, 1.0, rng).iter().map(|x| x.abs()).collect()
 }
@@ -62,7 +62,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale
 }
 
-/// Compares hand-written derivatives with differences at a random state.
+/// Compares hand-written derivatives of an action with finite differences at a random state.
 fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
     let (ndx, nu) = (action.ndx(), action.nu());
     let mut oracle = NumDiff(action.clone());
@@ -186,7 +186,7 @@ fn derivatives_in_contact_are_those_of_the_action() {
     }
 }
 
-/// Tests contacts along lines and planes, also two lines on one body.
+/// Tests contacts of the kinds line and plane, also two line contacts on the same body.
 #[test]
 fn derivatives_in_contact_along_axes_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(29);
@@ -206,7 +206,7 @@ fn derivatives_in_contact_along_axes_are_those_of_the_action() {
             let mut costs = contact_costs(&model, &contacts, 12, &mut rng);
             let at_frame =
                 |cost: &Cost| !matches!(cost.residual, Residual::FrameRotation { .. } | Residual::FrameVelocity { .. });
-            costs.retain(at_frame); // the name of contacts[0] differs from its frame's name
+            costs.retain(at_frame); // the frame of contacts[0] has another name than the contact
             let what = format!("{:?} {reference:?}", contacts[1].constraint.kind);
             let action = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
             check_derivatives(&what, action, &model, 5.0, &mut rng);
@@ -266,7 +266,7 @@ fn derivatives_of_inverse_dynamics_are_those_of_the_action() {
     }
 }
 
-/// The same reach with torques and with accelerations as controls ends in the same optimum.
+/// Reaching a point with torques as controls and with accelerations as controls has the same optimum.
 #[test]
 fn inverse_and_forward_dynamics_have_one_optimum() {
     let arm = Arc::new(robots::arm7());
@@ -321,7 +321,7 @@ fn residuals_are_what_they_say() {
         let cost = action.calc(0, &x, &[], &mut []);
         assert!(cost < 1e-24, "{cost:e}");
     }
-    // with the efforts that hold the robot still, `ControlGravity` is zero, whichever feet touch the ground
+    // with the efforts that hold the robot still, `ControlGravity` is zero for any set of feet on the ground
     let still = [q, &[0.0; 18]].concat();
     let all = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
     let contacts = all.map(|name| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap())));
@@ -417,8 +417,8 @@ fn what_does_not_fit_is_refused_by_name() {
     assert!(matches!(end, Error::Cost { .. }));
 }
 
-/// Points on a line on one body constrain five of six directions. With damping, they share the forces, and a solve
-/// continues.
+/// Contact points on a line of the same body constrain only five of six directions. With damping, these contacts share
+/// the forces, and a solve converges.
 #[test]
 fn a_line_of_contacts_on_one_body_needs_damping() {
     let arm = robots::arm7();
@@ -447,8 +447,8 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     assert!(solution.xs.iter().all(|x| x.is_finite()));
 }
 
-/// The structure of A and B reported by knots in contact and impacts is correct: a sweep without it gives the same
-/// result.
+/// Knots in contact and impacts report the structure of A and B correctly: a sweep that ignores the structure gives the
+/// same result.
 #[test]
 fn derivatives_have_the_form_of_euler_steps() {
     let mut rng = StdRng::seed_from_u64(9);

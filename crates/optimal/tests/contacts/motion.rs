@@ -10,7 +10,7 @@ use condyle_optimal::robot::{
 use condyle_optimal::{Constrained, PathConstraint};
 use nalgebra::DVector;
 
-/// Tolerance of the same equation through a factorisation, with forces of some hundred newtons.
+/// Tolerance of the equation of motion after a factorisation, with forces of a few hundred newtons.
 const BALANCE: f64 = 1e-8;
 
 /// Constraint without rows.
@@ -26,14 +26,14 @@ impl PathConstraint for Nothing {
     fn calc(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut [f64]) {}
 }
 
-/// Creates a problem of one knot.
+/// Creates a problem with one knot and a terminal knot.
 fn single(knot: Box<dyn ActionModel>, model: &Arc<Model>, x: &[f64]) -> Problem {
     let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
     Problem::new(x.to_vec(), vec![knot], vec![0], Box::new(end)).unwrap()
 }
 
-/// Computes Σ Jᵀ f from the forces along the world's axes at the frames' origins; checks that the local forces give the
-/// same.
+/// Computes Σ Jᵀ f from the forces along the world's axes at the origins of the frames. Checks that the local forces
+/// are the same vectors.
 fn generalised(model: &Model, q: &[f64], motion: &KnotMotion) -> DVector<f64> {
     let (mut data, mut sum) = (Data::new(model), DVector::zeros(model.nv()));
     for contact in &motion.contacts {
@@ -54,7 +54,7 @@ fn generalised(model: &Model, q: &[f64], motion: &KnotMotion) -> DVector<f64> {
     sum
 }
 
-/// Returns contacts of all kinds, along their own and the world's axes.
+/// Returns contacts of all kinds, with rows along the axes of the frame or of the world.
 fn kinds(model: &Model, rng: &mut StdRng) -> Vec<Contact> {
     let names: [&str; 4] = match model.name() {
         "quadruped" => ["LF_foot", "RF_foot", "LH_foot", "RH_foot"],
@@ -99,7 +99,7 @@ fn motion_of_an_arm_is_that_of_its_dynamics() {
         assert_eq!(motion.effort, u);
         assert!(motion.contacts.is_empty() && !motion.is_impact() && motion.contact("none").is_none());
     }
-    // accelerations as controls
+    // the same motion results with accelerations as controls
     let knot = FreeInverseDynamics::running(arm.clone(), DT, vec![]).unwrap();
     let motion = single(Box::new(knot), &arm, &x).motion_at(0, &x, &a).unwrap();
     assert_eq!(motion.acceleration, a);
@@ -174,7 +174,7 @@ fn forces_of_contacts_balance_the_robot() {
         let needed = DVector::from_row_slice(rnea(&model, &mut data, q, v, &motion.acceleration, &[]));
         let found = DVector::from_row_slice(&tau) + generalised(&model, q, &motion);
         assert!(largest_difference(found.as_slice(), needed.as_slice()) < BALANCE);
-        // the same with accelerations and forces as controls
+        // the efforts and forces are the same with accelerations and forces as controls
         let knot = ContactInverseDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
         let mut inverse = single(Box::new(knot), &model, &x);
         let again = inverse.motion_at(0, &x, &[a, lambda].concat()).unwrap();
@@ -205,14 +205,15 @@ fn impulses_change_velocities() {
         let needed = M.symmetric_part() * DVector::from_row_slice(&motion.velocity_change);
         let found = generalised(&model, q, &motion);
         assert!(largest_difference(found.as_slice(), needed.as_slice()) < BALANCE);
-        // an impact may end a horizon
+        // an impact may be the terminal knot
         let knot = FreeDynamics::running(model.clone(), DT, vec![]).unwrap();
         let mut problem = Problem::new(x.clone(), vec![Box::new(knot)], vec![0], Box::new(impact)).unwrap();
         assert_eq!(problem.motion_at(1, &x, &[]).unwrap(), motion);
     }
 }
 
-/// In a solution of a trot, each knot has contacts at the standing feet, and their forces carry the robot.
+/// In a solution of a trot, each knot has contacts at the standing feet, and the forces of these contacts carry the
+/// robot.
 #[test]
 fn a_solution_of_a_trot_has_forces_at_the_feet_that_stand() {
     let model = Arc::new(robots::quadruped());

@@ -1,4 +1,4 @@
-//! User-defined residuals that are written for any scalar: exact Jacobians, as costs, limits and path constraints.
+//! User-defined residuals, written for any scalar, have exact Jacobians and can be costs, limits and path constraints.
 
 use super::*;
 use condyle_optimal::robot::{
@@ -7,10 +7,10 @@ use condyle_optimal::robot::{
 use condyle_optimal::{AugmentedLagrangian, Constrained, GroupModel, PathConstraint};
 use condyle_spatial::Scalar;
 
-/// Tolerance of the same formulas in another order.
+/// Tolerance for the same formulas, evaluated in different order.
 const EXACT: f64 = 1e-11;
 
-/// Residual p − p_ref of a frame.
+/// Residual p − p_ref of the position of a frame.
 struct Place {
     frame: usize,
     target: Vec3<f64>,
@@ -30,7 +30,7 @@ impl GenericResidual for Place {
     }
 }
 
-/// Velocity of a frame, along its own axes.
+/// Velocity of a frame along the axes of the frame.
 struct Speed(usize);
 
 impl GenericResidual for Speed {
@@ -46,7 +46,7 @@ impl GenericResidual for Speed {
     }
 }
 
-/// Controls, as a residual.
+/// Residual whose entries are the controls.
 struct Drive(usize);
 
 impl GenericResidual for Drive {
@@ -59,7 +59,7 @@ impl GenericResidual for Drive {
     }
 }
 
-/// Residual with one entry that mixes all arguments and the knot: (1 + t) z Σ v + z Σ u.
+/// Residual with one entry that depends on all arguments and on the knot's index t: (1 + t) z Σ v + z Σ u.
 struct Mixed(usize);
 
 impl GenericResidual for Mixed {
@@ -79,7 +79,7 @@ fn own(model: &Arc<Model>, function: impl GenericResidual) -> Residual {
     Residual::Own(OwnResidual::autodiff(model.clone(), function))
 }
 
-/// Returns costs with built-in residuals, and the same costs with user-defined ones.
+/// Returns costs with built-in residuals, and the same costs with user-defined residuals.
 fn both(model: &Arc<Model>, frame: &str, nu: usize) -> [Vec<Cost>; 2] {
     let (number, target) = (model.frame(frame).unwrap(), Vec3::new(0.3, -0.2, 0.7));
     let built_in = [
@@ -97,7 +97,7 @@ fn both(model: &Arc<Model>, frame: &str, nu: usize) -> [Vec<Cost>; 2] {
     })
 }
 
-/// Compares two actions at knots side by side.
+/// Compares costs and derivatives of two actions for a group of knots.
 fn compare(what: &str, mut a: impl GroupModel, mut b: impl GroupModel, model: &Model, rng: &mut StdRng) {
     let (ndx, nx, nu, knots) = (a.ndx(), a.nx(), a.nu(), [0, 1, 2, 3, 4]);
     let xs: Vec<_> = knots.iter().flat_map(|_| random_state(model, rng)).collect();
@@ -160,7 +160,7 @@ fn derivatives_of_an_own_residual_are_those_of_the_action() {
     }
 }
 
-/// Creates the problem of an arm that reaches for a point, exactly or as a cost.
+/// Creates the problem of an arm that reaches for a point. The point is a limit of the terminal knot or a cost.
 fn reach(residual: Residual, limit: bool) -> Problem {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
@@ -195,7 +195,7 @@ fn an_own_residual_can_be_a_limit_or_a_path_constraint() {
     let built_in = solve(reach(Residual::FrameTranslation { frame: "tool".into(), target }, true), 1);
     let limit = solve(reach(Residual::Own(place()), true), 1);
     assert!(largest_difference(&limit, &built_in) < OPTIMUM);
-    // the same as a constraint around an action without limits
+    // the same residual as a path constraint gives the same optimum
     let x0 = built_in[..14].to_vec();
     let rest = Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic);
     let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);

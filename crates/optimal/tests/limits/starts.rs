@@ -1,5 +1,5 @@
-//! Warm starts outside the bounds, or far from any solution: the result is within the bounds, or reports that it is
-//! not.
+//! Warm starts outside the bounds, or far from any solution: the result is within the bounds, or the status reports a
+//! failure.
 
 use super::{ARM, quadratic};
 use condyle_dynamics::{ContactConstraint as Held, Model, ReferenceFrame, Vec3, neutral, robots};
@@ -8,10 +8,10 @@ use condyle_optimal::{AugmentedLagrangian, Fddp, Problem, Solution, Status, Viol
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Largest effort of the arm (N m); holding the initial posture takes 29.6 at the second joint.
+/// Maximum effort of each joint (N m). To hold the initial posture, the second joint needs 29.6 N m.
 const WEAK: f64 = 20.0;
 const HORIZON: usize = 15;
-/// Cost of the optimum, by IPOPT, and its accuracy.
+/// Cost of the optimum, computed with IPOPT; `DIGITS` is the accuracy of this cost.
 const IPOPT: f64 = 0.7869;
 const DIGITS: f64 = 2e-4;
 
@@ -19,8 +19,8 @@ fn control() -> Residual {
     Residual::Control { reference: vec![0.0; 7] }
 }
 
-/// Creates the problem of an arm that ends at `end`, with its efforts bounded directly or by limits. Also returns the
-/// efforts that hold the arm still.
+/// Creates the problem of an arm with the terminal action `end`. Efforts are bounded by limits if `limits` is set,
+/// otherwise by control bounds. Also returns the efforts that hold the arm still.
 fn arm(limits: bool, end: FreeDynamics) -> (Problem, Vec<f64>) {
     let costs =
         vec![quadratic("rest", 0.1, Residual::State { reference: ARM.to_vec() }), quadratic("effort", 1e-3, control())];
@@ -55,7 +55,7 @@ fn most(us: &[f64]) -> f64 {
     us.iter().fold(0.0, |most, u| most.max(u.abs()))
 }
 
-/// Returns random controls up to a size, or all of that size.
+/// Returns random controls between −`size` and `size`; if `saturated`, each control is ±`size`.
 fn random(n: usize, size: f64, seed: u64, saturated: bool) -> Vec<f64> {
     let mut random = StdRng::seed_from_u64(seed);
     let mut one = || 2.0 * random.random::<f64>() - 1.0;
@@ -69,7 +69,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     for (limits, start) in [(false, still.clone()), (false, clipped(&still, WEAK)), (true, still.clone())] {
         let (mut problem, _) = arm(limits, exact());
         let mut solver = AugmentedLagrangian::new(&problem);
-        solver.inner.project_warm_start = false; // it is projected nevertheless
+        solver.inner.project_warm_start = false; // the start is projected nevertheless
         let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &start).unwrap();
         assert!(solution.status == Status::Converged && most(&solution.us) <= WEAK + 1e-6);
         let cost = solver.outcome().cost;
@@ -82,7 +82,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert!(solution.status == Status::MaxIterations || solution.status == Status::Converged);
     assert!(most(&solution.us) <= WEAK);
-    // as in Crocoddyl: the start is kept, no step from it is accepted, and the status reports this
+    // as in Crocoddyl, the start is kept, no step from this start is accepted, and the status reports this
     solver.settings.project_warm_start = false;
     let kept = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert!(kept.status != Status::Converged && kept.us == still);
@@ -98,7 +98,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     assert!(most(solver.solution().u(HORIZON - 1)) <= WEAK && most(solver.solution().u(0)) > WEAK);
 }
 
-/// Bounds that become narrower between two solves also apply to the trajectory that is resumed.
+/// If bounds become narrower between two solves, they also apply to the resumed trajectory.
 #[test]
 fn bounds_may_change_between_solves() {
     let (mut problem, still) = arm(false, exact());
@@ -120,7 +120,8 @@ fn assert_honest(solution: &Solution, primal: f64, bound: f64, case: &str) {
     }
 }
 
-/// Starts have controls of ±1 to ±200, at the initial state or rolled out; many exceed all bounds or diverge.
+/// Starts have controls of ±1 to ±200. Their states are all the initial state, or the rollout of the controls. Many
+/// starts exceed all bounds or diverge.
 #[test]
 fn any_start_leads_somewhere() {
     let (mut solved, mut count) = (0, 0);
@@ -145,12 +146,12 @@ fn any_start_leads_somewhere() {
     assert!(count >= 16 && 4 * solved >= 3 * count, "{solved} of {count}");
 }
 
-/// The same for a quadruped that stands on four feet, and shifts its trunk forwards with bounded efforts.
+/// A quadruped that stands on four feet shifts its trunk forwards with bounded efforts, from many different starts.
 #[test]
 fn a_stance_starts_anywhere() {
     let model: Arc<Model> = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     let x0 = [q, vec![0.0; 18]].concat();
     let (bound, horizon) = (80.0, 8);
     let contacts = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"].map(|foot| {
@@ -186,7 +187,7 @@ fn a_stance_starts_anywhere() {
     assert!(costs.iter().all(|cost| (cost - costs[0]).abs() < 1e-4 * costs[0]), "{costs:?}");
 }
 
-/// If FDDP itself reports convergence, the solution is within the bounds, with projection and without.
+/// If FDDP alone reports convergence, the solution is within the bounds, with projection of the start and without.
 #[test]
 fn fddp_never_converges_outside_of_the_bounds() {
     let reach = vec![quadratic("reach", 100.0, point())];
@@ -202,7 +203,7 @@ fn fddp_never_converges_outside_of_the_bounds() {
                 let case = format!("±{size}, seed {seed}, projected {project}");
                 assert_honest(solution, 0.0, WEAK, &case);
                 assert!(!project || most(&solution.us) <= WEAK, "{case}");
-                // an iterate within the bounds precedes a start outside them
+                // an iterate within the bounds is preferred to a start outside them
                 let stepped = solution.trace.iter().any(|iteration| iteration.accepted);
                 if stepped && solution.status != Status::NotFinite {
                     assert!(most(&solution.us) <= WEAK, "{case}: {:?}", solution.status);
@@ -212,7 +213,7 @@ fn fddp_never_converges_outside_of_the_bounds() {
     }
 }
 
-/// A limit that x̂₀ itself violates proves infeasibility; the other constraints are still satisfied.
+/// A limit that the initial state x̂₀ violates proves infeasibility; all other constraints are still satisfied.
 #[test]
 fn a_proof_names_the_limit() {
     let mut lower = vec![f64::NEG_INFINITY; 14];
@@ -243,7 +244,7 @@ fn a_proof_names_the_limit() {
     assert!((tool.translation - Vec3::new(0.35, 0.2, 0.6)).norm_squared().sqrt() < 1e-5);
 }
 
-/// In a solve without iterations, a gap is reported as evidence, too.
+/// In a solve without iterations, a gap can also be the reported violation.
 #[test]
 fn a_gap_is_named() {
     let (mut problem, still) = arm(true, exact());

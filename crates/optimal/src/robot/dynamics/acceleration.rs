@@ -1,4 +1,4 @@
-//! Accelerations of a robot, and the methods that all of its knots share.
+//! Accelerations of a robot, and the methods that all kinds of a robot's knots share.
 
 use super::batch::Group;
 use super::robot::RobotDynamics;
@@ -18,7 +18,7 @@ use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Accelerations of a robot, with costs. `K` tells how they follow: see
+/// Accelerations and costs of a robot. `K` is the kind of the robot's dynamics: see
 /// [`FreeAcceleration`](crate::robot::FreeAcceleration), [`ContactAcceleration`](crate::robot::ContactAcceleration),
 /// [`ControlledAcceleration`](crate::robot::ControlledAcceleration) and
 /// [`ControlledContactAcceleration`](crate::robot::ControlledContactAcceleration).
@@ -55,7 +55,7 @@ kinds! {
 }
 
 impl<K> RobotAcceleration<K> {
-    /// Wraps the dynamics of the kind `K`.
+    /// Wraps a robot's dynamics, which must be of the kind `K`.
     pub(super) fn of(robot: RobotDynamics) -> Self {
         Self { robot, kind: PhantomData }
     }
@@ -72,7 +72,7 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         &self.inner().robot.model
     }
 
-    /// Returns the costs of all knots without their own costs, to change weights and targets between solves.
+    /// Returns the common costs of all knots without separate costs, to change weights and targets between solves.
     pub fn costs_mut(&mut self) -> &mut Costs {
         self.terms_mut().costs_mut(None)
     }
@@ -82,7 +82,7 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         self.terms_mut().costs_mut(Some(t))
     }
 
-    /// Changes the weights of the terms called `name` of all knots, between solves; returns whether such a term exists.
+    /// Changes the weight of the term called `name` at all knots, between solves. Returns whether such a term exists.
     ///
     /// # Errors
     /// [`Error::Cost`] if the weight is negative or not finite; the old weights are then kept.
@@ -90,8 +90,8 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         self.terms_mut().set_weight(name, weight)
     }
 
-    /// Sets the costs of knot t of the horizon, so that one action serves knots that differ in their targets. They move
-    /// with their knot when the horizon is [shifted](crate::Problem::shift). Allocates.
+    /// Sets separate costs for knot t of the horizon, so that one action can have a different target at each knot. When
+    /// the horizon is [shifted](crate::Problem::shift), the costs move with their knot. Allocates.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit; [`Error::Size`] for a knot beyond 2²⁰.
@@ -99,7 +99,7 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         self.terms_mut().set_costs(t, costs)
     }
 
-    /// Returns the same action with limits at all knots without their own limits.
+    /// Returns the same action with common limits for all knots without separate limits.
     ///
     /// # Errors
     /// [`Error::Limit`] for a limit that does not fit.
@@ -108,7 +108,8 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         Ok(self)
     }
 
-    /// Sets the limits of knot t of the horizon, between solves; they too move with their knot. Allocates.
+    /// Sets separate limits for knot t of the horizon, between solves. When the horizon is shifted, the limits move
+    /// with their knot. Allocates.
     ///
     /// # Errors
     /// [`Error::Limit`] for a limit that does not fit; [`Error::Size`] for a knot beyond 2²⁰.
@@ -116,9 +117,9 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         self.terms_mut().set_limits(Some(t), limits)
     }
 
-    /// Returns the smallest controls that hold the robot still at a state as nearly as possible. With contacts they are
-    /// computed together with the contact forces λ: (S u, λ) = [S Jᵀ]⁺ g(q). If accelerations are controls, they are
-    /// zero; if contact forces are controls too, λ follows them. Allocates.
+    /// Returns the smallest controls u that hold the robot still at the state `x`, as nearly as possible. With
+    /// contacts, u and the contact forces λ are computed together: (u, λ) = [S Jᵀ]⁺ g(q). Controls that are
+    /// accelerations are zero; if contact forces are controls too, the result is zeros, then λ. Allocates.
     ///
     /// # Panics
     /// If `x` does not have nq + nv numbers.

@@ -1,7 +1,8 @@
-//! Dynamics of one knot, or of several side by side in the lanes of a vector register, with what their residuals see.
+//! Dynamics of one knot, or of several knots in the lanes of a vector register, with the quantities that residuals
+//! read.
 //!
 //! The coordinates of knots are packed so that each number has a lane for each knot; the passes of dynamics then run
-//! once for all of them. What they give is unpacked into the data of each knot, since the costs and the sweep look at
+//! once for all these knots. The results are unpacked into the data of each knot, because costs and the sweep process
 //! one knot after the other.
 #![allow(non_snake_case)] // J, M
 
@@ -27,39 +28,40 @@ use condyle_spatial::{Matrix, matrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Law from which accelerations follow.
+/// Equations that determine the accelerations.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum DynamicsKind {
-    /// Nowhere: time stands still, or the state jumps.
+    /// No accelerations: a terminal knot.
     None,
-    /// q̈ = M⁻¹ (τ − h).
+    /// Free motion, q̈ = M⁻¹ (τ − h).
     Free,
-    /// M q̈ + h = τ + Jᵀλ, J q̈ + γ = 0, with the damping μ.
+    /// Motion in contact, M q̈ + h = τ + Jᵀλ and J q̈ + γ = 0: contacts and the damping μ.
     Contact(Vec<Contact>, f64),
-    /// v⁺ − v = −M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v.
+    /// Impact, v⁺ − v = −M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v.
     Impact {
         contacts: Vec<Contact>,
-        /// ε.
+        /// Coefficient of restitution ε.
         restitution: f64,
-        /// μ.
+        /// Damping μ.
         damping: f64,
     },
-    /// Controls: q̈ = u, and τ = M q̈ + h follows.
+    /// Inverse dynamics of free motion: the controls are q̈ = u; the efforts are τ = M q̈ + h.
     Inverse,
-    /// Controls: (q̈, λ) = u, and τ = M q̈ + h − Jᵀλ follows, for these contacts and drives.
+    /// Inverse dynamics in contact: the controls are (q̈, λ) = u; the efforts are τ = M q̈ + h − Jᵀλ. Fields: contacts
+    /// and actuation.
     ContactInverse(Vec<Contact>, Actuation),
 }
 
-/// States of some knots, and the quantities that are computed there.
+/// Knots with their states and controls, and the quantities that are computed for these knots.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group<'a> {
     /// Indices of the knots.
     pub knots: &'a [usize],
-    /// States and controls, one after the other.
+    /// States of the knots, one after the other; `us` has the controls of the knots.
     pub xs: &'a [f64],
     pub us: &'a [f64],
     pub what: Evaluation<'a>,
-    /// Whether limits count: not at later stages of a step.
+    /// Whether limits count; they do not at later stages of an integration step.
     pub limited: bool,
 }
 
@@ -70,19 +72,19 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Law with the scratch that it takes.
+/// Kind of dynamics with its workspace.
 #[derive(Debug)]
 pub(crate) enum Pass<S> {
     None,
     Free,
-    /// Constraints, and J. Shape: rows × nv.
+    /// Constraints of the contacts, and the Jacobian J of these constraints. Shape: rows × nv.
     Contact(Box<ConstraintSet<S>>, Matrix<S>),
     Inverse,
-    /// As [`Self::Contact`].
+    /// Constraints of the contacts, and the Jacobian J of these constraints. Shape: rows × nv.
     ContactInverse(Box<ConstraintSet<S>>, Matrix<S>),
 }
 
-/// Dynamics of as many knots as a scalar has lanes.
+/// Dynamics of as many knots as the scalar `S` has lanes.
 #[derive(Debug)]
 pub(crate) struct KnotBatch<S> {
     pub data: Data<S>,
@@ -91,17 +93,17 @@ pub(crate) struct KnotBatch<S> {
     residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
-    /// Output that the controls drive: τ, or q̈.
+    /// Output that the controls drive: the efforts τ, or the accelerations q̈ if accelerations are controls.
     tau: Vec<S>,
     a: Vec<S>,
     lambda: Vec<S>,
     linear: LinearEquations<S>,
-    /// Whether the last pass was at q.
+    /// Whether the last pass was computed at the position `q`.
     visited: bool,
 }
 
 impl<S: Block<Number = f64>> KnotBatch<S> {
-    /// Scratch for a robot whose accelerations obey a law that was checked.
+    /// Allocates the workspace for a robot; the contacts of `kind` have been checked before.
     #[inline(never)]
     pub(crate) fn new(model: &Model, kind: &DynamicsKind) -> Self {
         let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
@@ -128,13 +130,14 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         Self { data, pass, gravity_residual, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
-    /// Makes room for the equations of knots in inverse-dynamics form.
+    /// Allocates the workspace for the equations of knots in inverse-dynamics form.
     pub(crate) fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         self.linear = LinearEquations::new(tableau, eliminations);
     }
 
-    /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and
-    /// what the residuals see of those that read the same as the first one.
+    /// Computes the dynamics of the knots of `group` from the efforts or accelerations in the data of each knot. Also
+    /// computes the quantities that residuals read, at the knots whose residuals differ from the first knot's only in
+    /// targets.
     pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: &HorizonTerms, to: &mut [KnotData]) {
         self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
@@ -145,7 +148,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.run_residuals(model, group, terms, to);
     }
 
-    /// Sets the states of some knots.
+    /// Copies the states of the knots into the lanes of q and v.
     fn pack(&mut self, model: &Model, xs: &[f64], of: &[KnotData]) {
         let (nq, nx) = (model.nq(), model.nq() + model.nv());
         pack(of.len(), |k| &xs[k * nx..][..nq], &mut self.q);
@@ -211,15 +214,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// Computes the equations of some knots at their states, for the accelerations and forces that the data of each
-    /// holds.
+    /// Computes the equations of motion of the knots at the states `xs`, for the accelerations and forces in the data
+    /// of each knot.
     pub(crate) fn run_equations_at(&mut self, model: &Model, xs: &[f64], to: &mut [KnotData]) {
         self.pack(model, xs, to);
         self.run_equations(model, to);
     }
 
-    /// Computes the equations that accelerations and forces satisfy, which are known, with the limbs and the base
-    /// solved.
+    /// Computes the equations that the known accelerations and forces satisfy, and eliminates the limbs and the base
+    /// from them.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
         let Self { data, pass, q, v, a, lambda, linear, .. } = self;
         pack(to.len(), |k| &to[k].a, a);
@@ -243,7 +246,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// Computes what the residuals see of a knot whose accelerations are known.
+    /// Computes the quantities that residuals read, at a knot whose accelerations are known.
     pub(crate) fn run_residuals_at(
         &mut self,
         model: &Model,
@@ -257,7 +260,8 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.run_residuals(model, group, terms, to);
     }
 
-    /// Computes what the residuals see of those knots that read the same as the first one.
+    /// Computes the quantities that residuals read, at the knots whose residuals differ from the first knot's only in
+    /// targets.
     fn run_residuals(
         &mut self,
         model: &Model,
@@ -289,16 +293,16 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 }
 
-/// Linear equations of some knots, side by side.
+/// Linear equations of several knots, with one lane for each knot.
 #[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
-    /// Eliminations in their order: of the limbs, and of the base.
+    /// Eliminations in order: first of the limbs, then of the base.
     eliminations: Vec<Arc<LimbElimination>>,
     tableau: Vec<S>,
     /// Tableau before an elimination.
     before: Vec<S>,
-    /// B⁻¹ of each block of an elimination, and Y of one.
+    /// Inverses B⁻¹ of all blocks of an elimination; `Y` is the matrix Y = B⁻¹ J of one block.
     inverses: Vec<S>,
     Y: Vec<S>,
 }
@@ -313,7 +317,8 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
         Self { size, eliminations, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
     }
 
-    /// Solves the limbs and the base of the knots where that can be, and writes the equations to the data of each.
+    /// Eliminates the limbs and the base of each knot where this is possible, and writes the equations to the knot's
+    /// data.
     fn solve(&mut self, to: &mut [KnotData]) {
         let Self { size, eliminations, tableau, before, inverses, Y } = self;
         let mut singular = S::zero();
@@ -337,13 +342,13 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
     }
 }
 
-/// Writes numbers of some knots side by side.
+/// Copies the numbers of `count` knots into the lanes of `to`, one lane for each knot.
 fn pack<'a, S: Block<Number = f64>>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
     let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| of(k.min(count - 1)));
     gather_rows(&rows[..count], to);
 }
 
-/// Writes three matrices to the data of each knot.
+/// Copies each lane of three matrices to the data of one knot.
 fn unpack_matrices<S: Block<Number = f64>>(
     from: [&Matrix<S>; 3],
     to: &mut [KnotData],

@@ -12,18 +12,18 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Forward dynamics of a robot in contact, and costs: q̈ and λ of M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0.
+/// Forward dynamics and costs of a robot in contact: q̈ and λ solve M q̈ + h = S u + Jᵀλ and J q̈ + γ = 0.
 pub type ContactAcceleration = RobotAcceleration<InContact>;
 
-/// Knot of a robot in contact, by default under its joints' efforts and by semi-implicit Euler:
+/// Knot of a robot in contact, by default with joint efforts as controls and with semi-implicit Euler:
 ///
 /// ```text
 /// [ M  Jᵀ ] [  q̈ ]   [ S u − h ]
 /// [ J  −μ ] [ −λ ] = [ −γ      ],   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// Any set of point and rigid contacts, also none. The damping μ makes J M⁻¹ Jᵀ + μ 1 regular where contacts are
-/// redundant. These are Crocoddyl's rules (`DifferentialActionModelContactFwdDynamics`).
+/// Any set of point and rigid contacts is allowed, also an empty set. The damping μ makes J M⁻¹ Jᵀ + μ 1 regular if
+/// contacts are redundant. The equations are the same as in Crocoddyl's `DifferentialActionModelContactFwdDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -44,12 +44,12 @@ pub type ContactAcceleration = RobotAcceleration<InContact>;
 pub type ContactDynamics = Integrated<ContactAcceleration>;
 
 impl ContactAcceleration {
-    /// Returns a robot with some drives, in contact, with the damping μ.
+    /// Creates the dynamics of a robot in contact, with an actuation and the damping μ.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular with another one on the same
-    /// body without damping; [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for drives of another
-    /// robot, or a robot with joints that move no mass.
+    /// [`Error::Contact`] for a contact that does not fit, whose name another contact has, or that is singular with
+    /// another contact on the same body without damping; [`Error::Cost`] for a term that does not fit;
+    /// [`Error::Actuation`] for the actuation of another robot, or a robot with joints that move no mass.
     pub fn new(
         model: Arc<Model>,
         actuation: Actuation,
@@ -65,12 +65,12 @@ impl ContactAcceleration {
 }
 
 impl ContactDynamics {
-    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler,
-    /// without damping. For other drives, integrators and damping see [`ContactAcceleration::new`] and
+    /// Creates a knot of Δt seconds with semi-implicit Euler and without damping. All joints are driven, except a
+    /// free-flyer at the root. For other actuations, integrators and damping see [`ContactAcceleration::new`] and
     /// [`Integrated::new`].
     ///
     /// # Errors
-    /// As [`ContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
+    /// The errors of [`ContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
     pub fn running(model: Arc<Model>, contacts: &[Contact], dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
         let actuation = Actuation::joints(&model);
         let inner = ContactAcceleration::new(model, actuation, contacts, 0.0, costs)?;

@@ -1,4 +1,4 @@
-//! Dynamics of a robot that touches nothing.
+//! Dynamics of a robot without contacts.
 
 use super::acceleration::{Free, RobotAcceleration};
 use super::batch::DynamicsKind;
@@ -11,16 +11,17 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Forward dynamics of a robot that touches nothing: q̈ = aba(q, v, S u), and costs.
+/// Forward dynamics q̈ = aba(q, v, S u) and costs of a robot without contacts.
 pub type FreeAcceleration = RobotAcceleration<Free>;
 
-/// Knot of a robot that moves freely, by default under its joints' efforts and by semi-implicit Euler:
+/// Knot of a robot that moves freely, by default with joint efforts as controls and with semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = aba(q, v, S u),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// The state is x = (q, v). A terminal knot has no controls and no Δt: ℓ = Σ w a(r). These are Crocoddyl's rules.
+/// The state is x = (q, v). A terminal knot has no controls and no Δt: ℓ = Σ w a(r). The equations are the same as in
+/// Crocoddyl.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -38,11 +39,11 @@ pub type FreeAcceleration = RobotAcceleration<Free>;
 pub type FreeDynamics = Integrated<FreeAcceleration>;
 
 impl FreeAcceleration {
-    /// Returns a robot with some drives.
+    /// Creates the dynamics of a robot with an actuation.
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for drives of another robot, or a robot with
-    /// joints that move no mass.
+    /// [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for the actuation of another robot, or a
+    /// robot with joints that move no mass.
     pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
         let capabilities = Capabilities { nu: actuation.nu(), effort: true, ..Capabilities::default() };
         RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Free, costs).map(Self::of)
@@ -50,8 +51,8 @@ impl FreeAcceleration {
 }
 
 impl FreeDynamics {
-    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler. For
-    /// other drives or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
+    /// Creates a knot of Δt seconds with semi-implicit Euler. All joints are driven, except a free-flyer at the root.
+    /// For other actuations or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
@@ -61,7 +62,8 @@ impl FreeDynamics {
         Self::new(FreeAcceleration::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 
-    /// Creates the terminal knot. Terms of the control must have an empty reference, because it has no controls.
+    /// Creates the terminal knot. Terms of the control must have an empty reference, because a terminal knot has no
+    /// controls.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.

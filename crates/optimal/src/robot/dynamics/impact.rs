@@ -9,25 +9,25 @@ use condyle_dynamics::{
     impulse_dynamics_derivatives,
 };
 
-/// Impact of some contacts, with its workspace.
+/// Impact at a set of contacts, with its workspace.
 #[derive(Debug)]
 pub(super) struct Impact {
     set: ConstraintSet<f64>,
     restitution: f64,
-    /// Zeros. Shape: nv.
+    /// Vector of zeros. Shape: nv.
     zero: Vec<f64>,
 }
 
 impl Impact {
-    /// Allocates the workspace for dynamics that are an impact.
+    /// Allocates the workspace of an impact; `None` for all other kinds of dynamics.
     pub(super) fn new(model: &Model, kind: &DynamicsKind) -> Option<Self> {
         let DynamicsKind::Impact { contacts, restitution, damping } = kind else { return None };
         let set = constraint_set(model, contacts, *damping).expect("was checked when it was given");
         Some(Self { set, restitution: *restitution, zero: vec![0.0; model.nv()] })
     }
 
-    /// Computes v⁺ − v and the impulses at a state, with their derivatives if `slopes` is set, and what the terms need
-    /// of them.
+    /// Computes v⁺ − v and the impulses at a state, and the quantities that the terms read. If `slopes` is set, also
+    /// computes the derivatives of all these.
     pub(super) fn run(
         &mut self,
         model: &Model,
@@ -62,7 +62,7 @@ fn write_change(v: &[f64], after: &[f64], lambda: &[f64], to: &mut KnotData) {
     to.lambda.copy_from_slice(lambda);
 }
 
-/// Writes J_c (v⁺ − v), and its derivatives if they are asked for.
+/// Writes J_c (v⁺ − v), the velocity change of the centre of mass, and its derivatives if `slopes` is set.
 fn write_com_change(model: &Model, data: &mut Data<f64>, [q, zero]: [&[f64]; 2], slopes: bool, to: &mut KnotData) {
     let KnotData { a: change, residuals, .. } = to;
     residuals.com_change = forward_velocities(model, data, q, change).com_velocity().to_array();

@@ -1,4 +1,4 @@
-//! Impacts: knots without time and controls, at which velocities jump.
+//! Impacts: knots without duration and controls, at which velocities jump.
 
 use super::acceleration::{InImpact, RobotAcceleration};
 use super::batch::DynamicsKind;
@@ -12,14 +12,14 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Knot at which contacts are made, with the restitution ε and the damping μ:
+/// Impact: a knot at which contacts begin, with the coefficient of restitution ε and the damping μ:
 ///
 /// ```text
 /// q⁺ = q,   v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v,   ℓ = Σ w a(r)
 /// ```
 ///
-/// It takes no time and has no controls. Residuals are functions of the state before the impact. Only the frames and
-/// axes of the contacts count. These are Crocoddyl's rules (`ActionModelImpulseFwdDynamics`).
+/// An impact has no duration and no controls. Residuals are functions of the state before the impact. Only the frames
+/// and axes of the contacts are used. The equations are the same as in Crocoddyl's `ActionModelImpulseFwdDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -39,12 +39,12 @@ use std::sync::Arc;
 pub type ImpulseDynamics = Integrated<RobotAcceleration<InImpact>>;
 
 impl ImpulseDynamics {
-    /// Creates the knot of an impact of some contacts.
+    /// Creates the knot of an impact at which `contacts` begin.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, is named twice, or is singular with another one on the same
-    /// body without damping, and for a restitution that is not from 0 to 1; [`Error::Cost`] for a term that does not
-    /// fit; [`Error::Actuation`] for a robot with joints that move no mass.
+    /// [`Error::Contact`] for a contact that does not fit, whose name another contact has, or that is singular with
+    /// another contact on the same body without damping; also for a restitution that is not from 0 to 1;
+    /// [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for a robot with joints that move no mass.
     pub fn instant(
         model: Arc<Model>,
         contacts: &[Contact],

@@ -1,4 +1,4 @@
-//! Dynamics of a robot whose accelerations are the controls, and whose efforts follow by inverse dynamics.
+//! Dynamics of a robot whose controls are its accelerations; inverse dynamics give the efforts.
 
 use super::acceleration::{Controlled, RobotAcceleration};
 use super::batch::DynamicsKind;
@@ -11,20 +11,20 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Inverse dynamics of a robot that touches nothing: q̈ = u, τ = rnea(q, v, u), and costs.
+/// Inverse dynamics q̈ = u, τ = rnea(q, v, u) and costs of a robot without contacts.
 pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 
-/// Knot of a robot whose nv controls are its accelerations, by semi-implicit Euler:
+/// Knot of a robot whose nv controls are its accelerations, by default with semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = u,   τ = rnea(q, v, u),   v⁺ = v + u Δt,   q⁺ = q ⊕ (v Δt + u Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// No equation is solved, so that a knot costs less than one of [`FreeDynamics`](crate::robot::FreeDynamics). Efforts
-/// are looked at by [`Residual::JointEffort`](crate::robot::Residual::JointEffort); where nothing drives a floating
-/// base they must be 0, which a [`Limit`](crate::robot::Limit) of
-/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) holds. For a robot in contact, and with other
-/// drives, see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
+/// No equation is solved, so a knot takes less time than a knot of [`FreeDynamics`](crate::robot::FreeDynamics).
+/// [`Residual::JointEffort`](crate::robot::Residual::JointEffort) reads the efforts. The efforts of an undriven
+/// floating base must be 0, which a [`Limit`](crate::robot::Limit) of
+/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) enforces. For a robot in contact, and for other
+/// actuations, see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -42,7 +42,7 @@ pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 pub type FreeInverseDynamics = Integrated<ControlledAcceleration>;
 
 impl ControlledAcceleration {
-    /// Returns a robot that is driven at every coordinate.
+    /// Creates the dynamics of a robot whose controls are the accelerations of all coordinates.
     ///
     /// # Errors
     /// [`Error::Cost`] for a term that does not fit.
@@ -55,7 +55,7 @@ impl ControlledAcceleration {
 }
 
 impl FreeInverseDynamics {
-    /// Returns a knot of Δt seconds by semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`]
+    /// Creates a knot of Δt seconds with semi-implicit Euler. For other integrators see [`ControlledAcceleration::new`]
     /// and [`Integrated::new`].
     ///
     /// # Errors

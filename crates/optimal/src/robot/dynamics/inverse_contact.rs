@@ -1,4 +1,5 @@
-//! Dynamics of a robot in contact whose accelerations and forces are the controls, and whose efforts follow.
+//! Dynamics of a robot in contact whose controls are accelerations and contact forces; inverse dynamics give the
+//! efforts.
 
 use super::acceleration::{ControlledInContact, RobotAcceleration};
 use super::batch::DynamicsKind;
@@ -14,12 +15,12 @@ use crate::robot::residuals::residual::Residual;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Inverse dynamics of a robot in contact, and costs: (q̈, λ) = u, τ = M q̈ + h − Jᵀλ, which asks for Nᵀτ = 0 and J q̈
-/// + γ = 0.
+/// Inverse dynamics and costs of a robot in contact: (q̈, λ) = u and τ = M q̈ + h − Jᵀλ, with the conditions Nᵀτ = 0
+/// and J q̈ + γ = 0.
 pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 
-/// Knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts, by semi-implicit
-/// Euler:
+/// Knot of a robot in contact whose controls are its nv accelerations and its contact forces, by default with
+/// semi-implicit Euler:
 ///
 /// ```text
 /// (q̈, λ) = u,   τ = M q̈ + h − Jᵀλ,   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
@@ -27,12 +28,13 @@ pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 /// J q̈ + γ = 0    contacts hold
 /// ```
 ///
-/// The equations are [`Limit`]s that the knot has of itself, called `undriven efforts` and `contact …`, before those
-/// that are given; [`AugmentedLagrangian`](crate::AugmentedLagrangian) holds them, to [`Fddp`](crate::Fddp) alone they
-/// are costs. Nothing is inverted, so that contacts may be redundant and M singular. Its solutions equal the solutions
-/// with [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations if it applies. Without
-/// contacts it is [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with drives. These are Crocoddyl's rules
-/// (`DifferentialActionModelContactInvDynamics`, and `DifferentialActionModelFreeInvDynamics` without contacts).
+/// The last two equations are [`Limit`]s that the knot always has, called `undriven efforts` and `contact …`. They
+/// precede the user's limits. [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces them; for
+/// [`Fddp`](crate::Fddp) alone they are costs. No matrix is inverted, so contacts may be redundant and M singular.
+/// Solutions are the same as with [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations but
+/// cannot always be used. Without contacts, the knot is [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with
+/// an actuation. The equations are the same as in Crocoddyl's `DifferentialActionModelContactInvDynamics` and, without
+/// contacts, `DifferentialActionModelFreeInvDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -51,11 +53,11 @@ pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 pub type ContactInverseDynamics = Integrated<ControlledContactAcceleration>;
 
 impl ControlledContactAcceleration {
-    /// Returns a robot with some drives, in contact.
+    /// Creates the dynamics of a robot in contact, with an actuation.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit or is named twice; [`Error::Cost`] for a term that does not
-    /// fit; [`Error::Actuation`] for drives of another robot.
+    /// [`Error::Contact`] for a contact that does not fit, or whose name another contact has; [`Error::Cost`] for a
+    /// term that does not fit; [`Error::Actuation`] for the actuation of another robot.
     pub fn new(model: Arc<Model>, actuation: Actuation, contacts: &[Contact], costs: Vec<Cost>) -> Result<Self, Error> {
         actuation.check(&model)?;
         let (all, named, undriven) = (Actuation::all(&model), rows_of(contacts), actuation.undriven());
@@ -75,11 +77,11 @@ impl ControlledContactAcceleration {
 }
 
 impl ContactInverseDynamics {
-    /// Returns a knot of Δt seconds, driven at every joint except a free-flyer at the root, by semi-implicit Euler. For
-    /// other drives and integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
+    /// Creates a knot of Δt seconds with semi-implicit Euler. All joints are driven, except a free-flyer at the root.
+    /// For other actuations and integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
-    /// As [`ControlledContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
+    /// The errors of [`ControlledContactAcceleration::new`], and [`Error::TimeStep`] if Δt is not above 0.
     pub fn running(model: Arc<Model>, contacts: &[Contact], dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
         let actuation = Actuation::joints(&model);
         let inner = ControlledContactAcceleration::new(model, actuation, contacts, costs)?;

@@ -1,4 +1,4 @@
-//! The equations of a knot in contact, solved for what is not chosen: see [`InverseDynamicsForm`].
+//! Elimination of the dependent unknowns from the equations of a knot in contact: see [`InverseDynamicsForm`].
 //!
 //! Changes of accelerations a and forces f satisfy
 //!
@@ -8,11 +8,11 @@
 //! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        the joints               → δu
 //! ```
 //!
-//! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those
-//! that it may best do without. A contact's rows prefer joints that move no other contact; where these are close to
-//! singular (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are
-//! redundant is there no pivot, and the knot stays explicit. What the limbs in contact do, and then the base, is mostly
-//! solved before, for several knots side by side: see [`limb_elimination`](super::limb_elimination).
+//! Gauss–Jordan elimination solves each row of the first two groups for one unknown: the one with the largest entry
+//! among the row's preferred unknowns. Rows of a contact prefer joints that move no other contact. If the entries of
+//! these joints are too small (a straight knee), any acceleration is used. Rows of the base prefer forces. A pivot is
+//! missing only if contacts are redundant; the knot then stays explicit. The limbs in contact, and then the base, are
+//! mostly eliminated before, for several knots at once: see [`limb_elimination`](super::limb_elimination).
 #![allow(non_snake_case)] // J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
@@ -22,12 +22,13 @@ use crate::robot::residuals::rows::Row;
 use condyle_linalg::{Runs, SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
 use core::ops::Range;
 
-/// Pivot among the unknowns that are preferred may be so much smaller than the largest of all.
+/// Smallest accepted pivot among the preferred unknowns, relative to the row's largest entry.
 pub(super) const PREFERENCE: f64 = 1e-2;
-/// Pivot that is so much smaller than the row's largest entry was at first counts as zero.
+/// Pivot that counts as zero, relative to the row's largest entry before the elimination.
 const REDUNDANT: f64 = 1e-7;
 
-/// Size of the tableau of a knot: a row for each contact's row and each coordinate, over (δa, δf, δv, δq).
+/// Size of the tableau of a knot. It has a row for each row of a contact and for each coordinate, and columns for (δa,
+/// δf, δv, δq).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tableau {
     pub nv: usize,
@@ -43,33 +44,34 @@ impl Tableau {
         3 * self.nv + self.rows + SLACK
     }
 
-    /// Returns the number of its entries.
+    /// Returns the number of entries of the tableau.
     pub(crate) fn len(self) -> usize {
         (self.rows + self.nv) * self.stride()
     }
 }
 
-/// Elimination for one set of contacts, and its scratch.
+/// Elimination for one set of contacts, with its workspace.
 #[derive(Debug)]
 pub(crate) struct KktElimination {
     tableau: Tableau,
-    /// Number of coordinates, the first ones, that are not driven.
+    /// Number of undriven coordinates; the first coordinates are the undriven ones.
     passive: usize,
-    /// Coordinates that each contact's row prefers.
+    /// Coordinates that each row of a contact prefers to be solved for.
     preferred: Vec<Vec<usize>>,
-    /// Rows that are solved before, elimination after elimination, each with its column.
+    /// Rows that other eliminations solve before, each with its column, in the order of these eliminations.
     before: Vec<Vec<(usize, usize)>>,
-    /// Column that each row was solved for.
+    /// Column for which each row was solved.
     pivots: Vec<usize>,
-    /// Rows that are solved here.
+    /// Rows that this elimination solves.
     late: Vec<usize>,
-    /// Pivots for which places and runs were found.
+    /// Pivots for which `place` and `runs` were computed.
     laid_out: Vec<usize>,
-    /// Place of each column of δa and δf: its unknown, if it is one, or else the row of D or of forces for it.
+    /// For each column of δa and δf: the index of the unknown that the column is, or the row of D or `forces` that
+    /// gives its value.
     place: Vec<Place>,
-    /// From the columns of δa, and of δf, to the unknowns that they are.
+    /// Maps from the columns of δa, and from the columns of δf, to the indices of unknowns.
     runs: [Runs; 2],
-    /// Forces that are not unknowns, over (w, δv, δq).
+    /// Forces that are not unknowns, as rows with respect to (w, δv, δq).
     forces: SparseRows,
 }
 
@@ -79,15 +81,15 @@ enum Place {
     Row(usize),
 }
 
-/// Returns the driven coordinates that move a contact's row r and no other contact's.
+/// Returns the driven coordinates that move the contact of row r and no other contact.
 pub(super) fn own_coordinates(moved_by: &[Vec<usize>], r: usize, passive: usize) -> Vec<usize> {
     let alone = |k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
     moved_by[r].iter().copied().filter(|k| *k >= passive && alone(k)).collect()
 }
 
 impl KktElimination {
-    /// Returns the elimination for contacts whose rows are moved by some coordinates each, of a robot whose first
-    /// `passive` coordinates are not driven.
+    /// Creates the elimination for a robot in contact whose first `passive` coordinates are undriven. `moved_by` has
+    /// the coordinates that move each row of the contacts.
     pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
         let rows = moved_by.len();
         let preferred = (0..rows).map(|r| {
@@ -111,26 +113,26 @@ impl KktElimination {
         elimination
     }
 
-    /// Sets the rows that are solved before: see
+    /// Sets the rows that other eliminations solve before: see
     /// [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
     pub(crate) fn follow(&mut self, before: Vec<Vec<(usize, usize)>>) {
         self.before = before;
     }
 
-    /// Returns the columns that the rows of the base are best solved for in a tableau whose limbs are solved.
+    /// Returns the best columns to solve the rows of the base for, in a tableau whose limbs have been eliminated.
     pub(crate) fn base_pivots(&mut self, tableau: &mut [f64]) -> Option<Vec<usize>> {
         let (mut form, Tableau { nv, rows }) = (InverseDynamicsForm::default(), self.tableau);
         form.reserve(nv, nv - self.passive, [self.most_dependent(), 0]);
         self.run(tableau, 1, 1.0, &mut form).then(|| self.pivots[rows..].to_vec())
     }
 
-    /// Returns the most coordinates that are not unknowns.
+    /// Returns the maximum number of coordinates that are not unknowns.
     pub(crate) fn most_dependent(&self) -> usize {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau in which a number of eliminations are done; returns whether
-    /// pivots exist. Overwrites the tableau.
+    /// Writes U and D for steps of Δt, from a tableau in which the first eliminations have been done. Returns whether
+    /// all pivots exist. Overwrites the tableau.
     pub(crate) fn run(
         &mut self,
         tableau: &mut [f64],
@@ -143,12 +145,12 @@ impl KktElimination {
         done
     }
 
-    /// Returns the sensitivities of outputs by (w, δv, δq), for a knot whose U and D are these.
+    /// Returns the sensitivities of outputs with respect to (w, δv, δq), for a knot with U and D from `form`.
     pub(crate) fn sensitivities<'a>(&'a self, form: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
         Unknowns { elimination: self, form, dt }
     }
 
-    /// Returns the column with the largest entry of a row, and the entry.
+    /// Returns the column of the row's largest entry among `columns`, and this entry.
     #[inline(always)]
     fn largest(&self, row: &[f64], columns: impl Iterator<Item = usize>) -> (usize, f64) {
         let mut best = (0, 0.0);
@@ -160,7 +162,7 @@ impl KktElimination {
         best
     }
 
-    /// Returns the column to solve row r for.
+    /// Returns the column for which row r is solved; `None` without a pivot.
     #[inline(always)]
     fn choose(&self, r: usize, row: &[f64], scale: [f64; 2]) -> Option<usize> {
         let Tableau { nv, rows } = self.tableau;
@@ -174,15 +176,15 @@ impl KktElimination {
             return Some(k);
         }
         let (k, pivot) = any();
-        (pivot.abs() > REDUNDANT * scale[0]).then_some(k) // a NaN ends here
+        (pivot.abs() > REDUNDANT * scale[0]).then_some(k) // a NaN is no pivot
     }
 }
 
-/// Number of rows that are subtracted at once: the number of coordinates of a base that moves freely.
+/// Number of rows that are subtracted at once: the six coordinates of a free base.
 const TOGETHER: usize = 6;
 
 impl KktElimination {
-    /// Solves the rows that have no pivot yet; returns whether all have one now.
+    /// Solves the rows that have no pivot yet. Returns whether all rows have a pivot afterwards.
     #[inline(always)]
     fn eliminate<V: Vector>(&mut self, T: &mut [f64], motion: &mut [f64]) -> bool {
         let (Tableau { nv, rows }, stride) = (self.tableau, self.tableau.stride());
@@ -190,7 +192,7 @@ impl KktElimination {
         for row in T.chunks_exact(stride).skip(rows) {
             force_scale = force_scale.max(max_abs(&row[nv..][..rows]));
         }
-        self.laid_out.clear(); // what follows writes to the places
+        self.laid_out.clear(); // the next lines overwrite `place`
         self.place.fill(Place::Unknown(0));
         for (r, &k) in self.pivots.iter().enumerate().filter(|(_, k)| **k != usize::MAX) {
             self.place[k] = Place::Row(r);
@@ -202,7 +204,8 @@ impl KktElimination {
             }
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
-            // what the entries of a row that depends on others are compared with: a contact's are of order one
+            // a row whose pivot is small relative to `scale` depends on other rows; entries of contact rows are of
+            // order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = self.choose(r, row, scale) else { return false };
             self.place[k] = Place::Row(r);
@@ -222,7 +225,7 @@ impl KktElimination {
             }
             self.late.push(r);
         }
-        // what the rows were solved for goes out of the joints' rows, several at once
+        // eliminates the solved unknowns from the rows of the joints, several solved rows at once
         for other in motion.chunks_exact_mut(stride) {
             let (mut x, mut a, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0);
             for &r in &self.late {
@@ -243,7 +246,7 @@ impl KktElimination {
         true
     }
 
-    /// Finds the place of each column: the columns without a row are the unknowns.
+    /// Computes `place` for each column: the columns for which no row was solved are the unknowns.
     fn lay_out(&mut self) {
         let Self { tableau: Tableau { nv, rows }, pivots, place, runs, .. } = self;
         runs.iter_mut().for_each(Runs::clear);
@@ -293,7 +296,7 @@ impl Vectorized for Run<'_> {
         let size = form.stride;
         let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive };
 
-        // U; the dependent steps D; the dependent forces
+        // writes U, then the dependent steps D, then the dependent forces
         form.own.clear();
         form.own.extend(e.runs[0].iter());
         form.efforts.resize(gather.m, size);
@@ -317,7 +320,7 @@ impl Vectorized for Run<'_> {
     }
 }
 
-/// From the columns (δa, δf, δv, δq) to (w, δv, δq).
+/// Map from the columns (δa, δf, δv, δq) to (w, δv, δq).
 struct Gather<'a> {
     runs: &'a [Runs; 2],
     /// Columns of (δv, δq).
@@ -326,7 +329,8 @@ struct Gather<'a> {
 }
 
 impl Gather<'_> {
-    /// Writes a row's unknowns and states: what one part writes too much, the next goes over.
+    /// Copies the unknowns and states of a row. Each copy may write beyond its end; the next copy overwrites these
+    /// numbers.
     #[inline(always)]
     fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
         self.runs[0].copy_scaled::<V>(row, by_a, to);
@@ -335,7 +339,7 @@ impl Gather<'_> {
     }
 }
 
-/// Sensitivities of a knot by (w, δv, δq); see [`KktElimination::sensitivities`].
+/// Sensitivities of a knot with respect to (w, δv, δq); see [`KktElimination::sensitivities`].
 pub(crate) struct Unknowns<'a> {
     elimination: &'a KktElimination,
     form: &'a InverseDynamicsForm,
@@ -343,7 +347,7 @@ pub(crate) struct Unknowns<'a> {
 }
 
 impl Unknowns<'_> {
-    /// g += c times row k of some rows.
+    /// Computes g += c times row k of `rows`.
     fn add(&self, rows: &SparseRows, k: usize, c: f64, g: &mut Row<'_>) {
         let row = &rows.numbers[k * self.form.stride..];
         let (u, x) = row.split_at(g.u.len());

@@ -1,19 +1,20 @@
-//! The equations of several knots in contact, solved side by side for what each contact's own limb does, then for the
-//! base.
+//! Elimination of unknowns from the equations of several knots in contact, with one lane for each knot: first the limb
+//! of each contact, then the base.
 //!
-//! In the tableau of [`kkt_elimination`](super::kkt_elimination) the rows of a contact hold the base, what stands
-//! between it and the limb, and the limb, whose joints move no other contact. Where these are as many as the rows, with
-//! B their block, the rows are solved for them, and they go out of the equations of motion:
+//! The tableau is described in [`kkt_elimination`](super::kkt_elimination). The rows of a contact have entries for the
+//! base, for the limb, and for joints between both. The joints of the limb move no other contact. Let B be the block of
+//! the limb's joints. If B is square, the rows are solved for these joints, which are then eliminated from the
+//! equations of motion:
 //!
 //! ```text
 //! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i of the equations that the limb is in
 //! ```
 //!
-//! Then the base's rows are solved for forces, and for accelerations where the contacts' forces cannot do all, in the
-//! same way. Which rows and columns all these are depends on the robot and its contacts only, so it is found once (what
-//! the base is solved for at some posture); the numbers are worked on for as many knots as a vector has lanes. A robot
-//! that touches nothing is solved for its base's accelerations. Where B is close to singular in some knot (a straight
-//! knee), that knot keeps the equations as they were, and its pivots are chosen one by one.
+//! Then the rows of the base are solved in the same way for forces and, if forces are not enough, for accelerations.
+//! The rows and columns depend only on the robot and its contacts, so they are determined once; for the base, at one
+//! posture. The numbers are computed for as many knots as a vector has lanes. Without contacts, the rows of the base
+//! are solved for the accelerations of the base. If B is close to singular at a knot (a straight knee), this knot keeps
+//! its original equations, and its pivots are chosen one by one.
 #![allow(non_snake_case)] // B, J, M, T, Y
 
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
@@ -23,34 +24,34 @@ use condyle_spatial::{Matrix, Scalar, kernel, same_layout};
 use core::ops::Range;
 use std::sync::Arc;
 
-/// Number of rows that are solved together, for a point, for a sole, and for a base that moves freely.
+/// Number of rows that are solved together: 3 for a point; 6 for a sole and for a free base.
 const SIZES: [usize; 2] = [3, 6];
 const MOST: usize = SIZES[1];
-/// B of a base that touches nothing is positive definite: a pivot so much smaller than its row's largest entry is
-/// rounding.
+/// Smallest accepted pivot for a base without contacts, relative to the row's largest entry. B is positive definite
+/// there, so a smaller pivot is a rounding error.
 const DEFINITE: f64 = 1e-9;
-/// Columns for a base in contact were chosen at another posture: a pivot that is so much smaller than its row's largest
-/// entry takes more digits than one that is chosen for the knot.
+/// Smallest accepted pivot for a base in contact, relative to the row's largest entry. The columns were chosen at
+/// another posture; a smaller pivot would lose more digits than a pivot that is chosen at the knot.
 const CHOSEN_ELSEWHERE: f64 = 1e-3;
 
-/// Some rows of the tableau that are solved for as many columns.
+/// Block of the tableau: rows that are solved for the same number of columns.
 #[derive(Clone, Debug, PartialEq)]
 struct Block {
-    /// Rows.
+    /// Rows of the block.
     rows: Range<usize>,
-    /// Columns: of coordinates, or of forces.
+    /// Columns for which the rows are solved: coordinates, or forces.
     solved: Vec<usize>,
-    /// Other columns in which the rows have entries, in runs.
+    /// Other columns in which the rows have entries, as ranges.
     columns: Vec<Range<usize>>,
     /// Other rows in which the solved columns have entries.
     others: Vec<usize>,
-    /// Columns, of both kinds, in which a row's largest entry is looked for.
+    /// Columns among which the largest entry of a row is determined: solved and other columns.
     compared: Vec<usize>,
-    /// Least pivot of B, over the row's largest entry.
+    /// Smallest accepted pivot of B, relative to the row's largest entry.
     least: f64,
 }
 
-/// Where a tableau has entries.
+/// Sparsity pattern of a tableau: the positions of its nonzero entries.
 #[derive(Debug)]
 struct Pattern {
     width: usize,
@@ -58,7 +59,8 @@ struct Pattern {
 }
 
 impl Pattern {
-    /// Returns the entries for contacts whose rows are moved by some coordinates each, with damping or without.
+    /// Returns the pattern for a robot in contact, with damping or without. `moved_by` has the coordinates that move
+    /// each row of the contacts.
     fn new(model: &Model, tableau: Tableau, moved_by: &[Vec<usize>], damped: bool) -> Self {
         let (Tableau { nv, rows }, coupled) = (tableau, coupled(model));
         let width = 3 * nv + rows;
@@ -80,7 +82,8 @@ impl Pattern {
         pattern
     }
 
-    /// Some rows, solved for as many columns; the entries are those afterwards.
+    /// Returns the block that solves `rows` for the columns `solved`, and updates the pattern to the one after the
+    /// elimination.
     fn solve(&mut self, rows: Range<usize>, solved: Vec<usize>, compared: Range<usize>, least: f64) -> Block {
         let Self { width, has } = self;
         let mut all = vec![false; *width];
@@ -108,7 +111,7 @@ impl Pattern {
     }
 }
 
-/// Rows of a robot in contact that are solved one block after the other, and where their entries are.
+/// Blocks of rows of a robot in contact, which are solved one after the other, with the positions of their entries.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LimbElimination {
     blocks: Vec<Block>,
@@ -117,9 +120,8 @@ pub(crate) struct LimbElimination {
 same_layout!(LimbElimination);
 
 impl LimbElimination {
-    /// Returns the limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved
-    /// by some coordinates each, with damping or without; and then the base, for columns that are found for the limbs.
-    /// What has no blocks is left out.
+    /// Returns the eliminations of a robot whose first `passive` coordinates are undriven: of the limbs, then of the
+    /// base, whose columns are determined from the elimination of the limbs. An elimination without blocks is left out.
     pub(crate) fn new(
         model: &Model,
         passive: usize,
@@ -154,24 +156,25 @@ impl LimbElimination {
         [limbs, base].into_iter().filter(|elimination| !elimination.blocks.is_empty()).collect()
     }
 
-    /// Returns the column that each row of a tableau was solved for, if it was.
+    /// Returns the solved rows of a tableau, each with the column for which it is solved.
     pub(crate) fn solved(&self) -> Vec<(usize, usize)> {
         self.blocks.iter().flat_map(|block| block.rows.clone().zip(block.solved.iter().copied())).collect()
     }
 
-    /// Room for the inverses B⁻¹.
+    /// Returns the number of entries of all inverses B⁻¹ together.
     pub(crate) fn room(&self) -> usize {
         self.blocks.iter().map(|block| block.rows.len() * block.rows.len()).sum()
     }
 
-    /// Room for one block's Y.
+    /// Returns the number of entries of the largest matrix Y of a block.
     pub(crate) fn columns(&self) -> usize {
         let count = |block: &Block| block.columns.iter().map(ExactSizeIterator::len).sum::<usize>();
         self.blocks.iter().map(|block| block.rows.len() * count(block)).max().unwrap_or(0)
     }
 }
 
-/// Returns whether two coordinates move one body, so that M has an entry for them. Shape: nv × nv.
+/// Returns, for each pair of coordinates, whether both move a common body, so that M has an entry for the pair. Shape:
+/// nv × nv.
 fn coupled(model: &Model) -> Vec<bool> {
     let nv = model.nv();
     let mut coupled = vec![false; nv * nv];
@@ -184,7 +187,7 @@ fn coupled(model: &Model) -> Vec<bool> {
     coupled
 }
 
-/// Runs of numbers that ascend.
+/// Returns ranges of consecutive numbers from an increasing list.
 fn runs(columns: impl IntoIterator<Item = usize>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for k in columns {
@@ -197,7 +200,8 @@ fn runs(columns: impl IntoIterator<Item = usize>) -> Vec<Range<usize>> {
 }
 
 kernel! {
-    /// Writes the rows of the equations of motion, [M · r_v r_q], into a tableau; M is symmetric.
+    /// Writes the rows [M · r_v r_q] of the equations of motion into a tableau, except the columns of forces (·). M is
+    /// symmetric.
     pub(crate) fn write_motion<S>(
         tableau: Tableau, M: &Matrix<S>, dtau_dv: &Matrix<S>, dtau_dq: &Matrix<S>, T: &mut [S],
     ) {
@@ -211,7 +215,7 @@ kernel! {
 }
 
 kernel! {
-    /// Writes the rows of the contacts except J, [· μ1 c_v c_q], into a tableau.
+    /// Writes the rows [· μ1 c_v c_q] of the contacts into a tableau, except the columns of J (·).
     pub(crate) fn write_drift<S>(
         tableau: Tableau, dgamma_dv: &Matrix<S>, dgamma_dq: &Matrix<S>, mu: f64, T: &mut [S],
     ) {
@@ -241,7 +245,7 @@ kernel! {
     }
 }
 
-/// Copies row i of a matrix.
+/// Copies row i of the matrix `from` to `to`.
 #[inline(always)]
 fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
     for (to, column) in to.iter_mut().zip(from.as_slice().chunks_exact(from.nrows())) {
@@ -250,8 +254,8 @@ fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
 }
 
 kernel! {
-    /// Computes each block's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `singular`
-    /// becomes 1 for the knots of which a pivot is too small.
+    /// Computes B⁻¹ of each block by Gauss–Jordan elimination, with row exchanges that differ from knot to knot.
+    /// `singular` becomes 1 in the lanes of knots with a pivot that is too small.
     pub(crate) fn invert_blocks<S>(
         elimination: &LimbElimination, tableau: Tableau, T: &[S], inverses: &mut [S], singular: &mut S,
     ) {
@@ -259,7 +263,7 @@ kernel! {
         let mut rest = inverses;
         for Block { rows, solved, compared, least, .. } in &elimination.blocks {
             let n = rows.len();
-            // [B D], with the rows scaled by D
+            // W = [B D], with the rows scaled by D
             let mut W = [[S::zero(); 2 * MOST]; MOST];
             for (k, r) in rows.clone().enumerate() {
                 let row = &T[r * stride..][..stride];
@@ -282,7 +286,7 @@ kernel! {
                         W[i][j] = S::select(exchange, upper, lower);
                     }
                 }
-                // a NaN is not large enough
+                // a NaN counts as too small
                 *singular = S::select(S::splat(*least).lt(W[k][k].abs()), *singular, S::one());
                 let inverse = W[k][k].recip();
                 for j in k + 1..2 * n {
@@ -307,7 +311,7 @@ kernel! {
 }
 
 kernel! {
-    /// Restores the tableau of the knots that are singular.
+    /// Restores the tableau in the lanes of knots with a singular block.
     pub(crate) fn restore<S>(singular: S, before: &[S], T: &mut [S]) {
         let singular = S::zero().lt(singular);
         for (to, before) in T.iter_mut().zip(before) {
@@ -317,7 +321,7 @@ kernel! {
 }
 
 kernel! {
-    /// Solves the rows of each block for its columns, and puts these into the other rows.
+    /// Solves the rows of each block for its columns, and eliminates these columns from the other rows.
     pub(crate) fn solve_blocks<S>(
         elimination: &LimbElimination, tableau: Tableau, T: &mut [S], inverses: &[S], Y: &mut [S],
     ) {
@@ -334,7 +338,7 @@ kernel! {
     }
 }
 
-/// Solves N rows. Y is kept column by column as well, as the other rows take it.
+/// Solves the N rows of a block. Y is also stored column by column, for the elimination from the other rows.
 #[inline(always)]
 fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], inverse: &[S], Y: &mut [S]) {
     let Block { rows, solved, columns, others, .. } = block;

@@ -1,4 +1,4 @@
-//! Dynamics of a robot: knots that move freely, in contact, by given accelerations, or that jump.
+//! Dynamics of a robot: free motion, motion in contact, inverse dynamics, and impacts.
 
 pub(super) mod acceleration;
 pub(super) mod batch;

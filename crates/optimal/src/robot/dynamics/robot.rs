@@ -1,4 +1,4 @@
-//! Dynamics of a robot, of all kinds: its accelerations, costs and limits for a group of knots.
+//! Dynamics of a robot, all kinds: accelerations, costs and limits for a group of knots.
 #![allow(non_snake_case)] // J
 
 use super::batch::{DynamicsKind, Group, KnotBatch, Pass};
@@ -29,22 +29,22 @@ use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Promise of this crate, by which it names vectors.
+/// Token with which this crate may name vector types.
 struct Gate;
 
-// SAFETY: vectors are used by the kernels of `condyle_dynamics`, and by what enters through their door.
+// SAFETY: vectors are used only by the kernels of `condyle_dynamics`, and by code that is entered as these kernels are.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Gate {}
 
 type Short = <f64 as Real>::Narrow<Gate>;
 type Long = <f64 as Real>::Wide<Gate>;
 
-/// So many postures are tried to find one that is not singular.
+/// Maximum number of postures that are tried to find one that is not singular.
 const POSTURES: usize = 8;
-/// Fewer knots than this are computed one by one.
+/// Smallest number of knots that are computed at once; fewer knots are computed one by one.
 const WORTHWHILE: usize = 3;
 
-/// Robot with its drives, the kind of its dynamics, and the costs and limits of its knots.
+/// Robot with its actuation, the kind of its dynamics, and the costs and limits of its knots.
 #[derive(Clone, Debug)]
 pub(crate) struct RobotDynamics {
     pub(crate) model: Arc<Model>,
@@ -54,17 +54,17 @@ pub(crate) struct RobotDynamics {
     /// Output that the controls drive.
     given: Output,
     capabilities: Capabilities,
-    /// Coordinates of each group of positions that is no vector space.
+    /// Coordinates of each group of positions that is not a vector space.
     pub(crate) groups: Vec<Range<usize>>,
     work: OnDemand<Work>,
 }
 
-/// Returns the robot of an action, or of the action that it wraps.
+/// Returns the robot of an action; if the action wraps another action, the robot of the wrapped action.
 pub(crate) fn robot_of(action: &mut dyn ActionModel) -> Option<&mut RobotDynamics> {
     innermost(action)?.dynamics()?.downcast_mut()
 }
 
-/// Parts of [`RobotDynamics`] with the workspace.
+/// References to the fields of [`RobotDynamics`], with an allocated workspace.
 struct Parts<'a> {
     model: &'a Arc<Model>,
     actuation: &'a Actuation,
@@ -74,7 +74,7 @@ struct Parts<'a> {
     work: &'a mut Work,
 }
 
-/// Memory in which the dynamics of knots are computed.
+/// Workspace for the dynamics of knots.
 #[derive(Debug)]
 struct Work {
     /// Dynamics of one knot.
@@ -85,19 +85,19 @@ struct Work {
     data: Vec<KnotData>,
     elimination: Option<KktElimination>,
     group_hessian: GroupHessian,
-    /// ∂q̈/∂u. Shape: nv × nu, nothing if S selects.
+    /// Derivatives ∂q̈/∂u. Shape: nv × nu; empty if each control drives one coordinate.
     da_du: Vec<f64>,
 }
 
-/// Dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for
-/// derivatives they are not: too rarely used to stay in the caches.
+/// Dynamics of as many knots as this processor has lanes. A few trial steps use vectors with few lanes, which are
+/// faster. Derivatives do not: short vectors would be used too rarely to stay in the caches.
 #[derive(Debug)]
 struct VectorBatches {
     short: KnotBatch<Short>,
     long: Option<KnotBatch<Long>>,
 }
 
-/// Returns the number of knots that are computed side by side.
+/// Returns the number of knots that are computed at once.
 fn lanes(kind: &DynamicsKind) -> usize {
     match (kind, level()) {
         (DynamicsKind::None | DynamicsKind::Impact { .. }, _) | (_, Level::Baseline) => 1,
@@ -107,7 +107,8 @@ fn lanes(kind: &DynamicsKind) -> usize {
 }
 
 impl VectorBatches {
-    /// Makes room for the equations of knots in inverse-dynamics form, in the widest lanes: they are for derivatives.
+    /// Allocates the workspace for the equations of knots in inverse-dynamics form, in the widest vectors, because only
+    /// derivatives use these equations.
     fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         match &mut self.long {
             Some(long) => long.reserve(tableau, eliminations),
@@ -115,7 +116,8 @@ impl VectorBatches {
         }
     }
 
-    /// Returns the equations of a knot at some posture in which the limbs can be solved.
+    /// Returns the equations of a knot at a posture at which the limbs can be eliminated; `None` if no such posture is
+    /// found.
     fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Vec<f64>> {
         (0..POSTURES).find_map(|posture| {
             let bend: Vec<f64> = (0..model.nv()).map(|k| 0.5 * ((1 + posture + k) as f64).sin()).collect();
@@ -151,7 +153,7 @@ impl Work {
             DynamicsKind::Contact(contacts, _) => Some(moved_by(model, contacts)),
             _ => None,
         };
-        // in inverse-dynamics form knots come in lanes only, and drives must not mix coordinates
+        // inverse-dynamics form needs vectors, and an actuation in which each control drives one coordinate
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
         let mut data = KnotData::new(nv, capabilities, given);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
@@ -179,7 +181,7 @@ impl Work {
         }
     }
 
-    /// Writes a knot of Δt = `scale` seconds as equations of inverse dynamics; returns whether it did so.
+    /// Writes a knot of Δt = `scale` seconds as equations of inverse dynamics. Returns whether this was possible.
     fn write_equations(
         &mut self,
         terms: &mut HorizonTerms,
@@ -204,11 +206,11 @@ impl Work {
 }
 
 impl RobotDynamics {
-    /// Returns a robot with some drives whose accelerations obey a law.
+    /// Creates the dynamics of a robot with an actuation and a kind of dynamics.
     ///
     /// # Errors
-    /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot,
-    /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for a robot of which forward dynamics has no
+    /// [`Error::Contact`] for contacts that do not fit; [`Error::Cost`] for a term that does not fit;
+    /// [`Error::Actuation`] for the actuation of another robot, and for a robot whose forward dynamics have no
     /// solution.
     pub(crate) fn new(
         model: Arc<Model>,
@@ -240,7 +242,7 @@ impl RobotDynamics {
         Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
     }
 
-    /// Returns the contacts of its law, in the order of their forces.
+    /// Returns the contacts, in the order in which λ has their forces.
     pub(crate) fn contacts(&self) -> &[Contact] {
         match &self.kind {
             DynamicsKind::Contact(contacts, _)
@@ -250,7 +252,7 @@ impl RobotDynamics {
         }
     }
 
-    /// Returns whether its knots are impacts.
+    /// Returns whether the knots are impacts.
     pub(crate) fn is_impact(&self) -> bool {
         self.capabilities.impulse
     }
@@ -260,13 +262,13 @@ impl RobotDynamics {
         self.capabilities.nu
     }
 
-    /// Allocates the workspace, unless it exists, and makes room for the residuals of all terms.
+    /// Allocates the workspace, unless it exists, and allocates memory for the residuals of all terms.
     pub(crate) fn reserve(&mut self) {
         let Parts { model, terms, work, .. } = self.parts();
         work.data.iter_mut().for_each(|data| data.residuals.reserve(model.nv(), terms.layouts()));
     }
 
-    /// Returns the parts, with a workspace.
+    /// Returns references to all fields, and allocates the workspace if it does not exist.
     fn parts(&mut self) -> Parts<'_> {
         let Self { model, actuation, terms, kind, given, capabilities, groups, work } = self;
         terms.reserve();
@@ -274,7 +276,8 @@ impl RobotDynamics {
         Parts { model, actuation, terms, capabilities, groups, work }
     }
 
-    /// Takes over the costs and limits of a robot with the same dynamics; returns whether the dynamics are the same.
+    /// Moves the costs and limits of `other` to this robot if both have the same dynamics. Returns whether the dynamics
+    /// are the same.
     pub(crate) fn merge(&mut self, other: &mut Self, place: Option<usize>) -> bool {
         let same = Arc::ptr_eq(&self.model, &other.model)
             && (&self.kind, &self.actuation, &self.capabilities)
@@ -285,13 +288,13 @@ impl RobotDynamics {
         same
     }
 
-    /// Returns the number of knots that are computed side by side.
+    /// Returns the number of knots that are computed at once.
     pub(crate) fn lanes(&self) -> usize {
         lanes(&self.kind)
     }
 
-    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, side by side if that is
-    /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each.
+    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, at once if that is faster.
+    /// [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
         let Group { knots, xs, us, what, .. } = group;
         if let Evaluation::Equations(motions) = what {
@@ -335,7 +338,8 @@ impl RobotDynamics {
         }
     }
 
-    /// Returns the accelerations, ℓ and the limits' term at a knot of the group that was solved.
+    /// Returns the accelerations, the cost ℓ and the term of the limits at one knot of the last group in
+    /// [`solve`](Self::solve).
     pub(crate) fn values(&mut self, lane: usize, input: KnotInput<'_>, limited: bool) -> (&[f64], f64, f64) {
         let (KnotInput { t, x, u }, Parts { terms, work: Work { data, .. }, .. }) = (input, self.parts());
         let data = &data[lane];
@@ -343,9 +347,9 @@ impl RobotDynamics {
         (&data.a, cost, term)
     }
 
-    /// Returns the derivatives of the accelerations at a knot of the group that was solved, and writes the derivatives
-    /// of `scale` · ℓ and of the limits' term to the LQ knot. If the group was solved for equations, the LQ knot is
-    /// written in inverse-dynamics form where that is possible.
+    /// Returns the derivatives of the accelerations at one knot of the last group in [`solve`](Self::solve). Writes the
+    /// derivatives of `scale` · ℓ and of the term of the limits to the LQ knot. If [`solve`](Self::solve) computed
+    /// equations, the LQ knot is written in inverse-dynamics form if possible.
     pub(crate) fn slopes(
         &mut self,
         lane: usize,
@@ -372,8 +376,9 @@ impl RobotDynamics {
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
 
-    /// Returns the number of accelerations and forces from which the equations of inverse dynamics start, and the
-    /// maximum numbers of dependent coordinates and of rows of costs; `None` without such equations.
+    /// Returns sizes for the equations of inverse dynamics: the number of accelerations and forces at which they are
+    /// evaluated, the maximum number of dependent coordinates, and the maximum number of rows of costs. Returns `None`
+    /// without such equations.
     pub(crate) fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         let layout = self.terms.layout(); // Hessians without rows are in Q, S and R, with respect to the controls
         let elimination = self.work.made()?.elimination.as_ref()?;
@@ -381,7 +386,7 @@ impl RobotDynamics {
         (!layout.curved).then_some((motion, [elimination.most_dependent(), layout.rows[0]]))
     }
 
-    /// Copies the accelerations and forces at a knot of the group that was solved.
+    /// Copies the accelerations and forces of one knot of the last group in [`solve`](Self::solve).
     pub(crate) fn copy_motion(&mut self, lane: usize, to: &mut [f64]) {
         let KnotData { a, lambda, .. } = &self.parts().work.data[lane];
         let (to_a, to_lambda) = to.split_at_mut(a.len());
@@ -389,7 +394,8 @@ impl RobotDynamics {
         to_lambda[..lambda.len()].copy_from_slice(lambda);
     }
 
-    /// Sets the accelerations and forces of `count` knots, which are at the beginning of equal parts of `motions`.
+    /// Sets the accelerations and forces of `count` knots. `motions` has an equally long block for each knot, which
+    /// begins with these numbers.
     fn set_motions(&mut self, count: usize, motions: &[f64]) {
         let size = motions.len() / count;
         for (KnotData { a, lambda, .. }, from) in self.parts().work.data.iter_mut().zip(motions.chunks_exact(size)) {
@@ -400,7 +406,7 @@ impl RobotDynamics {
         }
     }
 
-    /// Passes the outputs at the first knot of the group that was solved to `show`: see
+    /// Calls `show` with the outputs at the first knot of the last group in [`solve`](Self::solve): see
     /// [`Problem::outputs`](crate::Problem::outputs).
     pub(crate) fn outputs(&mut self, show: &mut dyn FnMut(&str, &[f64])) {
         let Parts { capabilities, work, .. } = self.parts();
@@ -414,14 +420,13 @@ impl RobotDynamics {
         }
     }
 
-    /// Returns the smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S
-    /// Jᵀ]⁺
-    /// g(q); and where accelerations are controls, none of these.
+    /// Returns the smallest controls and contact forces that hold the robot still as nearly as possible: (u, λ) = [S
+    /// Jᵀ]⁺ g(q). Controls that are accelerations are zero.
     #[track_caller]
     pub(crate) fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         assert_length("x", x.len(), nq + nv);
-        // one state does not need the memory of many knots, which may not be there
+        // allocates data for one state only, because the workspace for many knots may not exist yet
         let Self { model, actuation, kind, .. } = &*self;
         let (data, zero, mut J) = (&mut Data::new(model), vec![0.0; nv], DMatrix::zeros(0, nv));
         let (contacts, drives): (&[Contact], _) = match kind {
@@ -442,7 +447,7 @@ impl RobotDynamics {
         if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ), or u
     }
 
-    /// As [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
+    /// Implements [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
     pub(crate) fn hessian(
         &mut self,
         KnotInput { x, u, .. }: KnotInput<'_>,
@@ -480,7 +485,7 @@ impl RobotDynamics {
             Pass::Inverse | Pass::ContactInverse(..) => {
                 knot.a.copy_from_slice(&u[..model.nv()]);
                 for part in [&mut hessian.xx, &mut hessian.xu, &mut hessian.uu] {
-                    part.fill(0.0); // accelerations that are given do not curve
+                    part.fill(0.0); // accelerations that are controls have no second derivatives
                 }
                 let [da_dq, da_dv, da_du] = &knot.da;
                 Some(Derivatives { a: &knot.a, da_dq, da_dv, da_du: da_du.as_slice() })
@@ -489,13 +494,13 @@ impl RobotDynamics {
         }
     }
 
-    /// ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq, the blocks of groups.
+    /// Computes the blocks of groups in ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
     pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Position, by_q);
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);
     }
 
-    /// Computes the second derivatives of λᵀ(q ⊕ δq) by q and δq.
+    /// Computes the second derivatives of λᵀ(q ⊕ δq) with respect to q and δq.
     pub(crate) fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) {
         let Parts { model, groups, work, .. } = self.parts();
         work.group_hessian.run(model, groups, dq, lambda, hessian);

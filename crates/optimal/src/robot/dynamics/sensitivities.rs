@@ -1,4 +1,4 @@
-//! The derivatives of the outputs of a knot by its state and its controls.
+//! Derivatives of the outputs of a knot with respect to its state and its controls.
 #![allow(non_snake_case)] // J
 
 use crate::robot::actuation::Actuation;
@@ -6,9 +6,10 @@ use crate::robot::knot_data::{KnotData, Sensitivities, add_matrix_row};
 use crate::robot::outputs::Output;
 use crate::robot::residuals::rows::Row;
 
-/// Derivatives of the outputs of a knot, from those in its data.
+/// Derivatives of the outputs of a knot, computed from the derivatives in the knot's data.
 pub(crate) struct DynamicsSensitivities<'a> {
-    /// Output that is S u; of accelerations, the first nv controls, behind which forces of contacts follow.
+    /// Output that equals S u. If this output is the acceleration, it equals the first nv controls; the other controls
+    /// are contact forces.
     pub given: Output,
     pub data: &'a KnotData,
     pub actuation: &'a Actuation,

@@ -1,31 +1,32 @@
-//! Accelerations of a group of knots: of a robot side by side, of user-defined models one by one.
+//! Accelerations of a group of knots: at once for a robot, one by one for user-defined models.
 
 use crate::lq::LqKnot;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use crate::robot::dynamics::batch::Group;
 use crate::robot::dynamics::robot::RobotDynamics;
 
-/// Returns the robot of a model.
+/// Returns the robot of a model; `None` for a user-defined model.
 pub(super) fn robot<M: ContinuousModel>(model: &M) -> Option<&RobotDynamics> {
     model.robot()?.downcast_ref()
 }
 
-/// Returns the robot of a model, for computing.
+/// Returns the robot of a model as a mutable reference; `None` for a user-defined model.
 pub(super) fn robot_mut<M: ContinuousModel>(model: &mut M) -> Option<&mut RobotDynamics> {
     model.robot_mut()?.downcast_mut()
 }
 
-/// Message for a violated condition: the model was checked to be a robot.
+/// Panic message if a model is not a robot, although it has been checked.
 const ROBOT: &str = "the model is a robot";
 
-/// Computes the dynamics of a group of a robot's knots; user-defined models compute each knot by itself.
+/// Computes the dynamics of a group of a robot's knots. Does nothing for user-defined models, which compute each knot
+/// by itself.
 pub(super) fn solve<M: ContinuousModel>(model: &mut M, group: Group<'_>) {
     if let Some(robot) = robot_mut(model) {
         robot.solve(group);
     }
 }
 
-/// Returns the accelerations, ℓ and the limits' term at a knot of the group that was solved.
+/// Returns the accelerations, the cost ℓ and the term of the limits at one knot of the last group in [`solve`].
 pub(super) fn values<'m, M: ContinuousModel>(
     model: &'m mut M,
     lane: usize,
@@ -39,7 +40,7 @@ pub(super) fn values<'m, M: ContinuousModel>(
     (a, cost, 0.0)
 }
 
-/// Returns the derivatives at a knot of the group that was solved.
+/// Returns the derivatives at one knot of the last group in [`solve`].
 pub(super) fn slopes<'m, M: ContinuousModel>(
     model: &'m mut M,
     lane: usize,

@@ -1,12 +1,12 @@
-//! Control polynomials: how the controls of a knot go through its time.
+//! Control polynomials: how the controls of a knot change during its duration.
 #![allow(non_snake_case)] // B, S, R
 
 use super::Integrator;
 use crate::lq::LqKnot;
 
-/// Polynomial u(s) that the controls of a knot follow, at the time s of its Δt, from 0 to 1.
+/// Polynomial u(s) that the controls of a knot follow, where s is the time within the knot divided by Δt, from 0 to 1.
 ///
-/// The controls of the knot are then w, the values of u at some nodes of the polynomial, one after the other:
+/// The control vector of the knot is w: the values of u at the nodes of the polynomial, one after the other.
 ///
 /// ```text
 /// constant    u(s) = w                                             nu numbers
@@ -14,9 +14,10 @@ use crate::lq::LqKnot;
 /// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials            at s = 0, ½, 1; by `RungeKutta3` at 0, ⅓, ⅔
 /// ```
 ///
-/// Dynamics and costs are taken at the stages of the [`Integrator`], each at its own u(s). Semi-implicit Euler has one,
-/// at s = 0, so that w₁ and w₂ do nothing there, and only regularisation or [`Constrained`](crate::Constrained) terms
-/// hold them. These are Crocoddyl's `ControlParametrizationModelPolyZero`, `PolyOne` and `PolyTwoRK`.
+/// Dynamics and costs are computed at the stages of the [`Integrator`], each with its own u(s). Semi-implicit Euler has
+/// one stage, at s = 0. So w₁ and w₂ have no effect there; only regularisation and [`Constrained`](crate::Constrained)
+/// terms determine them. These polynomials are Crocoddyl's `ControlParametrizationModelPolyZero`, `PolyOne` and
+/// `PolyTwoRK`.
 ///
 /// ```
 /// use condyle_optimal::robot::{ControlPolynomial, Integrator};
@@ -28,12 +29,12 @@ use crate::lq::LqKnot;
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum ControlPolynomial {
-    /// Same controls all the time.
+    /// Constant controls: one node.
     #[default]
     Constant,
-    /// First degree.
+    /// Polynomial of first degree: two nodes.
     Linear,
-    /// Second degree.
+    /// Polynomial of second degree: three nodes.
     Quadratic,
 }
 
@@ -47,7 +48,7 @@ impl ControlPolynomial {
         }
     }
 
-    /// Returns the weights of w₀, w₁, w₂ in u(s), zeros where there is no such node.
+    /// Returns the weights of w₀, w₁, w₂ in u(s), 0 for nodes that do not exist.
     pub fn weights(self, integrator: Integrator, s: f64) -> [f64; 3] {
         match (self, integrator) {
             (Self::Constant, _) => [1.0, 0.0, 0.0],
@@ -59,13 +60,14 @@ impl ControlPolynomial {
         }
     }
 
-    /// Returns whether the controls stay the same.
+    /// Returns whether the controls are constant during the knot.
     pub(crate) fn is_constant(&self) -> bool {
         *self == Self::Constant
     }
 }
 
-/// Writes the derivatives of a step by u = w₀ as those by all w, the others zero.
+/// Copies the derivatives of a step with respect to u = w₀ into those with respect to all w; the other columns are
+/// zero.
 pub(super) fn widen(from: &LqKnot, knot: &mut LqKnot) {
     let (n, nu) = (from.ndx(), from.nu());
     let LqKnot { A, B, Q, S, R, q, r, .. } = knot;

@@ -1,4 +1,4 @@
-//! The second derivatives of a step of semi-implicit Euler.
+//! Second derivatives of a step of semi-implicit Euler.
 //!
 //! With y = v + Δt a(x, u) the step is q⁺ = q ⊕ Δt y, v⁺ = y. Let E = ∂(q ⊕ δ)/∂δ at δ = Δt y, ε = Δt δy and
 //! θ(δq, ε) = λ_qᵀ((q ⊕ δq) ⊕ (Δt y + ε) ⊖ q⁺). By the chain rule
@@ -7,7 +7,7 @@
 //! ψ = θ(δq, ε) + λ_vᵀ δy      ∂²ψ = Δt μᵀ∂²a + [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε]      μ = λ_v + Δt Eᵀ λ_q
 //! ```
 //!
-//! where ∂²θ has a block for each group of positions that is no vector space, and is zero elsewhere.
+//! where ∂²θ has a block for each group of positions that is not a vector space, and is zero elsewhere.
 #![allow(non_snake_case)] // E
 
 use super::retraction::Retraction;
@@ -16,19 +16,19 @@ use crate::lq::LARGEST_BLOCK;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use core::ops::Range;
 
-/// Rows of a group of a column of a matrix, zeros after them.
+/// Entries of a matrix column in the rows of a group, padded with zeros.
 type Rows = [f64; LARGEST_BLOCK];
 
-/// Scratch of the second derivatives of steps of one model.
+/// Workspace for the second derivatives of a model's steps.
 #[derive(Clone, Debug)]
 pub(super) struct Curvature {
     groups: Vec<Range<usize>>,
-    /// Δt μ. Shape: nv. Written by: `run`.
+    /// Vector Δt μ. Shape: nv. Written by: `run`.
     mu: Vec<f64>,
-    /// ∂²θ, ε in place of controls. Shape: nv and nv; nothing where there are no groups. Written by: `run`.
+    /// Hessian ∂²θ, with ε instead of controls. Shape: nv and nv; empty without groups. Written by: `run`.
     theta: Hessian,
-    /// Group's rows of ∂ε/∂(x, u), ∂²θ/∂q∂(x, u), ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns each; nothing where there are
-    /// no groups. Written by: `add_group`.
+    /// Rows of one group in ∂ε/∂(x, u), ∂²θ/∂q∂(x, u) and ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns each; empty without
+    /// groups. Written by: `add_group`.
     columns: [Vec<Rows>; 3],
 }
 
@@ -40,7 +40,7 @@ impl Curvature {
         Self { groups, mu: vec![0.0; nv], theta: Hessian::zeros(n, n), columns }
     }
 
-    /// Writes ∂²ψ to `hessian`; returns whether the model gives it.
+    /// Writes ∂²ψ to `hessian`. Returns whether the model has second derivatives.
     pub(super) fn run<M: ContinuousModel>(
         &mut self,
         model: &mut M,
@@ -78,7 +78,8 @@ impl Curvature {
     }
 }
 
-/// Adds [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε] of a group, O((ndx + nu)²), with ε = Δt (δv + Δt (∂a/∂q δq + ∂a/∂v δv + ∂a/∂u δu)).
+/// Adds [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε] of one group, in O((ndx + nu)²) operations, with ε = Δt (δv + Δt (∂a/∂q δq + ∂a/∂v δv
+/// + ∂a/∂u δu)).
 fn add_group(
     group: &Range<usize>,
     dt: f64,
@@ -134,7 +135,7 @@ fn add_group(
     }
 }
 
-/// out += Rᵀ x, for the columns of R.
+/// Computes out += Rᵀ x, where `rows` has the columns of R.
 fn add_products(rows: &[Rows], x: &Rows, out: &mut [f64]) {
     for (out, row) in out.iter_mut().zip(rows) {
         let mut sum = 0.0;

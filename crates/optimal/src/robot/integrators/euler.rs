@@ -1,4 +1,5 @@
-//! Semi-implicit Euler, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), ℓ Δt. The limits' term is not scaled.
+//! Semi-implicit Euler, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), cost ℓ Δt. The term of the limits is
+//! not multiplied by Δt.
 #![allow(non_snake_case)] // A, B
 
 use super::accelerations::{slopes, values};
@@ -8,7 +9,7 @@ use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use crate::robot::dynamics::batch::Group;
 use condyle_linalg::{Vector, Vectorized, at_level};
 
-/// Writes the next state of a knot of the group that was solved; returns the cost.
+/// Writes the next state of one knot of the last solved group. Returns the cost.
 pub(super) fn calc<M: ContinuousModel>(
     model: &mut M,
     lane: usize,
@@ -60,7 +61,7 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     }
 }
 
-/// Conversion of derivatives of accelerations, nv numbers in each column, to derivatives of steps: [a Δt²; a Δt].
+/// Conversion of columns a of acceleration derivatives (nv numbers) to columns of step derivatives: [a Δt²; a Δt].
 struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
 
 impl<const N: usize> Vectorized for Steps<'_, N> {

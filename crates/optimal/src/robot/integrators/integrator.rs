@@ -1,11 +1,11 @@
-//! The rules by which a knot steps through its time.
+//! Integration rules: how the next state of a knot is computed from its accelerations.
 
 use core::fmt;
 
-/// Rule by which a knot steps through its time.
+/// Integration rule, by which the next state of a knot is computed from its accelerations.
 ///
-/// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
-/// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
+/// As in Crocoddyl, the stages of the Runge–Kutta methods add velocities of different points as if positions were a
+/// vector space. For the rotation of a free-flyer, these methods are therefore only of first order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -25,7 +25,7 @@ pub enum Integrator {
 }
 
 impl Integrator {
-    /// Returns the name, as files and Python have it: `"semi_implicit_euler"`, `"runge_kutta_4"` and so on.
+    /// Returns the name that files and Python use, for example `"semi_implicit_euler"` or `"runge_kutta_4"`.
     pub fn name(self) -> &'static str {
         match self {
             Self::SemiImplicitEuler => "semi_implicit_euler",

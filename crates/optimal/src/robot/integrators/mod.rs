@@ -1,4 +1,4 @@
-//! Integrators: from accelerations to the next state, and knots with a duration.
+//! Integrators, which compute the next state from accelerations, and knots with a duration.
 
 mod accelerations;
 mod controls;
@@ -26,7 +26,8 @@ use retraction::Retraction;
 use runge_kutta::RungeKutta;
 use std::any::Any;
 
-/// Knot of Δt seconds of a [`ContinuousModel`], impact, or terminal knot, whose cost is ℓ itself.
+/// Knot that integrates a [`ContinuousModel`] over Δt seconds. It can also be an impact or a terminal knot; the cost is
+/// then ℓ without the factor Δt.
 #[derive(Clone, Debug)]
 pub struct Integrated<M> {
     inner: M,
@@ -57,7 +58,7 @@ struct Work {
     retraction: Retraction,
     curvature: Curvature,
     runge_kutta: Option<RungeKutta>,
-    /// Step by the first controls, if there are others.
+    /// Derivatives with respect to the first node of the control polynomial; only if there are other nodes.
     first: Option<Box<LqKnot>>,
 }
 
@@ -89,7 +90,7 @@ impl<M: ContinuousModel> Integrated<M> {
         Self::of(model, Method::Terminal, 0.0)
     }
 
-    /// Creates an impact: the accelerations of the model are v⁺ − v.
+    /// Creates an impact, where the model computes v⁺ − v instead of accelerations.
     pub(super) fn impact(model: M) -> Self {
         Self::of(model, Method::Impact, 0.0)
     }
@@ -116,7 +117,7 @@ impl<M: ContinuousModel> Integrated<M> {
     }
 
     /// Returns the same knot with controls that follow a polynomial in time. A terminal knot has no controls and is
-    /// returned unchanged. Bounds, also those given before, hold at each node of the polynomial.
+    /// returned unchanged. Bounds on controls, also those that were set before, hold at each node of the polynomial.
     #[must_use]
     pub fn with_controls(mut self, controls: ControlPolynomial) -> Self {
         if self.method != Method::Terminal {
@@ -130,7 +131,7 @@ impl<M: ContinuousModel> Integrated<M> {
     /// Returns the same knot with bounds on the controls u of its model, infinite where a control is unbounded.
     ///
     /// # Panics
-    /// If their lengths differ from the number of controls of the model.
+    /// If the length of a bound differs from the number of controls of the model.
     #[must_use]
     #[track_caller]
     pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
@@ -146,12 +147,12 @@ impl<M: ContinuousModel> Integrated<M> {
         &self.inner
     }
 
-    /// Returns the model that is integrated, for changes.
+    /// Returns the model that is integrated, as a mutable reference.
     pub fn inner_mut(&mut self) -> &mut M {
         &mut self.inner
     }
 
-    /// Passes the vectors that the dynamics of knot t compute to `show`: see
+    /// Calls `show` with each vector that the dynamics of knot t compute: see
     /// [`Problem::outputs`](crate::Problem::outputs).
     pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         if self.method != Method::Terminal {
@@ -167,13 +168,13 @@ impl<M: ContinuousModel> Integrated<M> {
         assert_length("u", u.len(), self.nu());
     }
 
-    /// Returns whether several states are computed side by side: not by Runge–Kutta methods, which compute stage after
-    /// stage, and not with controls that change within a knot.
+    /// Returns whether several states can be computed at once. They cannot with Runge–Kutta methods, which compute
+    /// stage after stage, and with controls that change within a knot.
     fn is_simple_step(&self) -> bool {
         !matches!(self.method, Method::RungeKutta(_)) && self.controls.is_constant()
     }
 
-    /// Writes the next state of a knot of the group that was solved; returns the cost.
+    /// Writes the next state of one knot of the last solved group. Returns the cost.
     fn step(&mut self, lane: usize, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
         let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
         let (inner, Work { retraction, runge_kutta, .. }) = self.parts();
@@ -194,7 +195,7 @@ impl<M: ContinuousModel> Integrated<M> {
         }
     }
 
-    /// Writes the derivatives at a knot of the group that was solved.
+    /// Writes the derivatives at one knot of the last solved group.
     fn differentiate(&mut self, lane: usize, input: KnotInput<'_>, group: Group<'_>, knot: &mut LqKnot) {
         let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
         let (inner, Work { retraction, runge_kutta, first, .. }) = self.parts();
@@ -225,7 +226,7 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         GroupModel::lanes(self)
     }
 
-    /// Computes dynamics, steps, costs and limits of a group, as many knots at a time as there are lanes.
+    /// Computes dynamics, steps, costs and limits of a group of knots, as many knots at a time as a vector has lanes.
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
         let (nx, nu, inner_nu, count) = (self.nx(), self.nu(), self.inner.nu(), knots.len());
@@ -244,7 +245,7 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         for from in (0..count).step_by(lanes) {
             let to = (from + lanes).min(count);
             let (knots, xs) = (&knots[from..to], &xs[from * nx..to * nx]);
-            let controls = &us[from * nu..][..(to - from) * inner_nu]; // one knot, unless they are constant
+            let controls = &us[from * nu..][..(to - from) * inner_nu]; // several knots only if controls are constant
             let group = Group { knots, xs, us: controls, what: what.part(from..to, count), limited: true };
             if !matches!(self.method, Method::RungeKutta(_)) {
                 solve(&mut self.inner, group);
@@ -420,7 +421,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         Some(self)
     }
 
-    /// Computes second derivatives of semi-implicit Euler, for constant controls: see `curvature.rs`.
+    /// Computes second derivatives of a step of semi-implicit Euler with constant controls: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let (euler, dt) = (self.method == Method::Euler, *self.durations.at(t).at(t));
         let (inner, Work { retraction, curvature, first: None, .. }) = self.parts() else { return false };

@@ -12,11 +12,11 @@ use nalgebra::DMatrix;
 /// Step of a configuration and its Jacobians.
 #[derive(Debug)]
 pub(super) struct Retraction {
-    /// δ. Shape: nv.
+    /// Step δ. Shape: nv.
     pub delta: Vec<f64>,
-    /// T. Shape: nv × nv, the groups' blocks. Written by: `differentiate`.
+    /// Jacobian T, only in the blocks of groups. Shape: nv × nv. Written by: `differentiate`.
     T: DMatrix<f64>,
-    /// E. Shape: nv × nv, the groups' blocks. Written by: `differentiate`.
+    /// Jacobian E, only in the blocks of groups. Shape: nv × nv. Written by: `differentiate`.
     pub E: DMatrix<f64>,
 }
 
@@ -33,14 +33,14 @@ impl Retraction {
         }
     }
 
-    /// Computes T and E.
+    /// Computes the Jacobians T and E.
     pub(super) fn differentiate<M: ContinuousModel>(&mut self, model: &M) {
         if !model.groups().is_empty() {
             model.integrate_jacobians(&self.delta, &mut self.T, &mut self.E);
         }
     }
 
-    /// Writes T and E of the groups.
+    /// Copies the blocks of T and E of each group to `blocks`.
     pub(super) fn write_blocks(&self, groups: &[Range<usize>], blocks: &mut [EulerBlock]) {
         for (group, block) in groups.iter().zip(blocks) {
             block.T.copy_from(&self.T.view((group.start, group.start), (group.len(), group.len())));
@@ -56,8 +56,8 @@ impl Retraction {
         }
     }
 
-    /// ∂(x ⊕ (δ, δv)) in place of X = ∂(δ, δv), by the chain rule: E X + T for positions, X + 1 for velocities. The
-    /// first columns of X are derivatives by x.
+    /// Replaces X = ∂(δ, δv) by ∂(x ⊕ (δ, δv)), with the chain rule: E X + T for positions, X + 1 for velocities. The
+    /// first columns of X are derivatives with respect to x.
     pub(super) fn chain(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
         self.multiply(groups, X);
         let n = X.nrows();
@@ -73,7 +73,7 @@ impl Retraction {
     }
 }
 
-/// Rows of a group times its block of E, in place.
+/// Multiplication in place of a group's rows by the group's block of E.
 struct Multiply<'a> {
     E: &'a DMatrix<f64>,
     group: &'a Range<usize>,
@@ -86,7 +86,7 @@ impl Vectorized for Multiply<'_> {
     fn run<V: Vector>(self) {
         let Self { E, group, X, rows } = self;
         let (start, size) = (group.start, group.len());
-        let mut block = [[0.0; 8]; LARGEST_BLOCK]; // column by column, with zeros up to a whole register
+        let mut block = [[0.0; 8]; LARGEST_BLOCK]; // column by column, padded with zeros to a whole register
         for c in 0..size {
             for r in 0..size {
                 block[c][r] = E[(start + r, start + c)];

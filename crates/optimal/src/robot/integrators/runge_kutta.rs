@@ -4,9 +4,10 @@
 //! y₀ = x,   kᵢ = (vᵢ, a(yᵢ, uᵢ)),   yᵢ₊₁ = x ⊕ cᵢ₊₁ Δt kᵢ,   x⁺ = x ⊕ Δt Σ bᵢ kᵢ,   cost = Δt Σ bᵢ ℓ(yᵢ, uᵢ)
 //! ```
 //!
-//! with uᵢ = u(cᵢ) of the controls' polynomial, u(s) = Σ lₖ(s) wₖ; derivatives are taken by all w.
+//! where uᵢ = u(cᵢ) is the value of the control polynomial u(s) = Σ lₖ(s) wₖ. Derivatives are taken with respect to all
+//! w.
 //!
-//! Limits hold at y₀.
+//! Limits are evaluated at y₀ only.
 //!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
 
@@ -22,32 +23,33 @@ use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
 pub(super) struct RungeKutta {
-    /// Times of the stages in the step, and their weights.
+    /// Times of the stages, as fractions of Δt; `b` has the weights of the stages.
     c: &'static [f64],
     b: &'static [f64],
     /// Weights of the controls w in the controls of each stage.
     l: [[f64; 3]; 4],
-    /// Controls of a stage. Shape: nu.
+    /// Controls of the current stage. Shape: nu.
     u: Vec<f64>,
-    /// State y of a stage. Shape: nq + nv.
+    /// State y of the current stage. Shape: nq + nv.
     y: Vec<f64>,
-    /// k of a stage, the step to the next one, and Σ b k. Shape: 2 nv.
+    /// Slope k of the current stage; `dx` is the step to the next stage, `sum` is Σ b k. Shape: 2 nv.
     k: Vec<f64>,
     dx: Vec<f64>,
     sum: Vec<f64>,
-    /// ∂y/∂(x, w), ∂k/∂(x, w), ∂(Σ b k)/∂(x, w). Shape: 2 nv × (2 nv + nw).
+    /// Derivatives ∂y/∂(x, w), ∂k/∂(x, w) and ∂(Σ b k)/∂(x, w). Shape: 2 nv × (2 nv + nw).
     dy: DMatrix<f64>,
     dk: DMatrix<f64>,
     dsum: DMatrix<f64>,
-    /// Cost at a stage.
+    /// Derivatives of the cost at the current stage.
     stage: LqKnot,
-    /// Products with the stage's Hessian. Shape: (2 nv + nw) × (2 nv + nw) and 2 nv × (2 nv + nw).
+    /// Products with the Hessian of the current stage. Shape: (2 nv + nw) × (2 nv + nw), and 2 nv × (2 nv + nw) for
+    /// `W`.
     H: DMatrix<f64>,
     W: DMatrix<f64>,
 }
 
 impl RungeKutta {
-    /// Returns a method of two, three or four stages.
+    /// Creates the method with two, three or four stages.
     pub(super) fn new<M: ContinuousModel>(stages: usize, model: &M, controls: ControlPolynomial) -> Self {
         let (nq, nv, nu) = (model.nq(), model.nv(), model.nu());
         let (c, b): (&[f64], &[f64]) = match stages {
@@ -81,7 +83,7 @@ impl RungeKutta {
         }
     }
 
-    /// Computes x ⊕ c Δt k, in `self.y`, with the step in `self.dx`.
+    /// Computes x ⊕ c Δt k into `self.y`, and the step c Δt k into `self.dx`.
     fn advance<M: ContinuousModel>(&mut self, model: &M, x: &[f64], step: f64) {
         let (nq, nv) = (model.nq(), model.nv());
         (0..2 * nv).for_each(|i| self.dx[i] = step * self.k[i]);
@@ -98,7 +100,7 @@ impl RungeKutta {
         }
     }
 
-    /// Writes the next state, for u = w; returns the cost.
+    /// Writes the next state for the controls w. Returns the cost.
     pub(super) fn calc<M: ContinuousModel>(
         &mut self,
         model: &mut M,
@@ -115,7 +117,7 @@ impl RungeKutta {
             let (input, limited) = (KnotInput { t, x: &self.y, u: &self.u }, i == 0);
             solve(model, Group::one(&input, Evaluation::Values, limited));
             let (a, rate, limits) = values(model, 0, input, limited);
-            term += limits; // zero at later stages
+            term += limits; // the term of the limits is zero at later stages
             cost += self.b[i] * rate;
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
@@ -126,7 +128,7 @@ impl RungeKutta {
         dt * cost + term
     }
 
-    /// Writes the derivatives of a step, by the chain rule through the stages, for u = w.
+    /// Writes the derivatives of a step for the controls w, with the chain rule through the stages.
     pub(super) fn calc_diff<M: ContinuousModel>(
         &mut self,
         model: &mut M,
@@ -185,8 +187,8 @@ impl RungeKutta {
         knot.B.copy_from(&self.dsum.columns(n, nw));
     }
 
-    /// Adds the cost of stage i, a function of y and uᵢ, as one of x and w: H += Yᵀ Q Y + …, with Y = ∂y/∂(x, w) and
-    /// ∂uᵢ/∂wₖ = lₖ.
+    /// Adds the cost of stage i, a function of y and uᵢ, converted to a function of x and w by the chain rule: H += Yᵀ
+    /// Q Y and further products, with Y = ∂y/∂(x, w) and ∂uᵢ/∂wₖ = lₖ.
     fn add_cost(&mut self, knot: &mut LqKnot, i: usize, n: usize, nu: usize) {
         let Self { l, dy: Y, stage, H, W, .. } = self;
         let (l, nw) = (l[i], Y.ncols() - n);

@@ -1,4 +1,4 @@
-//! Residuals of one's own that are written for any scalar, with exact Jacobians by dual numbers.
+//! User-defined residuals that are written for any scalar, with exact Jacobians by dual numbers.
 
 use super::own::{Inputs, OwnResidual, ResidualFunction};
 use condyle_dynamics::{
@@ -8,31 +8,30 @@ use condyle_spatial::Scalar;
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Residual r(t, x, u) of a robot that is written for any [`Scalar`], so that [`OwnResidual::autodiff`] differentiates
-/// it.
+/// Residual r(t, x, u) of a robot, written for any [`Scalar`], so that [`OwnResidual::autodiff`] can differentiate r.
 ///
-/// Mark `calc` with `#[inline(always)]`: it is then compiled for the vector registers in which the Jacobian is
+/// Mark `calc` with `#[inline(always)]`: `calc` is then compiled for the vector registers in which the Jacobian is
 /// computed.
 pub trait GenericResidual: Any + Send + Sync {
     /// Returns the number of entries of r.
     fn size(&self) -> usize;
 
-    /// Returns the arguments on which r depends, which must not change: all by default. Columns of the others are zero
-    /// and are not computed, so that fewer arguments take less time.
+    /// Returns the arguments on which r depends: all by default. The result must not change. Columns of the Jacobian
+    /// for other arguments are zero and are not computed, so fewer arguments take less time.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
 
-    /// Computes r at a knot into `r`, of size numbers.
+    /// Computes r at a knot into `r`, which has [`size`](Self::size) numbers.
     fn calc<S: Scalar>(&self, state: &mut RobotState<'_, S>, r: &mut [S]);
 }
 
-/// Robot's state and controls at a knot in numbers of any scalar, with the kinematics that follow from them.
+/// State and controls of a robot at a knot, for any scalar, with the kinematics of this state.
 #[derive(Debug)]
 pub struct RobotState<'a, S> {
     /// Robot.
     pub model: &'a Model,
-    /// Number of the knot.
+    /// Index of the knot.
     pub t: usize,
     /// Position, nq numbers.
     pub q: &'a [S],
@@ -46,7 +45,7 @@ pub struct RobotState<'a, S> {
 }
 
 impl<'a, S: Scalar> RobotState<'a, S> {
-    /// Returns a knot t at x = (q, v).
+    /// Creates the state of knot t from x = (q, v) and u.
     fn new(model: &'a Model, data: &'a mut Data<S>, t: usize, x: &'a [S], u: &'a [S]) -> Self {
         let (q, v) = x.split_at(model.nq());
         Self { model, t, q, v, u, data, placed: false }
@@ -61,14 +60,14 @@ impl<'a, S: Scalar> RobotState<'a, S> {
         self.data.placements(self.model).expect("bodies were just placed")
     }
 
-    /// Computes the placements and velocities of all bodies and frames at (q, v). One call serves a whole residual: the
-    /// result gives placements too.
+    /// Computes the placements and velocities of all bodies and frames at (q, v). One call is enough for a whole
+    /// residual: the result has the placements, too.
     pub fn velocities(&mut self) -> Velocities<'_, S> {
         self.placed = true;
         forward_velocities(self.model, self.data, self.q, self.v)
     }
 
-    /// Returns the workspace of the robot's algorithms, to call others than kinematics.
+    /// Returns the workspace of the robot's algorithms, for calls of algorithms other than kinematics.
     pub fn data(&mut self) -> &mut Data<S> {
         self.placed = false;
         self.data
@@ -76,12 +75,12 @@ impl<'a, S: Scalar> RobotState<'a, S> {
 }
 
 impl OwnResidual {
-    /// Makes a residual of a function that is written for any scalar. Its Jacobian is exact, in the tangent space of
-    /// the state, by dual numbers: four or eight columns take one evaluation in vector registers (AVX2, NEON, SIMD128
-    /// or AVX-512). The Hessian of its cost is Gauss–Newton's.
+    /// Makes a residual from a function that is written for any scalar. Dual numbers compute its exact Jacobian, in the
+    /// tangent space of the state: four or eight columns take one evaluation in vector registers (AVX2, NEON, SIMD128
+    /// or AVX-512). The Hessian of a cost of this residual is the Gauss–Newton approximation.
     ///
-    /// Copies share the function. A thread takes a workspace that no other thread uses, and allocates one only if all
-    /// are in use.
+    /// Copies share the function. Each thread takes a workspace that no other thread uses, and allocates a workspace
+    /// only if all existing ones are in use.
     ///
     /// ```
     /// use condyle_dynamics::robots;
@@ -115,7 +114,7 @@ impl OwnResidual {
 struct Differentiated<F> {
     model: Arc<Model>,
     function: F,
-    /// Scratch that no thread uses at present.
+    /// Workspaces that no thread uses at present.
     idle: Mutex<Vec<Scratch>>,
 }
 
@@ -123,10 +122,10 @@ struct Differentiated<F> {
 struct Scratch {
     nu: usize,
     data: Box<Data<f64>>,
-    /// (q, v, u). Written by: `calc_diff`.
+    /// Vector (q, v, u). Written by: `calc_diff`.
     state: Vec<f64>,
     jacobian: LaneJacobian,
-    /// Columns of (δq, δv, δu) that are computed.
+    /// Columns of the Jacobian with respect to (δq, δv, δu) that are computed.
     columns: Vec<usize>,
 }
 
@@ -142,7 +141,7 @@ impl Scratch {
 }
 
 impl<F: GenericResidual> Differentiated<F> {
-    /// Calls a function with scratch for nu controls that no other thread uses.
+    /// Calls `f` with a workspace for nu controls that no other thread uses.
     fn with_scratch<T>(&self, nu: usize, f: impl FnOnce(&mut Scratch) -> T) -> T {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let found = idle.iter().position(|scratch| scratch.nu == nu).map(|k| idle.swap_remove(k));
@@ -155,7 +154,7 @@ impl<F: GenericResidual> Differentiated<F> {
     }
 }
 
-/// Generic residual at a knot as a function of (q, v, u).
+/// Generic residual at a knot, as a function of the vector (q, v, u).
 struct AtKnot<'a, F> {
     model: &'a Model,
     function: &'a F,
@@ -189,7 +188,7 @@ impl<F: GenericResidual> ResidualFunction for Differentiated<F> {
             let [[nq, nv], [own_nq, own_nv]] = [found, expected];
             return Err(format!("it is of a robot of nq = {own_nq}, nv = {own_nv}; this one has nq = {nq}, nv = {nv}"));
         }
-        self.with_scratch(nu, |_| ()); // so that the first solve need not allocate it
+        self.with_scratch(nu, |_| ()); // allocates a workspace, so that the first solve does not
         Ok(())
     }
 

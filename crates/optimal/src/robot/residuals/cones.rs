@@ -1,7 +1,8 @@
 //! Friction cones, wrench cones and the support of the centre of pressure, as rows of inequalities.
 //!
-//! A contact's force is along the axes of the contact's rows; a cone's rotation R turns the surface's axes (its normal
-//! is z) into those. Rows are in Crocoddyl's order, so that its residuals are the same numbers.
+//! A contact's force is expressed along the axes of the contact's rows. The rotation R of a cone maps the axes of the
+//! surface, with the normal z, to these axes. Rows are in Crocoddyl's order, so residuals have the same numbers as in
+//! Crocoddyl.
 
 use crate::Error;
 use crate::problem::leave_a_value;
@@ -20,13 +21,13 @@ use condyle_dynamics::{Mat3, Vec3};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FrictionCone {
-    /// R, the surface's axes along the contact's.
+    /// Rotation R: the axes of the surface, expressed along the axes of the contact.
     pub rotation: Mat3<f64>,
-    /// μ.
+    /// Coefficient of friction μ.
     pub mu: f64,
-    /// Number of sides of the pyramid; even, 4 to [`MOST_FACETS`](Self::MOST_FACETS).
+    /// Number of sides of the pyramid: an even number from 4 to [`MOST_FACETS`](Self::MOST_FACETS).
     pub facets: usize,
-    /// Whether the pyramid lies inside of the cone, or around it.
+    /// Whether the pyramid lies inside the cone; otherwise it lies around the cone.
     pub inner: bool,
     /// Least normal force (N).
     pub least: f64,
@@ -35,8 +36,8 @@ pub struct FrictionCone {
     pub greatest: f64,
 }
 
-/// Friction, the centre of pressure within a rectangle, and the yaw moment of a rectangle of friction: rows A with
-/// lower ≤ A w ≤ upper for the wrench w, force first.
+/// Limits of the wrench w (force first) of a rectangular sole, as rows A with lower ≤ A w ≤ upper. They limit friction,
+/// the centre of pressure (inside the rectangle), and the yaw moment that friction can produce.
 ///
 /// Source: Caron, Pham, Nakamura, *Stability of surface contacts for humanoid robots* (2015).
 ///
@@ -52,30 +53,30 @@ pub struct FrictionCone {
 pub struct WrenchCone {
     /// Cone of the force.
     pub friction: FrictionCone,
-    /// Rectangle's sides along the surface's x and y (m).
+    /// Side lengths of the rectangle along the axes x and y of the surface (m).
     pub size: [f64; 2],
 }
 
 impl FrictionCone {
-    /// Most sides of a pyramid: 1000 of them are within 5e-6 of the round cone.
+    /// Maximum number of sides of a pyramid. A pyramid with 1000 sides is within 5e-6 of the round cone.
     pub const MOST_FACETS: usize = 1000;
 
-    /// Returns a pyramid of four sides around the cone on a surface whose normal is z, for any normal force that
-    /// pushes.
+    /// Returns a pyramid of four sides around the cone, on a surface with the normal z. Any normal force that pushes is
+    /// allowed.
     pub fn new(mu: f64) -> Self {
         Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
     }
 
-    /// μ of the pyramid.
+    /// Returns the coefficient of friction of the pyramid.
     fn slope(&self) -> f64 {
         let half = core::f64::consts::PI / self.facets as f64;
         if self.inner { self.mu * half.cos() } else { self.mu }
     }
 
-    /// A: a row for each side of the pyramid, and the normal.
+    /// Returns the matrix A: a row for each side of the pyramid, then a row for the normal force.
     ///
     /// # Panics
-    /// If there are no sides, or more than 1000.
+    /// If the number of sides is 0 or above 1000.
     #[track_caller]
     pub fn rows(&self) -> Vec<[f64; 3]> {
         self.assert_facets();
@@ -97,10 +98,10 @@ impl FrictionCone {
         assert!((1..=most).contains(&facets), "`facets` is {facets}, expected from 4 to {most}");
     }
 
-    /// Returns the least and greatest values of A f.
+    /// Returns the lower and upper bounds of A f for a contact's force f.
     ///
     /// # Panics
-    /// If there are no sides, or more than 1000.
+    /// If the number of sides is 0 or above 1000.
     #[track_caller]
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
         self.assert_facets();
@@ -110,16 +111,16 @@ impl FrictionCone {
         (lower, upper)
     }
 
-    /// Checks the numbers of the cone, as problems do that it comes into.
+    /// Checks the numbers of the cone. Problems that contain the cone also make this check.
     ///
     /// # Errors
-    /// [`Error::Cone`] if μ is negative or not finite, the number of sides is odd, below 4 or above 1000, the rotation
-    /// is invalid, or no normal force is between the bounds.
+    /// [`Error::Cone`] if μ is negative or not finite, or if the number of sides is odd, below 4 or above 1000. Also if
+    /// the rotation is invalid, or no normal force satisfies the bounds.
     pub fn check(&self) -> Result<(), Error> {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }
 
-    /// Returns a message for what makes no sense.
+    /// Returns an error message if a number of the cone is invalid.
     pub(crate) fn wrong(&self) -> Option<String> {
         let Self { least, greatest, .. } = *self;
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
@@ -137,14 +138,14 @@ impl FrictionCone {
     }
 }
 
-/// Returns the message for invalid sides of a rectangle.
+/// Returns an error message if a side length of the rectangle is invalid.
 pub(crate) fn wrong_size([length, width]: [f64; 2]) -> Option<String> {
     let good = |side: f64| side >= 0.0 && side.is_finite();
     (!(good(length) && good(width)))
         .then(|| format!("its sides are {length} and {width} m, expected finite numbers of at least 0"))
 }
 
-/// Returns the four rows that keep the centre of pressure within a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x
+/// Returns the four rows that keep the centre of pressure inside a rectangle: |τ_x| ≤ ½ size_y f_z, |τ_y| ≤ ½ size_x
 /// f_z.
 pub(crate) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6]; 4] {
     let [x, y, z] = R.columns();
@@ -155,7 +156,7 @@ pub(crate) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6
 }
 
 impl WrenchCone {
-    /// Checks the numbers of the cone, as problems do that it comes into.
+    /// Checks the numbers of the cone. Problems that contain the cone also make this check.
     ///
     /// # Errors
     /// [`Error::Cone`] as for [`FrictionCone::check`], and for a side that is negative or not finite.
@@ -163,15 +164,16 @@ impl WrenchCone {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }
 
-    /// Returns a message for what makes no sense.
+    /// Returns an error message if a number of the cone is invalid.
     pub(crate) fn wrong(&self) -> Option<String> {
         self.friction.wrong().or_else(|| wrong_size(self.size))
     }
 
-    /// A: the rows of the friction cone, four of the centre of pressure, eight of the yaw moment.
+    /// Returns the matrix A: the rows of the friction cone, then four rows for the centre of pressure and eight for the
+    /// yaw moment.
     ///
     /// # Panics
-    /// If there are no sides, or more than 1000.
+    /// If the number of sides is 0 or above 1000.
     #[track_caller]
     pub fn rows(&self) -> Vec<[f64; 6]> {
         let (R, mu) = (self.friction.rotation, self.friction.slope());
@@ -190,10 +192,10 @@ impl WrenchCone {
         rows
     }
 
-    /// Returns the least and greatest values of A w.
+    /// Returns the lower and upper bounds of A w for a wrench w.
     ///
     /// # Panics
-    /// If there are no sides, or more than 1000.
+    /// If the number of sides is 0 or above 1000.
     #[track_caller]
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut lower, mut upper) = self.friction.bounds();

@@ -1,9 +1,9 @@
-//! Frames by their names, which mean the same frame of whatever robot a problem is of.
+//! Names of frames, which are independent of a particular robot.
 
 use condyle_dynamics::{Frame, FrameKind, Model};
 
-/// Frame by its name. Its number is looked up in the robot for which an action is made, which refuses a name that is
-/// unknown there.
+/// Name of a frame. When an action is made, the index of the frame is looked up in the action's robot; an unknown name
+/// is an error.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -18,9 +18,10 @@ use condyle_dynamics::{Frame, FrameKind, Model};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FrameName {
-    /// Name.
+    /// Name of the frame.
     pub name: String,
-    /// Kind that goes first where several frames have that name; otherwise as in [`Model::frame`].
+    /// Kind of the frame, if several frames have the same name. Without a kind, or if no frame has this kind,
+    /// [`Model::frame`] chooses.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub kind: Option<FrameKind>,
 }
@@ -38,7 +39,7 @@ impl From<&Frame> for FrameName {
 }
 
 impl FrameName {
-    /// Returns the number that the frame has in a robot.
+    /// Returns the index of the frame in a robot.
     ///
     /// # Errors
     /// [`condyle_dynamics::Error::UnknownFrame`], with the nearest name.

@@ -1,5 +1,5 @@
-//! Gravity residual: the efforts of a knot beyond those that hold the robot still, for several knots side by side or
-//! for one.
+//! Gravity residual: the efforts of a knot minus the efforts that hold the robot still, for one knot or several at
+//! once.
 
 use super::kernel::KnotGroup;
 use crate::robot::knot_data::unpack;
@@ -8,22 +8,22 @@ use condyle_spatial::block::Block;
 use condyle_spatial::kernel;
 use nalgebra::DMatrix;
 
-/// M q̈ + h − g at knots with contacts, else −g.
+/// Vector M q̈ + h − g at knots with contacts, −g at other knots.
 #[derive(Debug)]
 pub(crate) struct GravityResidual<S> {
-    /// Value. Shape: nv.
+    /// Value of the vector. Shape: nv.
     value: Vec<S>,
-    /// Derivative by q. Shape: nv × nv.
+    /// Derivative with respect to q. Shape: nv × nv.
     by_q: DMatrix<S>,
 }
 
 impl<S: Block<Number = f64>> GravityResidual<S> {
-    /// Scratch for a robot with nv coordinates.
+    /// Allocates the vector and its derivative for nv coordinates.
     pub(crate) fn new(nv: usize) -> Self {
         Self { value: vec![S::zero(); nv], by_q: DMatrix::from_element(nv, nv, S::zero()) }
     }
 
-    /// Computes it at (q, v, q̈), and its derivatives if they are asked for.
+    /// Computes the vector at (q, v, q̈), and its derivatives if `slopes` is set.
     pub(crate) fn run(
         &mut self,
         model: &Model,
@@ -56,7 +56,7 @@ impl<S: Block<Number = f64>> GravityResidual<S> {
 }
 
 kernel! {
-    /// x −= y.
+    /// Computes x −= y.
     fn subtract<S>(x: &mut [S], y: &[S]) {
         for i in 0..x.len().min(y.len()) {
             x[i] -= y[i];

@@ -1,5 +1,5 @@
-//! Residuals of kinematics with their Jacobians, for several knots side by side in the lanes of a vector register, or
-//! for one. Each kind of residual is a function of its own, compiled for the level of its scalar.
+//! Kinematic residuals and their Jacobians, for one knot or for several knots in the lanes of a vector register. Each
+//! kind of residual has its own function, compiled for the SIMD level of the scalar.
 #![allow(non_snake_case)] // J, R, X
 
 use super::layout::{Plan, ROWS, STRIDE, row_width};
@@ -13,20 +13,21 @@ use condyle_dynamics::{
 use condyle_spatial::block::{Block, Strided, gather_rows};
 use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
-/// Some knots whose residuals read the same.
+/// Knots whose residuals read the same quantities.
 pub(crate) struct KnotGroup<'a> {
     /// Terms of each knot.
     pub terms: &'a [KnotTerms<'a>],
     /// Data of each knot.
     pub data: &'a mut [KnotData],
-    /// Whether Jacobians are asked for.
+    /// Whether Jacobians are computed.
     pub slopes: bool,
-    /// Whether the last pass was at the positions of these knots.
+    /// Whether the last kinematic pass was computed at the positions of these knots.
     pub visited: bool,
 }
 
 impl KnotGroup<'_> {
-    /// Calls a function for each kinematic residual that has a weight at some knot, with its list and its number there.
+    /// Calls `visit` for each kinematic residual with a weight above 0 at one knot at least. The two numbers are the
+    /// index of the list (costs or limits), and the index of the residual in this list.
     fn each(&mut self, mut visit: impl FnMut(&mut Self, [usize; 2], &Residual, &Plan)) {
         let (first, terms) = (self.terms[0], self.terms);
         for list in 0..2 {
@@ -41,7 +42,7 @@ impl KnotGroup<'_> {
         }
     }
 
-    /// Writes the Jacobian of a residual: the first rows of ∂r/∂v, if it depends on v, and of ∂r/∂q.
+    /// Writes the Jacobian of a residual: the first rows of ∂r/∂v, if the residual depends on v, and of ∂r/∂q.
     fn write_rows<S: Block<Number = f64>>(
         &mut self,
         list: usize,
@@ -59,22 +60,22 @@ impl KnotGroup<'_> {
     }
 }
 
-/// Scratch of kinematic residuals.
+/// Workspace of kinematic residuals.
 #[derive(Debug)]
 pub(crate) struct ResidualKernel<S> {
-    /// Numbers of targets.
+    /// Numbers of the residuals' targets.
     t: [S; 12],
     r: [S; STRIDE],
-    /// ∂r/∂v and ∂r/∂q. Shape: 6 × nv.
+    /// Jacobians ∂r/∂v and ∂r/∂q. Shape: 6 × nv.
     J: [Matrix<S>; 2],
-    /// ∂c/∂q. Shape: 3 × nv.
+    /// Jacobian ∂c/∂q of the centre of mass. Shape: 3 × nv.
     Jcom: Matrix<S>,
-    /// Zeros. Shape: nv.
+    /// Vector of zeros. Shape: nv.
     zero: Vec<S>,
 }
 
 impl<S: Block<Number = f64>> ResidualKernel<S> {
-    /// Scratch for a robot with nv coordinates.
+    /// Allocates the workspace for a robot with nv coordinates.
     pub(crate) fn new(nv: usize) -> Self {
         let wide = |rows| matrix(rows, nv, S::zero());
         Self {
@@ -86,7 +87,7 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
         }
     }
 
-    /// Computes the kinematic residuals of some knots at (q, v), and the rows of their Jacobians.
+    /// Computes the kinematic residuals of the knots of `group` at (q, v), and the rows of their Jacobians.
     pub(crate) fn run(&mut self, model: &Model, data: &mut Data<S>, [q, v]: [&[S]; 2], group: &mut KnotGroup<'_>) {
         let Self { t, r, J, Jcom, zero } = self;
         let requirements = group.terms[0].layout().requirements;
@@ -144,14 +145,14 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
 }
 
 kernel! {
-    /// Computes ∂c/∂q.
+    /// Computes the Jacobian ∂c/∂q of the centre of mass c.
     fn center_of_mass_jacobian<S>(model: &Model, data: &mut Data<S>, q: &[S], Jcom: &mut Matrix<S>) {
         Jcom.as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
     }
 }
 
 kernel! {
-    /// Computes ∂h_G/∂v and ∂h_G/∂q.
+    /// Computes the derivatives ∂h_G/∂v and ∂h_G/∂q of the centroidal momentum h_G.
     fn centroidal_momentum_derivatives<S>(
         model: &Model, data: &mut Data<S>, q: &[S], v: &[S], zero: &[S], J: &mut [Matrix<S>; 2],
     ) {
@@ -162,14 +163,14 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c − c_ref.
+    /// Computes the error c − c_ref of the centre of mass.
     fn center_of_mass<S>(placements: Placements<'_, S>, t: &[S; 12], r: &mut [S; STRIDE]) {
         r[..3].copy_from_slice(&(placements.com() - vector(t, 0)).to_array());
     }
 }
 
 kernel! {
-    /// Computes h_G − h_ref.
+    /// Computes the error h_G − h_ref of the centroidal momentum.
     fn centroidal_momentum<S>(velocities: Velocities<'_, S>, t: &[S; 12], r: &mut [S; STRIDE]) {
         let momentum = velocities.centroidal_momentum() - Force::new(vector(t, 0), vector(t, 3));
         r[..6].copy_from_slice(&momentum.to_array());
@@ -177,7 +178,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes log(refXo oXf), and its Jacobian Jlog J.
+    /// Computes the error log(refXo oXf) of a frame's placement, and its Jacobian Jlog J.
     fn frame_placement<S>(
         placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
         J: &mut [Matrix<S>; 2],
@@ -197,7 +198,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes p − p_ref, and its Jacobian.
+    /// Computes the error p − p_ref of a frame's position, and its Jacobian.
     fn frame_translation<S>(
         placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
         J: &mut [Matrix<S>; 2],
@@ -210,7 +211,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes log(R_refᵀ R), and its Jacobian Jlog J.
+    /// Computes the error log(R_refᵀ R) of a frame's rotation, and its Jacobian Jlog J.
     fn frame_rotation<S>(
         placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
         J: &mut [Matrix<S>; 2],
@@ -230,7 +231,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes v − v_ref, ∂v/∂q̇ and ∂v/∂q.
+    /// Computes the error v − v_ref of a frame's velocity, ∂v/∂q̇ and ∂v/∂q.
     fn frame_velocity<S>(
         velocities: Velocities<'_, S>, frame: usize, reference: ReferenceFrame, t: &[S; 12], r: &mut [S; STRIDE],
         slopes: bool, J: &mut [Matrix<S>; 2],
@@ -244,13 +245,13 @@ kernel! {
     }
 }
 
-/// Three numbers of a target from the k-th on.
+/// Returns three numbers of a target, from index k on.
 #[inline(always)]
 fn vector<S: Scalar>(t: &[S; 12], k: usize) -> Vec3<S> {
     Vec3::new(t[k], t[k + 1], t[k + 2])
 }
 
-/// Returns the rotation of a target.
+/// Returns the rotation in the numbers of a target.
 #[inline(always)]
 fn rotation<S: Scalar>(t: &[S; 12]) -> Mat3<S> {
     Mat3 { x: vector(t, 3), y: vector(t, 6), z: vector(t, 9) }

@@ -1,4 +1,5 @@
-//! Layout of the residuals of a knot: how each is computed, what it reads, and where its numbers stand.
+//! Layout of the residuals of a knot: how each residual is computed, which quantities it reads, and where its entries
+//! are stored.
 #![allow(non_snake_case)] // W
 
 use super::residual::{Part, Residual};
@@ -7,27 +8,28 @@ use condyle_dynamics::Model;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;
 
-/// Residual as it is computed.
+/// Plan for the computation of a residual, made once for a robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
-    /// Number of its entries.
+    /// Number of entries of the residual.
     pub n: usize,
-    /// Number of entries of the terms before it.
+    /// Number of entries of all terms before this one.
     pub first: usize,
-    /// Index of a kinematic residual among the kinematic residuals of its knot.
+    /// Index of a kinematic residual among the kinematic residuals of the knot.
     pub index: usize,
-    /// Number of its frame in the robot; 0 if it reads none.
+    /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
-    /// Rows of its contact in λ.
+    /// Rows in λ of the residual's contact.
     pub rows: Range<usize>,
-    /// Whether its knot has contacts.
+    /// Whether the knot has contacts.
     pub in_contact: bool,
-    /// W of a residual W f of a contact's force, or W τ, row after row.
+    /// Matrix W, row after row, of a residual W f of a contact's force f or W τ of the efforts τ.
     pub W: Vec<f64>,
 }
 
 impl Plan {
-    /// Returns the plan of a residual, or what does not fit the robot and the capabilities of its dynamics.
+    /// Returns the plan of a residual, or a text that describes what does not fit the robot and the capabilities of its
+    /// dynamics.
     pub(crate) fn new(model: &Model, capabilities: &Capabilities, residual: &Residual) -> Result<Self, String> {
         let n = residual.check(model, capabilities)?;
         let frame = residual.frame().map_or(Ok(0), |name| name.number(model)).map_err(|error| error.to_string())?;
@@ -41,23 +43,23 @@ impl Plan {
     }
 }
 
-/// Returns the width of a row of the Jacobian of a kinematic residual, which is one by q alone or by (v, q).
+/// Returns the width of a row of a kinematic residual's Jacobian, which is with respect to q alone or to (v, q).
 pub(crate) fn row_width(nv: usize, residual: &Residual) -> usize {
     if residual.part() == Part::Positions { nv } else { 2 * nv }
 }
 
-/// Memory that the residuals of a knot take, and the quantities that they read.
+/// Memory sizes for the residuals of a knot, and the quantities that these residuals read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct KnotLayout {
-    /// Most entries of one residual.
+    /// Largest number of entries of one residual.
     pub longest: usize,
-    /// Most rows of Jacobians by (u, v, q), and by q alone.
+    /// Number of rows of Jacobians with respect to (u, v, q), and with respect to q alone.
     pub rows: [usize; 2],
     /// Number of kinematic residuals.
     pub kinematic: usize,
     /// Whether a residual reads forces.
     pub forces: bool,
-    /// Whether a residual is a user's own, and whether one has second derivatives.
+    /// Whether a residual is user-defined; `curved`: whether a user-defined residual has second derivatives.
     pub own: bool,
     pub curved: bool,
     pub requirements: Requirements,
@@ -79,7 +81,7 @@ impl KnotLayout {
         Self { longest: plan.n, rows, kinematic, forces, own, curved, requirements }
     }
 
-    /// Returns the layout that serves both of two knots.
+    /// Returns a layout that is large enough for two knots, each by itself.
     pub(crate) fn or(self, other: Self) -> Self {
         let most = |a: [usize; 2], b: [usize; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         let kinematic = self.kinematic.max(other.kinematic);
@@ -87,7 +89,7 @@ impl KnotLayout {
     }
 }
 
-/// Layout of the residuals of both together.
+/// Layout of the residuals of two lists together.
 impl Add for KnotLayout {
     type Output = Self;
     fn add(self, other: Self) -> Self {
@@ -104,7 +106,7 @@ impl Add for KnotLayout {
     }
 }
 
-/// Quantities of the whole robot that the residuals of a knot read, so that each is computed once.
+/// Quantities of the whole robot that the residuals of a knot read. Each quantity is computed once.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Requirements {
     pub placements: bool,
@@ -112,9 +114,9 @@ pub(crate) struct Requirements {
     /// Jacobian of the centre of mass.
     pub com: bool,
     pub momentum: bool,
-    /// g, the efforts that hold the robot still.
+    /// Efforts g that hold the robot still.
     pub gravity: bool,
-    /// M q̈ + h, the efforts of joints and contacts.
+    /// Efforts M q̈ + h of joints and contacts together.
     pub inertia: bool,
     /// Change of the velocity of the centre of mass at an impact.
     pub impulse_com: bool,
@@ -150,29 +152,29 @@ impl BitOr for Requirements {
     }
 }
 
-/// Distance between the numbers of consecutive kinematic residuals.
+/// Distance between the first numbers of consecutive kinematic residuals.
 pub(crate) const STRIDE: usize = 8;
-/// Number of entries of each residual's rows per coordinate: six rows with respect to v and q.
+/// Number of entries of the Jacobian of a residual for each coordinate: six rows with respect to v and q.
 pub(crate) const ROWS: usize = 12;
 
-/// Quantities that the residuals of a knot read; those that its terms do not require are not written.
+/// Quantities that the residuals of a knot read. Quantities that no term of the knot requires are not written.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ResidualData {
-    /// Kinematic residuals: of costs, and of limits.
+    /// Kinematic residuals of costs, then of limits.
     pub kinematic: [KinematicData; 2],
-    /// M q̈ + h − g at a knot with contacts, else −g. Shape: nv.
+    /// Gravity residual: M q̈ + h − g at a knot with contacts, −g at other knots. Shape: nv.
     pub gravity_residual: Vec<f64>,
-    /// Derivatives of the surplus by q, v, q̈; of −g that by q. Shape: nv × nv.
+    /// Derivatives of the gravity residual with respect to q, v and q̈; for −g only with respect to q. Shape: nv × nv.
     pub dsurplus: [DMatrix<f64>; 3],
-    /// J_c (v⁺ − v) at an impact: the change of the velocity of the centre of mass.
+    /// Velocity change J_c (v⁺ − v) of the centre of mass at an impact.
     pub com_change: [f64; 3],
-    /// Derivatives of that by q, where v⁺ − v stays, and by v⁺ − v. Shape: 3 × nv.
+    /// Derivatives of `com_change` with respect to q, at constant v⁺ − v, and with respect to v⁺ − v. Shape: 3 × nv.
     pub dcom_change: [DMatrix<f64>; 2],
-    /// Whether it was written for the terms of the knot.
+    /// Whether these data were written for the terms of the knot.
     pub is_written: bool,
 }
 
-/// Residuals of kinematics, and the rows of their Jacobians, at the places that their plans name.
+/// Kinematic residuals and the rows of their Jacobians. Each residual is stored at the `index` of its plan.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KinematicData {
     pub r: Vec<f64>,
@@ -180,7 +182,7 @@ pub(crate) struct KinematicData {
 }
 
 impl ResidualData {
-    /// Makes room for the residuals of costs and of limits of a robot's knots.
+    /// Allocates memory for the residuals of costs and of limits, if the present memory is too small.
     pub(crate) fn reserve(&mut self, nv: usize, layouts: [KnotLayout; 2]) {
         for (data, KnotLayout { kinematic, .. }) in self.kinematic.iter_mut().zip(layouts) {
             if data.r.len() < kinematic * STRIDE {
@@ -200,7 +202,7 @@ impl ResidualData {
 }
 
 impl KinematicData {
-    /// r of a residual.
+    /// Returns the entries of a residual.
     pub(crate) fn residual(&self, plan: &Plan) -> &[f64] {
         &self.r[plan.index * STRIDE..][..plan.n]
     }

@@ -1,4 +1,4 @@
-//! Residuals: what costs and limits read, and how it is computed.
+//! Residuals, which costs and limits read, and their computation.
 
 pub(super) mod autodiff;
 pub(super) mod cones;

@@ -1,4 +1,4 @@
-//! Residuals of one's own: any function of the state and the control.
+//! User-defined residuals: any function of the state and the controls.
 
 use crate::lq::Hessian;
 use condyle_dynamics::Model;
@@ -27,45 +27,45 @@ impl Inputs {
     pub const POSITIONS: Self = Self { velocities: false, ..Self::STATE };
 }
 
-/// Residual that is written by a user, r(t, x, u), with its Jacobian. Several threads may call it at a time.
+/// User-defined residual r(t, x, u) with its Jacobian. Several threads may call it at the same time.
 ///
 /// [`GenericResidual`](crate::robot::GenericResidual) needs no Jacobian: dual numbers compute it.
 pub trait ResidualFunction: Any + Send + Sync {
     /// Returns the number of entries of r.
     fn size(&self) -> usize;
 
-    /// Returns the arguments on which r depends, which must not change: all by default. Of the others, the columns of
-    /// the Jacobian are not read.
+    /// Returns the arguments on which r depends: all by default. The result must not change. Columns of the Jacobian
+    /// for other arguments are not read.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
 
-    /// Refuses a robot, or a number of controls, for which r is not made. By default none is refused. An action calls
-    /// this when it is given the residual.
+    /// Returns an error if r cannot be used with this robot or this number of controls. By default it can always be
+    /// used. An action calls this function once, when the action receives the residual.
     ///
     /// # Errors
-    /// The fault, with the numbers.
+    /// A description of the fault, including the invalid numbers.
     fn check(&self, model: &Model, nu: usize) -> Result<(), String> {
         let _ = (model, nu);
         Ok(())
     }
 
-    /// r(t, x, u) of knot t.
+    /// Computes r(t, x, u) of knot t into `r`.
     fn calc(&self, t: usize, x: &[f64], u: &[f64], r: &mut [f64]);
 
-    /// ∂r/∂x in the tangent space of the state, size × ndx, and ∂r/∂u, size × nu, row after row. Both hold zeros
-    /// before.
+    /// Computes ∂r/∂x in the tangent space of the state (size × ndx) and ∂r/∂u (size × nu), row after row. Both arrays
+    /// contain zeros before the call.
     fn calc_diff(&self, t: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]);
 
-    /// Returns whether [`calc_hessian`](Self::calc_hessian) gives second derivatives. Not by default: the Hessian of
-    /// the cost is then Gauss–Newton's, (∂r)ᵀ a″ ∂r.
+    /// Returns whether [`calc_hessian`](Self::calc_hessian) computes second derivatives. By default it does not: the
+    /// Hessian of the cost is then the Gauss–Newton approximation (∂r)ᵀ a″ ∂r.
     fn has_hessian(&self) -> bool {
         false
     }
 
-    /// As [`calc_diff`](Self::calc_diff), with Σ dᵢ ∂²rᵢ too, for size numbers d, the slopes of what r is worth: they
-    /// come to the Gauss–Newton Hessian. Of positions on groups it is the Hessian of r(x ⊕ δ) at δ = 0. All hold zeros
-    /// before.
+    /// Computes the same as [`calc_diff`](Self::calc_diff), and Σ dᵢ ∂²rᵢ, where d is the gradient of the activation
+    /// with respect to r. The sum is added to the Gauss–Newton Hessian. For positions that are not a vector space, ∂²rᵢ
+    /// is the Hessian of rᵢ(x ⊕ δ) at δ = 0. All outputs contain zeros before the call.
     fn calc_hessian(
         &self,
         t: usize,
@@ -80,7 +80,7 @@ pub trait ResidualFunction: Any + Send + Sync {
     }
 }
 
-/// A [`ResidualFunction`] as a residual. Two are equal if they are one object.
+/// Residual that wraps a [`ResidualFunction`]. Two such residuals are equal if they share the same function object.
 ///
 /// ```
 /// use condyle_optimal::robot::{OwnResidual, Residual, ResidualFunction};
@@ -102,14 +102,14 @@ pub trait ResidualFunction: Any + Send + Sync {
 /// # assert_eq!(power, power.clone());
 /// ```
 ///
-/// A cost of one's own that is a number and no residual has one entry, the activation
-/// [`Sum`](crate::robot::Activation::Sum), and second derivatives, if it has any, in
+/// For a user-defined cost that is a number and not a residual, write a residual with one entry and use the activation
+/// [`Sum`](crate::robot::Activation::Sum). Its second derivatives, if any, belong in
 /// [`calc_hessian`](ResidualFunction::calc_hessian).
 #[derive(Clone)]
 pub struct OwnResidual(Arc<dyn ResidualFunction>);
 
 impl OwnResidual {
-    /// Returns a residual of a function.
+    /// Makes a residual from a function.
     pub fn new(function: impl ResidualFunction) -> Self {
         Self(Arc::new(function))
     }

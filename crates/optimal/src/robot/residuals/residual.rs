@@ -1,4 +1,4 @@
-//! Residuals: what a cost reads.
+//! Residuals, which costs and limits read.
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
@@ -9,124 +9,125 @@ use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
 /// Residual: a vector r(x, u) that should be small.
 ///
-/// Frames are called by their names in the robot, contacts and impulses by those that the action gives them.
+/// Frames have the names from the robot; contacts and impulses have the names from the action.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[non_exhaustive]
 pub enum Residual {
-    /// x ⊖ x_ref, 2 nv numbers.
+    /// State error x ⊖ x_ref, 2 nv numbers.
     State {
-        /// x_ref = (q, v).
+        /// Reference state x_ref = (q, v).
         reference: Vec<f64>,
     },
-    /// u − u_ref, nu numbers.
+    /// Control error u − u_ref, nu numbers.
     Control {
-        /// u_ref.
+        /// Reference controls u_ref.
         reference: Vec<f64>,
     },
-    /// τ − g(q) + Jᵀλ, nv numbers: the efforts and forces beyond those that hold the robot still.
+    /// Efforts and contact forces minus the efforts that hold the robot still: τ − g(q) + Jᵀλ, nv numbers.
     ControlGravity,
-    /// τ − τ_ref, the efforts of all joints, nv numbers.
+    /// Effort error τ − τ_ref of all joints, nv numbers.
     JointEffort {
-        /// τ_ref.
+        /// Reference efforts τ_ref.
         reference: Vec<f64>,
     },
-    /// Nᵀτ, the efforts that inverse dynamics finds where nothing drives the robot, which must vanish in a motion that
-    /// is possible: of a floating base 6 numbers, the force and the moment on it. Nᵀ S = 0, orthonormal.
+    /// Undriven efforts Nᵀτ from inverse dynamics, with Nᵀ S = 0 and orthonormal rows of Nᵀ. They are 0 in each motion
+    /// that the controls can produce. For a floating base they are 6 numbers: the force and the moment on the base.
     UndrivenEffort,
-    /// J q̈ + γ of a contact, along the axes of its rows, where accelerations are controls: 1, 2, 3 or 6 numbers that
-    /// must vanish while the contact holds.
+    /// Acceleration J q̈ + γ of a contact along the axes of its rows, if joint accelerations are controls: 1, 2, 3 or 6
+    /// numbers. They are 0 while the contact holds.
     ContactAcceleration {
-        /// Contact's name.
+        /// Name of the contact.
         contact: String,
     },
-    /// q̈ − a_ref, nv numbers.
+    /// Acceleration error q̈ − a_ref of all joints, nv numbers.
     JointAcceleration {
-        /// a_ref.
+        /// Reference accelerations a_ref.
         reference: Vec<f64>,
     },
-    /// c − c_ref, 3 numbers in the world.
+    /// Error c − c_ref of the centre of mass, 3 numbers along the world's axes.
     CenterOfMass {
-        /// Wanted centre of mass (m).
+        /// Desired centre of mass in the world (m).
         target: Vec3<f64>,
     },
-    /// h_G − h_ref, 6 numbers along the world's axes, linear first: the momentum about the centre of mass.
+    /// Error h_G − h_ref of the momentum about the centre of mass: 6 numbers along the world's axes, linear first.
     CentroidalMomentum {
-        /// Wanted momentum (kg m/s, kg m²/s).
+        /// Desired momentum (kg m/s, kg m²/s).
         target: Force<f64>,
     },
-    /// log(refXo oXf), the twist from the target to the frame, in the target's frame: 6 numbers, linear first.
+    /// Twist log(refXo oXf) from the target to the frame, expressed in the target's frame: 6 numbers, linear first.
     FramePlacement {
-        /// Frame.
+        /// Frame to which the residual refers.
         frame: FrameName,
-        /// Frame's wanted pose in the world.
+        /// Desired pose of the frame in the world.
         target: Se3<f64>,
     },
-    /// p − p_ref, 3 numbers, in the world.
+    /// Error p − p_ref of a frame's position, 3 numbers along the world's axes.
     FrameTranslation {
-        /// Frame.
+        /// Frame to which the residual refers.
         frame: FrameName,
-        /// Wanted position of its origin in the world (m).
+        /// Desired position of the frame's origin in the world (m).
         target: Vec3<f64>,
     },
-    /// log(R_refᵀ R), 3 numbers, in the target's axes.
+    /// Rotation error log(R_refᵀ R) of a frame, 3 numbers along the target's axes.
     FrameRotation {
-        /// Frame.
+        /// Frame to which the residual refers.
         frame: FrameName,
-        /// Frame's wanted axes in the world.
+        /// Desired rotation of the frame in the world.
         target: Mat3<f64>,
     },
-    /// v − v_ref, 6 numbers, linear first.
+    /// Velocity error v − v_ref of a frame, 6 numbers, linear first.
     FrameVelocity {
-        /// Frame.
+        /// Frame to which the residual refers.
         frame: FrameName,
-        /// Wanted velocity (m/s, rad/s).
+        /// Desired velocity (m/s, rad/s).
         target: Motion<f64>,
-        /// Frame in which both are expressed.
+        /// Frame in which the velocity and its target are expressed.
         reference: ReferenceFrame,
     },
-    /// λ − λ_ref, the force or impulse of a contact along the axes of its rows: 1, 2, 3 or 6 numbers, linear first.
+    /// Error λ − λ_ref of a contact's force or impulse along the axes of the contact's rows: 1, 2, 3 or 6 numbers,
+    /// linear first.
     ContactForce {
-        /// Contact's name.
+        /// Name of the contact.
         contact: String,
-        /// Wanted force along the contact's axes; only what its rows hold is read, of a point no moment, of a line z,
-        /// of a plane x and z.
+        /// Desired force along the contact's axes. Only the components that the contact has are read: no moment for a
+        /// point, only z for a line, only x and z for a plane.
         target: Force<f64>,
     },
-    /// F, for a contact's force f along its axes (of a line (0, 0, λ), of a plane (λ₁, 0, λ₂)): a number for each side
-    /// of the cone, and the normal force. See [`FrictionCone::bounds`].
+    /// Rows of a friction cone times the contact's force f along its axes: a number for each side of the cone, then the
+    /// normal force. For a line f = (0, 0, λ), for a plane f = (λ₁, 0, λ₂). See [`FrictionCone::bounds`].
     FrictionCone {
-        /// Contact's name.
+        /// Name of the contact.
         contact: String,
-        /// Cone.
+        /// Cone whose rows are used.
         cone: FrictionCone,
     },
-    /// W, for a rigid contact's wrench w. See [`WrenchCone::bounds`].
+    /// Rows of a wrench cone times the wrench w of a rigid contact. See [`WrenchCone::bounds`].
     WrenchCone {
-        /// Contact's name.
+        /// Name of the contact.
         contact: String,
-        /// Cone.
+        /// Cone whose rows are used.
         cone: WrenchCone,
     },
-    /// ±τ_x − ½ size_y f_z, ±τ_y − ½ size_x f_z of a rigid contact: not above 0 while the centre of pressure is inside.
+    /// Limits ±τ_x − ½ size_y f_z and ±τ_y − ½ size_x f_z of a rigid contact: at most 0 while the centre of pressure is
+    /// inside the rectangle.
     CenterOfPressure {
-        /// Contact's name.
+        /// Name of the contact.
         contact: String,
-        /// Surface's axes along the contact's.
+        /// Axes of the surface, expressed along the axes of the contact.
         rotation: Mat3<f64>,
-        /// Rectangle's sides along the surface's x and y (m).
+        /// Side lengths of the rectangle along the axes x and y of the surface (m).
         size: [f64; 2],
     },
-    /// J_c (v⁺ − v), 3 numbers in the world: by how much an impact changes the velocity of the centre of mass (m/s).
+    /// Velocity change J_c (v⁺ − v) of the centre of mass at an impact (m/s), 3 numbers along the world's axes.
     ImpulseCenterOfMass,
-    /// Function of one's own. It cannot be put into a file.
+    /// User-defined function, which cannot be written to a file.
     #[cfg_attr(feature = "serde", serde(skip))]
     Own(OwnResidual),
 }
 
-/// Returns the entries of a wrench along a contact's axes that are its rows, by their number: a line has z, a plane x
-/// and z.
+/// Returns the entries of a wrench that a contact with this number of rows has: z for a line, x and z for a plane.
 pub(super) fn held(rows: usize) -> &'static [usize] {
     match rows {
         1 => &[2],
@@ -136,7 +137,7 @@ pub(super) fn held(rows: usize) -> &'static [usize] {
     }
 }
 
-/// Part of the Hessian of a residual that has entries.
+/// Nonzero block of the Hessian of a residual's term.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
     /// Diagonal of Q or R, and the blocks of groups.
@@ -148,7 +149,7 @@ pub(crate) enum Part {
 }
 
 impl Residual {
-    /// Returns the part of the Hessian that has entries.
+    /// Returns which block of the Hessian has nonzero entries.
     pub(crate) fn part(&self) -> Part {
         match self {
             Self::State { .. } | Self::Control { .. } => Part::Diagonal,
@@ -161,7 +162,7 @@ impl Residual {
         }
     }
 
-    /// Returns the output of the dynamics that it depends on, besides x and u.
+    /// Returns the output of the dynamics on which the residual depends, besides x and u.
     pub(crate) fn output(&self) -> Option<Output> {
         match self {
             Self::JointEffort { .. } | Self::UndrivenEffort => Some(Output::Effort),
@@ -177,18 +178,18 @@ impl Residual {
         }
     }
 
-    /// Returns whether it reads kinematics alone.
+    /// Returns whether the residual reads only kinematics.
     pub(crate) fn is_kinematic(&self) -> bool {
         self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
     }
 
-    /// Returns whether another residual, of the same frame if it has one, reads the same, with a target of its own.
+    /// Returns whether another residual differs only in its target. Callers compare the frames of both residuals.
     pub(crate) fn differs_in_target(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other) && self.reference() == other.reference()
     }
 
-    /// Returns the numbers of its target: a position, a twist or a wrench, then a rotation by columns, padded with
-    /// zeros.
+    /// Returns the numbers of the target, padded with zeros: a position, twist or wrench, then a rotation column by
+    /// column.
     pub(crate) fn target_numbers(&self) -> [f64; 12] {
         let mut to = [0.0; 12];
         let mut write = |from: usize, numbers: &[f64]| to[from..][..numbers.len()].copy_from_slice(numbers);
@@ -206,7 +207,7 @@ impl Residual {
         to
     }
 
-    /// Returns the frame that it reads.
+    /// Returns the frame that the residual reads.
     pub(crate) fn frame(&self) -> Option<&FrameName> {
         match self {
             Self::FramePlacement { frame, .. }
@@ -217,7 +218,8 @@ impl Residual {
         }
     }
 
-    /// Returns the frame in which it is expressed, of those that leave a choice.
+    /// Returns the reference frame in which the residual is expressed; `None` if the kind of residual has no such
+    /// choice.
     pub(crate) fn reference(&self) -> Option<ReferenceFrame> {
         match self {
             Self::FrameVelocity { reference, .. } => Some(*reference),
@@ -225,7 +227,7 @@ impl Residual {
         }
     }
 
-    /// Returns the contact that it reads.
+    /// Returns the contact that the residual reads.
     pub(crate) fn contact(&self) -> Option<&str> {
         match self {
             Self::ContactForce { contact, .. }
@@ -237,7 +239,8 @@ impl Residual {
         }
     }
 
-    /// Returns the number of its entries, or what does not fit the robot and the capabilities of its dynamics.
+    /// Returns the number of entries, or a text that describes what does not fit the robot and the capabilities of its
+    /// dynamics.
     pub(crate) fn check(&self, model: &Model, capabilities: &Capabilities) -> Result<usize, String> {
         let (nv, nu) = (model.nv(), capabilities.nu);
         let rows = self.contact().map_or(Ok(0), |name| capabilities.contact(name).map(|rows| rows.len()))?;
@@ -290,7 +293,8 @@ impl Residual {
         }
     }
 
-    /// W of a residual r = W f of a contact's force, row after row; its rows have as many numbers as the contact.
+    /// Returns the matrix W, row after row, of a residual r = W f of a contact's force f. W has as many columns as the
+    /// contact has rows.
     pub(crate) fn force_rows(&self, rows: usize) -> Vec<f64> {
         match self {
             Self::ContactForce { .. } => (0..rows * rows).map(|k| f64::from(u8::from(k % rows == k / rows))).collect(),

@@ -1,12 +1,12 @@
-//! Rows of the Jacobians of residuals. They are collected, and gradients and Gauss–Newton Hessians of a knot are then
-//! written once, each entry of Q, S and R as a sum of outer products.
-#![allow(non_snake_case)] // the names of the literature
+//! Rows of the Jacobians of residuals. All rows of a knot are collected. Then the gradient and the Gauss–Newton Hessian
+//! are written once. Each entry of Q, S and R is a sum of products of row entries.
+#![allow(non_snake_case)] // names of matrices follow the literature
 
 use crate::lq::LqKnot;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product_without_slack};
 use core::ops::Range;
 
-/// q += d and Q += diag(dd) on some entries, for a residual whose Jacobian is the identity there.
+/// Adds d to q and diag(dd) to Q at `entries`, where the Jacobian of the residual is the identity.
 pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[f64], dd: &[f64]) {
     let (n, inverse, form) = (knot.ndx(), knot.structure.is_inverse_dynamics(), &mut knot.inverse_dynamics);
     for i in entries.clone() {
@@ -21,7 +21,7 @@ pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[
     }
 }
 
-/// r += d and R += diag(dd).
+/// Adds d to r and diag(dd) to R.
 pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
     let (n, m, inverse) = (knot.ndx(), knot.nu(), knot.structure.is_inverse_dynamics());
     let form = &mut knot.inverse_dynamics;
@@ -34,7 +34,7 @@ pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
     }
 }
 
-/// Row of a Jacobian with respect to (u, v, q), to be added to.
+/// Row of a Jacobian with respect to (u, v, q), to which terms are added.
 pub(crate) struct Row<'a> {
     pub u: &'a mut [f64],
     pub v: &'a mut [f64],
@@ -42,21 +42,22 @@ pub(crate) struct Row<'a> {
 }
 
 /// Rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In a
-/// knot in inverse-dynamics form u stands for the unknowns that replace the controls.
+/// knot in inverse-dynamics form, u means the unknowns that replace the controls.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     nu: usize,
     nv: usize,
     /// Distance from one row to the next.
     stride: usize,
-    /// Rows of residuals that depend on more than q; from the end of the memory backwards, rows of the other residuals.
+    /// From the front: rows of residuals that depend on more than q. From the back: rows of residuals that depend on q
+    /// alone.
     rows: Vec<f64>,
-    /// a′ and a″.
+    /// Derivatives a′ and a″ of the activation for each row.
     slopes: Vec<[f64; 2]>,
-    /// Number of rows of both kinds.
+    /// Number of rows with respect to (u, v, q); `positions` counts rows with respect to q alone.
     whole: usize,
     positions: usize,
-    /// Rows times √|a″|, and the same with the sign of a″.
+    /// Rows times √|a″|; `right` has the same rows with the sign of a″.
     left: Vec<f64>,
     right: Vec<f64>,
 }
@@ -70,12 +71,12 @@ impl Rows {
         Self { nu, nv, stride, rows, slopes, whole: 0, positions: 0, left, right }
     }
 
-    /// Forgets all rows.
+    /// Removes all rows.
     pub(crate) fn clear(&mut self) {
         (self.whole, self.positions) = (0, 0);
     }
 
-    /// Returns a row of zeros, to be written, for the a′ and a″ that it is worth.
+    /// Appends a row of zeros with the derivatives `worth` = [a′, a″], and returns it to be filled.
     pub(crate) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
         let k = self.whole;
         self.slopes[k] = worth;
@@ -87,7 +88,7 @@ impl Rows {
         Row { u, v, q }
     }
 
-    /// Computes a row of a Jacobian with respect to q alone.
+    /// Appends a row of a Jacobian with respect to q alone, with the derivatives `worth` = [a′, a″].
     pub(crate) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
         self.positions += 1;
         let k = self.slopes.len() - self.positions;
@@ -95,8 +96,9 @@ impl Rows {
         self.rows[k * self.stride + self.nu + self.nv..][..self.nv].copy_from_slice(row);
     }
 
-    /// Writes q, r, Q, S and R: q = Gᵀ a′ and so on, for G of all rows. Of a knot in inverse-dynamics form, it writes q
-    /// and the part of Q for q alone, and leaves the rows that depend on more to the sweep.
+    /// Writes q, r, Q, S and R from the matrix G of all rows: the gradient is Gᵀ a′, the Hessian Gᵀ a″ G. In
+    /// inverse-dynamics form, only the gradient and the block of Q for positions are written; the sweep uses the rows
+    /// that depend on more than positions.
     pub(crate) fn write(&mut self, knot: &mut LqKnot) {
         knot.q.as_mut_slice().fill(0.0);
         knot.r.as_mut_slice().fill(0.0);
@@ -136,7 +138,7 @@ impl Vectorized for Write<'_> {
                 right[i] = if dd < 0.0 { -left[i] } else { left[i] };
             }
         }
-        let (u, v, q) = (0, m, m + nv); // where they stand in a row
+        let (u, v, q) = (0, m, m + nv); // offsets of u, v and q in a row
         let Q = knot.Q.as_mut_slice();
         let both = [left.as_slice(), right.as_slice()];
         if inverse {
@@ -164,7 +166,7 @@ impl Vectorized for Write<'_> {
     }
 }
 
-/// y += a x on the entries of x.
+/// Computes y += a x for the entries of x.
 #[inline(always)]
 fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     for (y, x) in y.iter_mut().zip(x) {
@@ -172,8 +174,8 @@ fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     }
 }
 
-/// C = Σ left rightᵀ over the first `length` rows of both, for some rows and columns of C that stand from two places on
-/// in the rows of `left` and `right`. The sums are the same on both sides of the diagonal.
+/// Computes C = Σ left rightᵀ over the first `length` rows of `left` and `right`. The rows and columns of C begin at
+/// two given offsets in these rows. Sums on both sides of the diagonal are equal.
 fn outer(
     C: &mut [f64],
     ldc: usize,

@@ -1,9 +1,9 @@
-//! Targets of residuals: the values that they are compared with, to read them and to change them in place.
+//! Targets of residuals: the reference values, which can be read and changed in place.
 
 use super::residual::Residual;
 use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
 
-/// Target of a [`Residual`]: the value with which it compares the robot's.
+/// Target of a [`Residual`]: the value with which the residual compares the value of the robot.
 ///
 /// ```
 /// use condyle_dynamics::Vec3;
@@ -62,7 +62,7 @@ impl<'a, const N: usize> From<&'a [f64; N]> for Target<'a> {
 }
 
 impl Target<'_> {
-    /// Returns the kind, as messages call it.
+    /// Returns the name of the kind of target, for error messages.
     fn kind(&self) -> String {
         match self {
             Self::Numbers(numbers) => format!("{} numbers", numbers.len()),
@@ -75,7 +75,7 @@ impl Target<'_> {
     }
 }
 
-/// Refuses numbers called `name` that are not finite.
+/// Returns an error if one of the numbers called `name` is not finite.
 fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     match numbers.iter().position(|x| !x.is_finite()) {
         None => Ok(()),
@@ -84,7 +84,7 @@ fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     }
 }
 
-/// Refuses a matrix called `name` that is no rotation.
+/// Returns an error if the matrix called `name` is not a rotation.
 pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
     match R.is_rotation() {
         true => Ok(()),
@@ -93,7 +93,7 @@ pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
 }
 
 impl Residual {
-    /// Returns its target; `None` for a residual that should simply be small, and for a function of one's own.
+    /// Returns the target; `None` for a residual without a target and for a user-defined function.
     pub fn target(&self) -> Option<Target<'_>> {
         Some(match self {
             Self::State { reference }
@@ -109,7 +109,7 @@ impl Residual {
         })
     }
 
-    /// Refuses a target that is no value of what it is compared with, for a robot with nu controls.
+    /// Returns an error if the target does not fit this residual and a robot with nu controls.
     pub(crate) fn check_target(&self, model: &Model, nu: usize, target: Target<'_>) -> Result<(), String> {
         let (nq, nv) = (model.nq(), model.nv());
         match (self, target) {
@@ -144,7 +144,7 @@ impl Residual {
         }
     }
 
-    /// Writes a target that was checked in place of its own.
+    /// Replaces the target of this residual by a target that has been checked.
     pub(crate) fn write_target(&mut self, to: Target<'_>) {
         match (self, to) {
             (
@@ -164,7 +164,7 @@ impl Residual {
     }
 }
 
-/// Refuses a reference of another length than expected, or one that is not finite.
+/// Returns an error if a reference has a wrong length or a number that is not finite.
 fn check_reference(numbers: &[f64], expected: usize) -> Result<(), String> {
     match numbers.len() == expected {
         true => check_finite("reference", numbers),

@@ -1,4 +1,4 @@
-//! Terms: residuals and what they are worth, costs or limits of a knot.
+//! Terms of a knot: residuals of its costs or limits, and their contributions to the objective.
 
 use super::layout::{KnotLayout, Plan};
 use super::residual::{Part, Residual};
@@ -6,7 +6,7 @@ use super::view::ResidualView;
 use crate::lq::LqKnot;
 use crate::robot::knot_data::Sensitivities;
 
-/// Residual that is worth something.
+/// Residual that contributes to the objective: a cost or a limit.
 pub(crate) trait Term {
     fn residual(&self) -> &Residual;
 
@@ -16,21 +16,21 @@ pub(crate) trait Term {
     }
 }
 
-/// Function of the residuals of terms: a cost, or a term of the augmented Lagrangian.
+/// Function of a term's residual: a cost, or a term of the augmented Lagrangian.
 pub(crate) trait Objective<T> {
-    /// Returns the worth of a term.
+    /// Returns the value of the function for a term with the residual r.
     fn value(&self, term: &T, plan: &Plan, r: &[f64]) -> f64;
 
-    /// Writes its gradient and the diagonal of its Hessian by r.
+    /// Computes the gradient and the diagonal of the Hessian of the function with respect to r, into `d` and `dd`.
     fn slopes(&mut self, term: &T, plan: &Plan, r: &[f64], d: &mut [f64], dd: &mut [f64]);
 }
 
-/// Terms of one kind of a knot, as they are computed.
+/// Terms of a knot, either costs or limits, with the plans of their residuals.
 #[derive(Clone, Debug)]
 pub(crate) struct Terms<T> {
     all: Vec<T>,
     plans: Vec<Plan>,
-    /// Terms that read kinematics.
+    /// Indices of the terms that read only kinematics.
     kinematic: Vec<usize>,
     layout: KnotLayout,
 }
@@ -53,7 +53,7 @@ impl<T: Term> Terms<T> {
         self.plans.push(plan);
     }
 
-    /// Puts a term with the plan of its residual in the place of term k; returns whether it takes the same memory.
+    /// Replaces term k by a term with the plan of its residual. Returns whether both terms take the same memory.
     pub(crate) fn replace(&mut self, k: usize, term: T, plan: Plan) -> bool {
         let (old, before) = (&mut self.all[k], &mut self.plans[k]);
         let same = KnotLayout::of(term.residual(), &plan) == KnotLayout::of(old.residual(), before);
@@ -68,12 +68,12 @@ impl<T: Term> Terms<T> {
         &self.all
     }
 
-    /// Term k, to change its target and what it is worth, and the number of its entries.
+    /// Returns term k, mutably, and the number of entries of its residual.
     pub(crate) fn term_mut(&mut self, k: usize) -> (&mut T, usize) {
         (&mut self.all[k], self.plans[k].n)
     }
 
-    /// Returns all terms, to change what they are worth.
+    /// Returns all terms as a mutable slice, to change their weights.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all
     }
@@ -83,12 +83,12 @@ impl<T: Term> Terms<T> {
         self.plans.last().map_or(0, |plan| plan.first + plan.n)
     }
 
-    /// Returns the terms that have a weight.
+    /// Returns the terms whose weight is not 0.
     fn weighty(&self) -> impl Iterator<Item = (&T, &Plan)> {
         self.all.iter().zip(&self.plans).filter(|(term, _)| term.weight() != 0.0)
     }
 
-    /// Σ of what the terms are worth.
+    /// Returns the sum of the objective over all terms.
     pub(crate) fn value(&self, view: &mut ResidualView<'_>, objective: &impl Objective<T>) -> f64 {
         let mut sum = 0.0;
         for (term, plan) in self.weighty() {
@@ -98,8 +98,8 @@ impl<T: Term> Terms<T> {
         sum
     }
 
-    /// Adds to the gradient and the Hessian of what the terms are worth: first the rows of Jacobians to those that are
-    /// collected in the scratch, then (`diagonal`) what has no rows to q, r, Q, R of the knot.
+    /// Adds the derivatives of all terms. Without `diagonal`, adds the rows of Jacobians to the rows that the scratch
+    /// collects. With `diagonal`, adds the terms that have no rows to q, r, Q and R of the knot.
     pub(crate) fn differentiate(
         &self,
         view: &mut ResidualView<'_>,
@@ -124,12 +124,12 @@ impl<T: Term> Terms<T> {
     }
 }
 
-/// Terms of either kind, for those who compute kinematics.
+/// Terms (costs or limits) as the computation of kinematics sees them.
 pub(crate) trait KinematicTerms {
-    /// Returns the memory that the terms take, and what they read.
+    /// Returns the memory sizes for the terms, and the quantities that they read.
     fn layout(&self) -> KnotLayout;
 
-    /// Returns the i-th kinematic residual, with its weight and its place.
+    /// Returns the kinematic residual with index i, its weight and its plan.
     fn kinematic(&self, i: usize) -> Option<(&Residual, f64, &Plan)>;
 }
 
@@ -154,7 +154,7 @@ impl KnotTerms<'_> {
         self.0[0].layout() + self.0[1].layout()
     }
 
-    /// Returns whether another knot reads the same with its own targets.
+    /// Returns whether the terms of another knot read the same quantities and differ only in their targets.
     pub(crate) fn is_alike(self, other: Self) -> bool {
         let same = |k: usize| core::ptr::addr_eq(self.0[k], other.0[k]);
         let alike = |a: &dyn KinematicTerms, b: &dyn KinematicTerms| {

@@ -1,4 +1,4 @@
-//! Values of residuals, and how their Jacobians come into a knot; costs and limits say what they are worth.
+//! Values of residuals, and how the Jacobians of residuals enter the gradient and Hessian of a knot.
 #![allow(non_snake_case)] // D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
@@ -13,18 +13,18 @@ use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian_groups};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// Scratch of the residuals of a knot.
+/// Workspace of the residuals of a knot.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Residual, its worth's gradient and the diagonal of its worth's Hessian.
+    /// Residual r. `d` is the gradient and `dd` the diagonal of the Hessian of the residual's objective.
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
     /// Rows of all Jacobians.
     pub rows: Rows,
-    /// Jacobian of the difference of configurations, of which the blocks of groups are read. Shape: nv × nv.
+    /// Jacobian of the difference of configurations; only the blocks of groups are read. Shape: nv × nv.
     D: DMatrix<f64>,
-    /// Coordinates of each group of positions that is no vector space.
+    /// Coordinates of each group of positions that is not a vector space.
     groups: Vec<Range<usize>>,
     /// ∂r/∂x and ∂r/∂u of a user-defined residual, row after row.
     own: [Vec<f64>; 2],
@@ -33,7 +33,7 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// Scratch for a robot with nu controls.
+    /// Allocates the workspace for a robot with nu controls.
     pub(crate) fn new(model: &Model, nu: usize, layout: KnotLayout) -> Self {
         let (nv, numbers) = (model.nv(), || vec![0.0; layout.longest]);
         let (rows, D) = (Rows::new(nv, nu, layout.rows), DMatrix::zeros(nv, nv));
@@ -42,7 +42,7 @@ impl Scratch {
         Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model), own, hessians }
     }
 
-    /// Forgets all rows and second derivatives.
+    /// Removes all rows and sets second derivatives to zero.
     pub(crate) fn clear(&mut self) {
         self.rows.clear();
         if let Some(hessians) = &mut self.hessians {
@@ -62,17 +62,17 @@ impl Scratch {
     }
 }
 
-/// r = W x, for W row after row.
+/// Computes r = W x, for a matrix W that is stored row after row.
 fn product(r: &mut [f64], W: &[f64], x: &[f64]) {
     for (r, row) in r.iter_mut().zip(W.chunks_exact(x.len())) {
         *r = row.iter().zip(x).map(|(w, x)| w * x).sum();
     }
 }
 
-/// Residuals of a knot: of its costs, or of its limits.
+/// Residuals of the costs or of the limits of a knot, with all data that they read.
 pub(crate) struct ResidualView<'a> {
     pub model: &'a Model,
-    /// Knot.
+    /// Index of the knot.
     pub t: usize,
     pub state: KnotState<'a>,
     pub kinematics: &'a KinematicData,
@@ -80,7 +80,7 @@ pub(crate) struct ResidualView<'a> {
 }
 
 impl ResidualView<'_> {
-    /// Computes r of a residual, in the scratch.
+    /// Computes the entries r of a residual in the scratch.
     pub(crate) fn compute(&mut self, residual: &Residual, plan: &Plan) {
         let Self { model, t, state: KnotState { x, u, data }, kinematics, scratch } = self;
         let r = &mut scratch.r[..plan.n];
@@ -113,8 +113,8 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes the rows of the Jacobian of a residual that was just computed, with its worth's slopes d and curvatures
-    /// dd; unless the Jacobian is the identity: then see [`add_diagonal`](Self::add_diagonal).
+    /// Appends the rows of the Jacobian of the residual that was just computed, with the derivatives d and dd of its
+    /// objective. If the Jacobian is the identity, [`add_diagonal`](Self::add_diagonal) is used instead.
     pub(crate) fn push_rows(&mut self, residual: &Residual, plan: &Plan, sensitivities: &dyn Sensitivities) {
         let (s, nv) = (&mut *self.scratch, self.model.nv());
         let worth = s.d.iter().zip(&s.dd).map(|(d, dd)| [*d, *dd]);
@@ -127,7 +127,7 @@ impl ResidualView<'_> {
             }
             return;
         }
-        let active = |worth: &[f64; 2]| *worth != [0.0, 0.0]; // not so a cone's row inside
+        let active = |worth: &[f64; 2]| *worth != [0.0, 0.0]; // false for a row of a cone inside its bounds
         if residual.is_kinematic() {
             let rows = self.kinematics.rows(nv, residual, plan).zip(worth);
             for (row, worth) in rows.filter(|(_, worth)| active(worth)) {
@@ -144,7 +144,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes the rows of a user-defined residual of n numbers.
+    /// Appends the rows of the Jacobian of a user-defined residual with n entries.
     fn push_own_rows(&mut self, own: &OwnResidual, n: usize, sensitivities: &dyn Sensitivities) {
         let Scratch { rows, d, dd, own: [by_x, by_u], hessians, .. } = &mut *self.scratch;
         let (KnotState { x, u, .. }, nv) = (self.state, self.model.nv());
@@ -184,7 +184,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Pushes row i of ∂r/∂(u, v, q) of a residual that reads outputs of the dynamics.
+    /// Appends row i of ∂r/∂(u, v, q) of a residual that reads outputs of the dynamics.
     fn push_row(&mut self, residual: &Residual, plan: &Plan, i: usize, sensitivities: &dyn Sensitivities) {
         let (Scratch { rows, d, dd, .. }, data) = (&mut *self.scratch, &self.state.data.residuals);
         let (g, nv) = (&mut rows.push([d[i], dd[i]]), self.model.nv());
@@ -223,7 +223,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Adds gradient and Hessian of a state's or a control's residual that was just computed.
+    /// Adds the gradient and Hessian of the residual of the state or the controls that was just computed.
     pub(crate) fn add_diagonal(&mut self, residual: &Residual, knot: &mut LqKnot) {
         match residual {
             Residual::State { .. } => self.add_state(knot),
@@ -231,7 +231,7 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Adds gradient and Hessian of a state's term: ∂r/∂x is the identity, except the groups' blocks of q.
+    /// Adds the gradient and Hessian of a residual of the state: ∂r/∂x is the identity, except in the blocks of groups.
     fn add_state(&mut self, knot: &mut LqKnot) {
         let Self { model, scratch: s, .. } = self;
         let nv = model.nv();
@@ -246,7 +246,7 @@ impl ResidualView<'_> {
         difference_jacobian_groups(model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
         for group in &s.groups {
             let (start, size) = (group.start, group.len());
-            let mut D = [[0.0; LARGEST_BLOCK]; LARGEST_BLOCK]; // row by row, with zeros
+            let mut D = [[0.0; LARGEST_BLOCK]; LARGEST_BLOCK]; // row by row, padded with zeros
             for i in 0..size {
                 for a in 0..size {
                     D[i][a] = s.D[(start + i, start + a)];
