@@ -192,8 +192,8 @@ impl Groups<'_> {
         });
     }
 
-    /// Writes the deferred gains of a group, if the group has been swept and no other thread writes them; returns
-    /// whether.
+    /// Writes the deferred gains of a group, and returns true, if the group has been swept and no other thread writes
+    /// its gains.
     fn finish(self, group: usize, gains: &mut Gains) -> bool {
         self.parts.work(group, FINISH, |_, lq_knots, found| gains.finish(lq_knots, found))
     }

@@ -113,7 +113,7 @@ impl Trials {
                 let (x_nominal, u_nominal) = (&nominal.xs[shape.x(t)], &nominal.us[shape.u(t)]);
                 u.copy_from_slice(u_nominal);
                 if failed[i] {
-                    x.copy_from_slice(x_nominal); // a valid state is needed, because the group call evaluates the action at it
+                    x.copy_from_slice(x_nominal); // a valid state, at which the group call evaluates the action
                     continue;
                 }
                 let action = view.action(t);

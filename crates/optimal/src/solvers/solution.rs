@@ -140,7 +140,7 @@ impl Timings {
 /// Result of a solve. Reading a solution from a file checks that the lengths of its fields fit one horizon.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(remote = "Self"))] // serde reads the fields; the implementations below also check them
+#[cfg_attr(feature = "serde", serde(remote = "Self"))] // serde reads the fields; the implementations below check them
 pub struct Solution {
     /// States x₀ … x_N, flat: (N + 1)·nx.
     pub xs: Vec<f64>,

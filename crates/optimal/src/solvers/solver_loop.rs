@@ -113,7 +113,7 @@ impl SolverLoop {
         settings.check()?;
         solution.shape().check(problem.shape())?;
         if self.knots[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.knots) {
-            self.sweep = Sweep::new(&self.knots); // `new` was given a problem with other dimensions or constraints
+            self.sweep = Sweep::new(&self.knots); // `new` was given a problem without equations of inverse dynamics
         }
         self.bounded = problem.check_bounds()?;
         self.inverse_dynamics = settings.inverse_dynamics_form && !self.bounded && !settings.second_order;
