@@ -118,8 +118,8 @@ impl BoxQp {
         Ok(())
     }
 
-    /// Takes the longest accepted step length, if one exists. The rule of the paper accepts if `careful`, else
-    /// Crocoddyl's.
+    /// Takes the longest accepted step length, if one exists. `careful` selects the rule by which steps are accepted:
+    /// the rule of the paper, or else Crocoddyl's.
     fn line_search(&mut self, H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64], careful: bool) {
         let m = q.len();
         if !careful {

@@ -1,5 +1,5 @@
-//! Conditional value functions: the lowest cost of a segment of a horizon, as a function of the state at the start of
-//! the segment and of a multiplier for the state after its end.
+//! Conditional value functions: the lowest cost of a segment of a horizon. They are functions of the state at the start
+//! of the segment, and of a multiplier for the state after its end.
 //!
 //! Let x be the state at the first knot of a segment and z the state after its last knot. The lowest cost of the
 //! segment plus λᵀz, with a multiplier λ as a parameter, is quadratic in x and λ:

@@ -27,9 +27,9 @@ use super::step::{Step, SweepError, SweepOptions};
 use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
-/// Largest accepted difference between the value function from which a segment was swept and the one that the sweep of
-/// the next segment computed, relative to the largest entry. Chosen as the accuracy of a sweep; for robots the
-/// differences are a thousandth of it.
+/// Largest accepted difference of two value functions at a cut: the one from which a segment was swept, and the one
+/// that the sweep of the next segment computed. The difference is relative to the largest entry. Chosen as the accuracy
+/// of a sweep; for robots the differences are a thousandth of it.
 const CONSISTENT: f64 = 1e-9;
 
 /// Segments of a horizon.

@@ -119,8 +119,8 @@ pub trait KnotGroup {
     /// order.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>);
 
-    /// Returns the number of accelerations and forces of a knot, at which its equations of inverse dynamics are taken,
-    /// and the maximum numbers of dependent coordinates and of rows of costs. `None` without such equations.
+    /// Returns the number of accelerations and forces at which the equations of inverse dynamics of a knot are taken.
+    /// Also returns the maximum numbers of dependent coordinates and of rows of costs. `None` without such equations.
     fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         None
     }

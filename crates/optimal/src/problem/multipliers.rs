@@ -148,8 +148,8 @@ impl Multipliers {
         self.y[knot.clone()].copy_from_slice(&self.next[knot]);
     }
 
-    /// Returns the violations g − Π g of the first `count` constraints, their next multipliers, and the term of the
-    /// cost, all at the last derivatives of knot t.
+    /// Returns three results of the last derivatives of knot t. They are the violations g − Π g and the next
+    /// multipliers of the first `count` constraints, and the term of the cost.
     pub(crate) fn measured(&self, t: usize, count: usize) -> (&[f64], &[f64], f64) {
         let first = t * self.size;
         (&self.excess[first..][..count], &self.next[first..][..count], self.terms[t])

@@ -108,8 +108,8 @@ impl Fddp {
     /// [`shift`](Self::shift), for the next horizon.
     ///
     /// A lost trajectory is replaced by x̂₀ held still at all knots, if that costs less. A trajectory is lost if it is
-    /// not finite, or if 1 + its cost exceeds ten times 1 + the cost of the last solution. If the last solve ran out of
-    /// time or iterations with a rejected step, the regularisation starts at its last value.
+    /// not finite, or if its cost exceeds the cost c of the last solution by more than 10 (1 + |c|). If the last solve
+    /// ran out of time or iterations with a rejected step, the regularisation starts at its last value.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).

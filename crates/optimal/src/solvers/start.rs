@@ -8,8 +8,8 @@ use crate::error::Error;
 use crate::lq::{LqKnot, Sweep};
 use crate::problem::Problem;
 
-/// Limit of the ratio between 1 + the cost of a start and 1 + the cost of the last solution. A push of the state or a
-/// new reference rarely raises the cost more. A horizon whose end diverges exceeds the limit within a few shifts
+/// Maximum excess of the cost of a start over the cost c of the last solution, relative to 1 + |c|. A push of the state
+/// or a new reference rarely raises the cost more. A horizon whose end diverges exceeds the limit within a few shifts
 /// (measured: 0.3, 1e3, 2e4, 3e7).
 const LOST: f64 = 10.0;
 

@@ -98,7 +98,8 @@ impl Controls {
     }
 }
 
-/// Moves the rows and columns of the `free` ones of m controls to the front of H, before the n states.
+/// Moves the rows and columns of the free controls, whose indices among m are `free`, to the front of H. The states
+/// follow.
 fn keep_free(H: &mut [f64], stride: usize, m: usize, n: usize, free: &[usize]) {
     let (kept, rows) = (free.len(), m + n + 1);
     for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {
