@@ -30,7 +30,9 @@ def cartpole(x, u, dt=0.03):
 
 
 def solve(step, nu, x0, horizon, cost, end, constraints, end_constraints, guess):
-    """Solves a problem by multiple shooting; constraints(x, u) and end_constraints(x) return lists of (lower, g, upper)."""
+    """Solves a problem by multiple shooting.
+
+    constraints(x, u) and end_constraints(x) return lists of (lower, g, upper)."""
     opti = casadi.Opti()
     xs, us = opti.variable(len(x0), horizon + 1), opti.variable(nu, horizon)
     total = end(xs[:, horizon])
