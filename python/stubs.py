@@ -121,7 +121,8 @@ ARGUMENTS = {
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
     "list[tuple[int, Residual]]": " ".join(
-        f"{kind}Dynamics._from_parts.written" for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")
+        f"{kind}Dynamics._from_parts.written"
+        for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")
     ),
     "list[int]": "_lend.shape _lend.strides",
     "bytes": "_model_from_bytes.data",

@@ -2813,7 +2813,8 @@ class AugmentedLagrangian:
 class ConstrainedAction:
     """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
 
-    `Fddp` alone treats the constraint as a cost for leaving the bounds. For residuals of a robot, `Limit` is faster.
+    `Fddp` alone treats the constraint as a cost of values outside the bounds. For residuals of a robot, `Limit` is
+    faster.
 
     action: the action.
     size: the number of entries of g, at most 4096.
@@ -3225,7 +3226,7 @@ class ImpulseDynamics:
 class Limit:
     """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
 
-    Limits apply at the beginning of a knot. `Fddp` alone treats them as costs for leaving the bounds.
+    Limits apply at the beginning of a knot. `Fddp` alone treats them as costs of values outside the bounds.
 
     name: used in errors.
     residual: a `Residual`.
@@ -3317,7 +3318,7 @@ class Problem:
         """
 
     def evaluate(self, xs: ArrayLike, us: _Controls) -> Evaluation:
-        """Computes the cost of states and controls and the results of the dynamics there, as an `Evaluation`.
+        """Computes the cost of given states and controls, and the results of the dynamics for them, as an `Evaluation`.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
@@ -3359,8 +3360,8 @@ class Problem:
         """
 
     def set_duration(self, knot: int, dt: float) -> None:
-        """Sets the duration of a knot, whose model keeps its duration at all other knots. Call it between solves. The
-        solver's next iterations do not allocate.
+        """Sets the duration of a single knot; the knot's model keeps its duration at all other knots. Call this method
+        between solves. The solver's next iterations do not allocate.
 
         knot: its index, 0 to N − 1.
         dt: the duration (s).
@@ -3369,12 +3370,12 @@ class Problem:
         """
 
     def set_knot(self, knot: int, model: _Action) -> None:
-        """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between
-        solves. The solver's next iterations do not allocate.
+        """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
+        between solves. The solver's next iterations do not allocate.
 
         knot: its index, 0 to N − 1.
-        model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
-            indices of this problem.
+        model: the new model, with as many states and controls as the old one. Costs that the model has for single
+            knots belong to the knots of this problem with the same index.
 
         Raises `ProblemError` if the model does not fit.
         """
@@ -3453,8 +3454,8 @@ class Residual:
 
     @staticmethod
     def control_gravity() -> Residual:
-        """Returns the difference between the actual efforts and forces and those that hold the robot still, r = τ − g(q) +
-        Jᵀλ, nv numbers.
+        """Returns r = τ − g(q) + Jᵀλ, nv numbers: the excess of the actual efforts and forces over the efforts and forces
+        that hold the robot still.
         """
 
     @staticmethod

@@ -162,8 +162,7 @@ def computeRNEADerivatives(
 def computeABADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
-    """Computes ∂q̈/∂q, ∂q̈/∂v and M⁻¹, also stored as data.ddq_dq, data.ddq_dv and data.Minv; q̈ is stored as data.ddq.
-    """
+    """Computes ∂q̈/∂q, ∂q̈/∂v and M⁻¹, also stored as data.ddq_dq, data.ddq_dv and data.Minv; q̈ is stored as data.ddq."""
     given = None if fext is None else _forces(fext)
     try:
         d = ours.aba_derivatives(model.ours, data._ours, q, v, tau, given)
@@ -219,8 +218,7 @@ def computeJointJacobian(model: Model, data: Data, q: ArrayLike, joint: int) -> 
 
 
 def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes the centroidal momentum matrix Ag, (6, nv), also stored as data.Ag. Also computes data.hg and data.com.
-    """
+    """Computes the centroidal momentum matrix Ag, (6, nv), also stored as data.Ag. Also computes data.hg and data.com."""
     Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
     data.Ag = Ag
     data._leave(com, Force._of(Ag @ np.asarray(v, float)))

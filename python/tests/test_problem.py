@@ -1,5 +1,4 @@
-"""Tests of problems and solvers: an action for each knot, evaluation, callbacks, progress output, pickles of results.
-"""
+"""Tests of problems and solvers: an action for each knot, evaluation, callbacks, progress output, pickles of results."""
 
 import pickle
 import sys
@@ -21,9 +20,9 @@ from condyle.optimal import (
     DifferentialAction,
     Fddp,
     FreeDynamics,
+    FreeInverseDynamics,
     FrictionCone,
     ImpulseDynamics,
-    FreeInverseDynamics,
     Iteration,
     Limit,
     LqKnot,

@@ -1,5 +1,4 @@
-"""Tests of pictures: the pattern of zeros of the tree, plots, shapes, and the contents of the page that shows a motion.
-"""
+"""Tests of pictures: the pattern of zeros of the tree, plots, shapes, and the contents of the page that shows a motion."""
 
 import subprocess
 import sys

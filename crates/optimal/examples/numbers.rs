@@ -1,5 +1,5 @@
 //! Prints results of dynamics and of optimal control, one line each, and the duration of an iteration of FDDP. The
-//! output compares processors and SIMD levels.
+//! output serves to compare processors and SIMD levels.
 //!
 //! ```text
 //! CONDYLE_LEVEL=baseline cargo run --release -p condyle-optimal --example numbers
@@ -18,7 +18,8 @@ use std::sync::Arc;
 
 /// Feet of the quadruped.
 const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
-/// Number of solves, of which the fastest is timed; a browser needs many, because it recompiles code that runs often.
+/// Number of solves, of which the fastest is timed. A browser needs many solves, because it recompiles code that runs
+/// often.
 const SOLVES: usize = if cfg!(debug_assertions) { 1 } else { 300 };
 
 fn main() {
@@ -40,11 +41,11 @@ mod page {
 
     #[link(wasm_import_module = "page")]
     unsafe extern "C" {
-        /// Returns whether vectors are used.
+        /// Returns whether vector instructions are used.
         safe fn vectors() -> bool;
-        /// Returns the time (ms).
+        /// Returns the current time (ms).
         safe fn now() -> f64;
-        /// Receives a piece of text.
+        /// Receives a piece of the output, as UTF-8 text of `length` bytes.
         safe fn take(text: *const u8, length: usize);
     }
 
@@ -77,14 +78,14 @@ fn numbers(seed: usize, n: usize) -> Vec<f64> {
     (0..n).map(|k| ((seed * 131 + k * 29 + 17) % 101) as f64 / 50.0 - 1.0).collect()
 }
 
-/// Returns a position away from the neutral one.
+/// Returns a position of the robot away from its neutral position.
 fn position(model: &Model, seed: usize) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &q.clone(), &numbers(seed, model.nv()), &mut q);
     q
 }
 
-/// Prints the results of single calls.
+/// Prints the results of single calls of the dynamics.
 fn calls(model: &Model, text: &mut String) -> std::fmt::Result {
     let (name, nv, mut data) = (model.name(), model.nv(), Data::new(model));
     for seed in 0..4 {
@@ -104,7 +105,7 @@ fn calls(model: &Model, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// Prints the results of a batch of states, one more than fills the lanes.
+/// Prints the results of a batch of states, one state more than fills the vector lanes.
 fn batch(model: &Model, text: &mut String) -> std::fmt::Result {
     const STATES: usize = 9;
     let all = |of: &dyn Fn(usize) -> Vec<f64>| (0..STATES).flat_map(of).collect::<Vec<f64>>();

@@ -22,7 +22,7 @@ fn a_sweep_allocates_nothing() {
     assert_eq!(allocations(|| sweep.run(&lq_knots, 1e-9).unwrap()), 0);
 }
 
-/// Runs on one thread, because rayon itself allocates to share work.
+/// The test runs on one thread, because rayon itself allocates when threads share work.
 #[test]
 fn a_sweep_in_segments_allocates_nothing() {
     let mut random = random();
@@ -195,7 +195,7 @@ fn a_gait_allocates_nothing() {
     });
     assert_eq!(second, 0);
     assert!(solver.solution().trace.iter().any(|i| i.accepted));
-    // with copies for three threads, after the copies exist
+    // with three threads, nothing is allocated after the copies for these threads exist
     solver.settings.threads = 3;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let count = pool.install(|| {
@@ -243,7 +243,7 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
     }
 }
 
-/// At first the feet stand. Then their forces exceed the limits, and rows become active that were inactive before.
+/// At first the feet stand. Then their forces exceed the limits, and limits become active that were inactive before.
 #[test]
 fn active_rows_allocate_nothing() {
     let model = std::sync::Arc::new(robots::quadruped());
@@ -293,7 +293,7 @@ impl GenericResidual for Height {
     }
 }
 
-/// User-defined residuals use existing memory, and a target is changed without allocation.
+/// User-defined residuals allocate nothing, and neither does a change of their target.
 #[test]
 fn own_residuals_and_changed_targets_allocate_nothing() {
     let arm = std::sync::Arc::new(robots::arm7());

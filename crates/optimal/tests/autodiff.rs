@@ -14,9 +14,9 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance between two exact methods, through a factorisation of M.
+/// Tolerance between two exact methods, both of which factorise M.
 const EXACT: f64 = 1e-9;
-/// Tolerance of central differences of first and second order, for functions of order one to a hundred.
+/// Tolerance of central differences, first and second ones, for functions with values of one to a hundred.
 const DIFFERENCES: f64 = 1e-4;
 const DT: f64 = 0.05;
 
@@ -75,7 +75,7 @@ fn close(what: &str, a: &DMatrix<f64>, b: &DMatrix<f64>, tolerance: f64) {
     assert!(error < tolerance, "{what} is off by {error:e}");
 }
 
-/// Returns a random state near neutral.
+/// Returns a random state near the neutral state.
 fn state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
@@ -175,8 +175,8 @@ impl GenericConstraint for OnCircle {
     }
 }
 
-/// ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ), along the circle. The matrices are
-/// overwritten.
+/// The derivatives are ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ), along the circle. Old
+/// entries of the matrices are overwritten.
 #[test]
 fn constraints_of_any_scalar_are_differentiated_along_the_manifold() {
     let (x, u) = ([0.8, 0.6], [3.0]);

@@ -6,8 +6,8 @@ use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle_optimal::{AugmentedLagrangian, Fddp, Problem, Status, Sweep};
 use std::sync::Arc;
 
-/// Creates the problem of an arm that reaches for a point in 50 knots. Only a tiny weight on its efforts and distant
-/// bounds limit the efforts.
+/// Creates the problem of an arm that reaches for a point in 50 knots. The efforts are limited only by a tiny weight
+/// and by distant bounds.
 fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Problem, Vec<f64>) {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
@@ -23,8 +23,9 @@ fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Prob
     (problem, x0.repeat(51))
 }
 
-/// Returns time steps, weights of efforts and weights of the point. Which of them diverge depends on the last digit of
-/// sums, and so on the processor's vectors. There are enough cases for some to diverge on each processor.
+/// Returns time steps, weights of efforts and weights of the point. Which of these problems diverge depends on the last
+/// digit of sums, and thus on the processor's vector instructions. There are enough problems for some to diverge on
+/// each processor.
 fn reckless() -> impl Iterator<Item = (f64, f64, f64)> {
     const EFFORTS: [f64; 7] = [1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2];
     let weights = |dt| EFFORTS.into_iter().flat_map(move |effort| [1e2, 1e3, 1e4].map(|point| (dt, effort, point)));
@@ -34,8 +35,9 @@ fn reckless() -> impl Iterator<Item = (f64, f64, f64)> {
 /// Number of diverging solves that are checked.
 const ENOUGH: usize = 4;
 
-/// Crocoddyl's rules may accept a step to an iterate that costs 1e16 times as much, where nothing can be computed. The
-/// trace records this step. The solution is the iterate before it, and the next solve begins there.
+/// Crocoddyl's rules may accept a step to an iterate that costs 1e16 times as much, at which no direction can be
+/// computed. The trace records this step. The solution is the iterate before this step, and the next solve begins
+/// there.
 #[test]
 fn a_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
@@ -58,12 +60,13 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
             continue;
         };
         if trace[before - 1].cost > 1e5 {
-            continue; // it diverges in several steps
+            continue; // skipped, because it diverges in several steps
         }
         blown_up += 1;
         let last = trace.last().unwrap();
         assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
-        // the iterate before the divergence: its cost and its gap are in consecutive records of the trace
+        // the solution is the iterate before the divergence: its cost and its gap are in consecutive records of the
+        // trace
         assert!(solution.cost < 1e5, "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
         let (mut lq_knots, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
@@ -71,7 +74,7 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         assert!((numbers.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
         assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
         assert!(solution.k.iter().any(|k| k.amax() > 0.0));
-        // a resumed solve begins there and does not end worse
+        // a resumed solve begins at the solution and does not end worse
         assert!(next.gap <= solution.gap && next.cost.is_finite(), "{} {}", next.gap, next.cost);
         assert!(next.trace.first().is_some_and(|first| first.gap == solution.gap));
         let (other, again, _) = run(2);
@@ -81,8 +84,8 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
     assert_eq!(blown_up, ENOUGH);
 }
 
-/// The same with bounds on the controls, where steps are quadratic programs. The solve accepts an iterate that costs
-/// more than a hundred times as much. No direction can be found there, so the solve restores an earlier iterate.
+/// With bounds on the controls, where steps are quadratic programs, the solve also accepts an iterate that costs more
+/// than a hundred times as much. No direction can be found there, so the solve restores an earlier iterate.
 #[test]
 fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
@@ -100,7 +103,7 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
         blown_up += 1;
         assert!(last.accepted, "{last:?}");
         let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
-        // after a failure at its first step it restores the guess, whose gap is not yet closed
+        // after a failure at its first step, the solve restores the warm start, whose gap is not yet closed
         let is_guess = solution.xs == xs;
         assert!(solution.cost < last.cost && (solution.gap < most || is_guess), "{} {}", solution.cost, solution.gap);
         assert!(solution.us.iter().all(|u| u.abs() <= 1e6));

@@ -12,8 +12,8 @@ use condyle_optimal::{
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-/// Tolerances: both solvers stop at residuals of 1e-7 or less. The cost is flat there; states and controls follow the
-/// residuals.
+/// Tolerances of comparisons with IPOPT. Both solvers stop at residuals of 1e-7 or less. Near an optimum, costs change
+/// less than the residuals; states and controls change as much.
 const COST: f64 = 1e-6;
 const TRAJECTORY: f64 = 1e-4;
 
@@ -72,7 +72,7 @@ fn reference(name: &str) -> Value {
     data[name].clone()
 }
 
-/// Solves and compares with IPOPT.
+/// Solves a problem, and compares the solution with IPOPT's.
 fn compare(reference: &Value, running: Constrained, terminal: Constrained) {
     let (x0, horizon) = (numbers(&reference["x0"]), reference["horizon"].as_u64().unwrap() as usize);
     let mut problem = Problem::new(x0.clone(), vec![Box::new(running)], vec![0; horizon], Box::new(terminal)).unwrap();
@@ -194,7 +194,7 @@ fn equalities_of_a_linear_problem_are_a_linear_system() {
     }
 }
 
-/// The derivatives of the augmented Lagrangian's terms are correct, on either side of a constraint's bounds.
+/// The derivatives of the augmented Lagrangian's terms are correct, both within and outside a constraint's bounds.
 #[test]
 fn derivatives_are_those_of_the_terms() {
     let rows = || {
@@ -278,7 +278,8 @@ fn what_cannot_be_met_is_said() {
     assert_eq!(error, "knot 10: constraint 0 must be at least 2 and at most 1");
 }
 
-/// An inner solve that stops early, at the largest penalty, proves nothing and keeps its status.
+/// An inner solve that stops early at the largest penalty does not prove that constraints are violated, so it keeps its
+/// status.
 #[test]
 fn a_solve_that_stops_early_claims_nothing() {
     let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -1.0, 1.0)]);
@@ -296,8 +297,8 @@ fn a_solve_that_stops_early_claims_nothing() {
     assert!(!matches!(status, Status::Infeasible | Status::ConstraintsViolated), "{status:?}");
 }
 
-/// At a knot without controls, a violated constraint on the initial state proves infeasibility. With controls, a user's
-/// constraint might depend on them.
+/// At a knot without controls, a violated constraint on the initial state proves infeasibility. At a knot with controls
+/// it does not, because a user-defined constraint may depend on the controls.
 #[test]
 fn what_is_infeasible_is_proved() {
     let solve = |nu: usize| {
@@ -318,7 +319,7 @@ fn what_is_infeasible_is_proved() {
     let worst = outcome.worst.unwrap();
     assert_eq!((worst.knot, worst.row, worst.amount), (0, 0, 0.25));
     assert_eq!(worst.to_string(), "knot 0: constraint 0 is 2.500e-1 beyond its bound");
-    // the other constraint holds, and the penalty has not risen in vain
+    // the other constraint holds, and the penalty stays below 1e8
     assert!((solution.x(10)[0] - 0.5).abs() < 1e-6 && outcome.penalty < 1e8, "{}", outcome.penalty);
     let (solution, outcome) = solve(2);
     assert!(!matches!(solution.status, Status::Infeasible | Status::Converged), "{:?}", solution.status);

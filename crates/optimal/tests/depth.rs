@@ -1,4 +1,4 @@
-//! Number of calls between a solve and the dynamics that it evaluates.
+//! Depth of the call stack between a solve and the dynamics that it evaluates.
 #![allow(non_snake_case)]
 
 use condyle_optimal::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};
@@ -7,13 +7,13 @@ use nalgebra::DMatrix;
 use std::backtrace::Backtrace;
 use std::sync::Mutex;
 
-/// Maximum number of calls, so that a reader can follow them.
+/// Maximum number of nested calls, so that a reader can follow them.
 const MOST: usize = 10;
 
-/// Calls that led to the last evaluation.
+/// Names of the nested calls that led to the last evaluation.
 static CALLS: Mutex<String> = Mutex::new(String::new());
 
-/// Accelerations q̈ = u, with a cost.
+/// Dynamics with the accelerations q̈ = u, and a cost.
 struct Probe {
     controls: usize,
     zero: DMatrix<f64>,

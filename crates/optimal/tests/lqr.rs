@@ -1,4 +1,4 @@
-//! Linear-quadratic problems: the sweep solves them exactly, and FDDP in one iteration.
+//! Linear-quadratic problems: the sweep solves them exactly, and FDDP solves them in one iteration.
 #![allow(non_snake_case)]
 
 mod common;
@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector};
 /// Tolerance of random problems with entries of size one, whose value functions grow to about 1e3 over the horizon.
 const RESIDUAL: f64 = 1e-9;
 
-/// Tolerance of a sum of some dozen products in another order.
+/// Tolerance of a sum of a few dozen products, added in another order.
 const ROUNDING: f64 = 1e-13;
 
 /// Tolerance of second differences: with steps of 1e-4 they are accurate to about 1e-7.
@@ -32,7 +32,7 @@ fn kkt_residual_vanishes() {
         sweep.run(&lq_knots, 0.0).unwrap();
         let (horizon, feedback) = (nus.len(), sweep.feedback());
 
-        // δu = k + K δx,   δx⁺ = A δx + B δu + f,   λ = Vxx δx + Vx
+        // states, controls and multipliers: δu = k + K δx,   δx⁺ = A δx + B δu + f,   λ = Vxx δx + Vx
         let x0: DVector<f64> = random_matrix(&mut random, ndx, 1).column(0).into_owned();
         let (mut xs, mut us) = (vec![x0], vec![]);
         for (knot, feedback) in lq_knots.iter().zip(feedback).take(horizon) {
@@ -44,7 +44,7 @@ fn kkt_residual_vanishes() {
         for t in 0..horizon {
             let (knot, x, u, next) = (&lq_knots[t], &xs[t], &us[t], multiplier(t + 1));
             let scale = 1.0 + next.amax();
-            // Q δx + S δu + q + Aᵀλ⁺ = λ,   Sᵀδx + R δu + r + Bᵀλ⁺ = 0
+            // conditions: Q δx + S δu + q + Aᵀλ⁺ = λ,   Sᵀδx + R δu + r + Bᵀλ⁺ = 0
             let state = &knot.Q * x + &knot.S * u + &knot.q + knot.A.transpose() * &next - multiplier(t);
             let control = knot.S.transpose() * x + &knot.R * u + &knot.r + knot.B.transpose() * &next;
             assert!(state.amax() < RESIDUAL * scale, "ndx {ndx}, knot {t}: {:e}", state.amax());
@@ -82,7 +82,7 @@ fn regularised_step_is_the_textbook_one() {
     }
 }
 
-/// With or without known structure of A and B, a sweep gives the same result, at knots of all sizes.
+/// A sweep gives the same result whether the structure of A and B is known or not, at knots of all sizes.
 #[test]
 fn the_form_of_euler_steps_changes_nothing() {
     let mut random = random();
@@ -146,7 +146,7 @@ fn sweep_names_the_knot_that_is_not_convex() {
     assert_eq!(sweep.run(&lq_knots, 1e5), Err(SweepError::NotFinite { knot: 3 }));
 }
 
-/// A sweep and a solver name the knot that has constraint rows, instead of ignoring them.
+/// For a knot with constraint rows, a sweep and a solver return an error that names the knot.
 #[test]
 fn constraint_rows_are_refused() {
     let mut random = random();
@@ -188,7 +188,7 @@ impl ActionModel for Limited {
     }
 }
 
-/// Derivatives that are computed again replace the rows.
+/// When derivatives are computed again, their constraint rows replace the old rows.
 #[test]
 fn an_action_writes_constraint_rows() {
     let end = Lqr::new(LqKnot::zeros(1, 0));
@@ -210,7 +210,7 @@ fn a_solver_refuses_constraint_rows() {
     let _ = Fddp::new(&problem).solve(&mut problem, &[0.5; 3], &[0.0; 2]);
 }
 
-/// Zeros around the entries of a row are not stored.
+/// Zeros before and after the entries of a row are not stored.
 #[test]
 fn constraint_rows_are_compact() {
     let mut rows = ConstraintRows::default();
@@ -231,7 +231,7 @@ fn constraint_rows_fit_their_knot() {
     Sweep::new(&knots);
 }
 
-/// One full step solves from any start, with or without gaps; the second iteration only confirms it.
+/// One full step solves the problem from any start, with or without gaps; the second iteration only confirms this.
 #[test]
 fn fddp_solves_an_lqr_in_one_iteration() {
     let mut random = random();
@@ -248,7 +248,7 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     let us = random_matrix(&mut random, problem.control_range(horizon).end, 1);
 
     let mut solver = Fddp::new(&problem);
-    // The regularisation changes the first step by about its own size.
+    // The regularisation changes the first step by about the value of the regularisation.
     solver.settings =
         Settings { tolerance: 1e-6, regularisation_start: 1e-15, regularisation_min: 1e-15, ..Settings::default() };
     let solution = solver.solve(&mut problem, xs.as_slice(), us.as_slice()).unwrap();
@@ -261,7 +261,7 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     assert!(solution.gap < 1e-12 && solution.feasible);
 }
 
-/// Compares the action's derivatives, its cost and next state with sums written out.
+/// Compares the action's derivatives, cost and next state with explicit sums.
 #[test]
 fn an_lqr_is_its_knot() {
     let mut random = random();

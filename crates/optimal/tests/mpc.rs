@@ -14,11 +14,11 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Tolerance of solves of the same problem from different warm starts. They differ by the regularisation, 1e-9 of
-/// entries of size one, which grows along the horizon.
+/// Tolerance of solves of the same problem from different warm starts. They differ by the regularisation, 1e-9 for
+/// entries of size one; this difference grows along the horizon.
 const SAME: f64 = 1e-5;
 
-/// Creates linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin at any of them.
+/// Creates linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin with any of the three models.
 fn linear(knot_models: &[usize], x0: &[f64]) -> Problem {
     let mut random = random();
     let models = [3, 0, 2].map(|nu| {
@@ -100,7 +100,7 @@ fn a_solve_without_time_returns_what_it_has() {
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
     assert_eq!((solution.status, &solution.xs, solution.trace.len()), (Status::TimeLimit, &xs, 0));
 
-    // The observer's time counts too: the second iteration does not begin.
+    // The time that the observer takes also counts: the second iteration does not begin.
     solver.settings.time_budget = Some(Duration::from_millis(200));
     let mut seen = 0;
     let pause = |_: &Iteration| {
@@ -111,7 +111,7 @@ fn a_solve_without_time_returns_what_it_has() {
     assert_eq!((solution.status, seen, solution.trace.len()), (Status::TimeLimit, 1, 1));
     assert_eq!(solution.cost, solution.trace[0].cost);
 
-    // Without any time, the gains come from the previous solve, shifted by one knot.
+    // Without any time, no gains are computed: they come from the previous solve, shifted by one knot.
     problem.shift(0).unwrap();
     solver.shift(&mut problem).unwrap();
     solver.settings.time_budget = Some(Duration::ZERO);
@@ -120,7 +120,7 @@ fn a_solve_without_time_returns_what_it_has() {
         moved.status == Status::TimeLimit && moved.K[..49] == solution.K[1..] && moved.xs[..200] == solution.xs[4..]
     );
 
-    // With enough time, the solve is the same.
+    // With enough time, the solve is the same as without a budget.
     solver.settings.time_budget = Some(Duration::from_secs(100));
     let mut problem = cartpole(&HANGING, 50, 1);
     let limited = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
@@ -152,14 +152,14 @@ fn a_solution_survives_a_file() {
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
     let text = serde_json::to_string(solution).unwrap();
     let read: Solution = serde_json::from_str(&text).unwrap();
-    // serde_json reads a decimal number with an error of at most its last bit.
+    // serde_json reads a decimal number with an error of at most one in its last bit.
     let close =
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs());
     assert!(close(&read.xs, &solution.xs) && close(&read.us, &solution.us) && close(read.x(50), solution.x(50)));
     assert!(read.K.iter().zip(&solution.K).all(|(a, b)| close(a.as_slice(), b.as_slice())));
     assert!(read.status == solution.status && read.trace.len() == solution.trace.len());
     assert!(text.contains("\"status\":\"converged\""));
-    // files of earlier versions lack overrun and projection
+    // files of earlier versions lack the fields `overrun` and `project_warm_start`
     let mut earlier: Value = serde_json::from_str(&text).unwrap();
     assert!(earlier["timings"].as_object_mut().unwrap().remove("overrun").is_some());
     assert_eq!(serde_json::from_value::<Solution>(earlier).unwrap().timings.overrun, Duration::ZERO);
@@ -167,8 +167,8 @@ fn a_solution_survives_a_file() {
     assert!(settings.project_warm_start && settings.max_iterations == 7);
 }
 
-/// The lengths of a solution from a file must fit one horizon. Otherwise it is rejected before anything reads out of
-/// range.
+/// The lengths of the fields of a solution from a file must fit one horizon. Otherwise the solution is rejected before
+/// anything reads out of range.
 #[test]
 fn a_solution_from_a_file_is_checked() {
     let mut problem = cartpole(&HANGING, 4, 1);
@@ -199,8 +199,8 @@ fn a_solution_from_a_file_is_checked() {
     assert!(refused("/shape/ndx", json!(3)).starts_with("knot 0: expected gains of 1 × 3"));
 }
 
-/// Costs and limits that belong to single knots move with the knots, also in copies on other threads. A new last knot
-/// has the model's common costs and limits, until it gets its own.
+/// Costs and limits that belong to single knots move with the knots. The same holds in the copies of other threads. A
+/// new last knot has the model's common costs and limits, until it gets costs and limits for itself.
 #[test]
 fn costs_and_limits_of_a_knot_move_with_it() {
     const HORIZON: usize = 9;
@@ -211,7 +211,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         let effort = Residual::Control { reference: vec![0.0; 7] };
         vec![cost("effort", 1e-3, effort), cost("rest", 1e-1, Residual::State { reference: x0.clone() })]
     };
-    // the cost of the knot with index `time`, counted from the beginning
+    // the costs of a knot; `time` counts the knots from the beginning of the first horizon
     let own = |time: usize| {
         let target = Vec3::new(0.4, 0.01 * time as f64, 0.5);
         let follow = cost("follow", 10.0 + time as f64, Residual::FrameTranslation { frame: "tool".into(), target });
@@ -222,7 +222,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         let effort = Residual::Control { reference: vec![0.0; 7] };
         if time % 3 == 1 { vec![Limit::new("weak", effort, vec![-weak; 7], vec![weak; 7])] } else { vec![] }
     };
-    // knots with and without their own costs and limits
+    // most knots have costs and limits for themselves, the others have the common ones
     let problem = |start: usize| {
         let mut knot = FreeDynamics::running(arm.clone(), 0.05, common()).unwrap();
         for t in 0..HORIZON {
@@ -247,7 +247,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
             problem.calc(&x0.repeat(HORIZON + 1), &us, &mut next, &mut costs);
             costs
         };
-        // the last knot has the common costs and limits
+        // the last knot has the common costs and limits of its model
         let (mut plain, mut fresh) = (problem(start), problem(start));
         let last: &mut FreeDynamics = plain.model_mut(0).unwrap();
         last.set_costs(HORIZON - 1, common()).unwrap();
@@ -260,7 +260,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         }
         last.set_limits(HORIZON - 1, limits(now)).unwrap();
         assert_eq!(costs(&mut moving), costs(&mut fresh), "{start}");
-        // on threads whose copies have moved along, and on one
+        // a solve on threads, whose copies have moved with the horizon, equals a solve on one thread
         let (xs, warm) = (solver.solution().xs.clone(), solver.solution().us.clone());
         let ours = solver.resume(&mut moving).unwrap();
         let mut other = Fddp::new(&fresh);

@@ -1,4 +1,4 @@
-//! A solve reports what is wrong, and its outcome does not depend on how its work is grouped.
+//! A solve reports what is wrong, and its outcome does not depend on how knots and trials are grouped.
 
 #![allow(non_snake_case)] // the names of the literature
 
@@ -15,7 +15,7 @@ use condyle_optimal::{
 use core::ops::ControlFlow;
 use std::time::Duration;
 
-/// Accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
+/// Accuracies of [`NumDiff`] for costs and states of size 100: first and second derivatives.
 const FIRST: f64 = 1e-6;
 const SECOND: f64 = 1e-3;
 
@@ -46,8 +46,8 @@ fn written_derivatives_agree_with_finite_differences() {
     compare_with_numdiff(Circle { nu: 1 }, &[0.6, 0.8], &[0.4]);
 }
 
-/// On a circle, the problem is linear in the angle. One full step solves it, across the gaps of a warm start that winds
-/// around the circle.
+/// On a circle, the problem is linear in the angle. One full step solves it, even from a warm start with gaps that
+/// winds around the circle.
 #[test]
 fn a_state_may_live_on_a_manifold() {
     let circle = |angle: f64| [angle.cos(), angle.sin()];
@@ -283,10 +283,10 @@ fn bounds_that_leave_no_control_are_refused_by_knot_and_number() {
     assert_eq!(error(&[infinite, 0.0], &[infinite, 1.0]), "knot 0: control 0 must be at least inf and at most inf");
     assert_eq!(error(&[0.0], &[1.0, 1.0]), "knot 0: expected lower bounds = 2, found 1");
     assert_eq!(error(&[0.0, 0.0], &[1.0; 3]), "knot 0: expected upper bounds = 2, found 3");
-    assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // a single allowed control is valid
+    assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // equal bounds are valid
 }
 
-/// Infinite bounds change nothing; a bound on one side only is active.
+/// Infinite bounds change nothing; a bound on one side only can be active.
 #[test]
 fn a_bound_may_be_on_one_side() {
     let infinite = f64::INFINITY;
@@ -305,14 +305,14 @@ fn a_bound_may_be_on_one_side() {
     assert_eq!(bounded.status, Status::Converged);
     assert!(bounded.us.iter().all(|u| *u >= 0.8 * least) && bounded.us.contains(&(0.8 * least)));
     assert!(bounded.cost > free.cost);
-    // At a bound, the feedback is zero.
+    // Where a control is at its bound, the feedback is zero.
     let t = bounded.us.iter().position(|u| *u == 0.8 * least).unwrap();
     assert!(bounded.K[t].amax() == 0.0);
 }
 
 /// Checks the multipliers of a bounded optimum independently of the solver. The gradient ∂J/∂u along the trajectory
-/// follows from the adjoint recursion λ = q + Aᵀλ⁺. It is zero where a control is free, and pushes against the bound
-/// otherwise.
+/// follows from the adjoint recursion λ = q + Aᵀλ⁺. It is zero for a free control, and pushes a control at its bound
+/// outwards.
 #[test]
 fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     let bounds = [vec![-8.0], vec![6.0]];
@@ -336,7 +336,7 @@ fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     assert!(at_bounds > 3, "{at_bounds}");
 }
 
-/// Action that records, at the first knot, the number of trials evaluated together.
+/// Action that records the number of trials that are evaluated together at the first knot.
 struct Noting {
     action: Cartpole,
     groups: Vec<usize>,
@@ -372,8 +372,9 @@ impl ActionModel for Noting {
     }
 }
 
-/// The first step length is tried alone. The second one is also tried alone if the last search did not need a shorter
-/// one. Then the next four are tried side by side, and then the others; the number of lanes limits each group.
+/// The first step length is tried alone. The second length is also tried alone if the last search did not need a
+/// shorter one. Then the next four are tried side by side, and then the others. The number of lanes limits the size of
+/// each group.
 #[test]
 fn a_refused_step_is_followed_by_the_others_at_once() {
     let alone = |lanes| if lanes == 1 { vec![1; 9] } else { vec![1, 4, 4] };
@@ -384,7 +385,7 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         let mut problem = Problem::new(HANGING.to_vec(), vec![Box::new(noting)], vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap();
-        // expected groups per line search: 1, and after a rejection as many groups as were needed to find the step
+        // expected groups per line search: one length alone, and after a rejection as many groups as the search needed
         let (mut expected, mut last) = (vec![], 0.0);
         for iteration in &solution.trace {
             expected.push(1);
@@ -444,7 +445,8 @@ impl Observer for Impatient {
     }
 }
 
-/// An observer ends a solve after an iteration, or within a long one; `resume` continues from there, to the same end.
+/// An observer ends a solve after an iteration, or within a long one. `resume` continues from there, to the same
+/// solution.
 #[test]
 fn observers_end_solves() {
     let mut problem = cartpole(&HANGING, 50, 1);
@@ -463,7 +465,7 @@ fn observers_end_solves() {
     let resumed = solver.resume(&mut problem).unwrap();
     assert!(resumed.status == Status::Converged && (resumed.cost - end.cost).abs() < 1e-6 * end.cost);
 
-    // a slow model: the solve ends before the iteration does
+    // with a slow model, the solve ends before its iteration does
     let mut problem =
         Problem::new(vec![1.0], vec![Box::new(NumDiff(Slow(1)))], vec![0; 5], Box::new(NumDiff(Slow(0)))).unwrap();
     let mut solver = Fddp::new(&problem);
@@ -473,7 +475,7 @@ fn observers_end_solves() {
         assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 0));
     }
 
-    // the same within the augmented Lagrangian
+    // a solve by the augmented Lagrangian ends in the same way
     let mut solver = AugmentedLagrangian::new(&problem);
     let observer = Impatient { questions: 9, iterations: 1 };
     let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
@@ -483,7 +485,8 @@ fn observers_end_solves() {
     assert_eq!(solution.status, Status::Interrupted);
 }
 
-/// Settings that determine the use of memory are limited; a number that only ends the solve may have any value.
+/// Settings that determine the use of memory have maximum values. A setting that only ends the solve may have any
+/// value.
 #[test]
 fn settings_that_count_are_limited() {
     let mut problem = cartpole(&HANGING, 5, 1);
@@ -500,7 +503,7 @@ fn settings_that_count_are_limited() {
     assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
 }
 
-/// If nothing is finite at all, the augmented Lagrangian's residuals are infinite, not NaN.
+/// If no number is finite, the residuals of the augmented Lagrangian are infinite, not NaN.
 #[test]
 fn what_is_nowhere_finite_is_infinitely_far() {
     let model = |nu| Bounded { nu, lanes: 1, limit: 1.0, broken: false };

@@ -1,5 +1,5 @@
-//! Models and durations of single knots are replaced between solves. The results equal the results of a new problem,
-//! and the next solve does not allocate.
+//! Models and durations of single knots are replaced between solves. The results then equal the results of a new
+//! problem, and the next solve does not allocate.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]
@@ -20,7 +20,7 @@ fn x0() -> Vec<f64> {
     [q, vec![0.0; 18]].concat()
 }
 
-/// Returns the model of knot t: on all feet or on two, and with another target at each knot.
+/// Returns the model of knot t, on the given `feet`; its target differs from knot to knot.
 fn model(t: usize, feet: &[&str], dt: f64) -> Box<dyn ActionModel> {
     let robot = Arc::clone(ROBOT.get_or_init(|| Arc::new(robots::quadruped())));
     let contact = |name: &&str| {
@@ -44,7 +44,7 @@ const ALL: [&str; 4] = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
 const TWO: [&str; 2] = ["LF_foot", "RH_foot"];
 const DT: f64 = 0.02;
 
-/// Creates a problem whose models differ in everything that `of` gives.
+/// Creates a problem with the model `of(t)` at each knot t.
 fn problem(of: impl Fn(usize) -> Box<dyn ActionModel>) -> Problem {
     let robot = Arc::clone(ROBOT.get_or_init(|| Arc::new(robots::quadruped())));
     let end = FreeDynamics::terminal(robot, vec![]).unwrap();
@@ -106,7 +106,7 @@ fn a_duration_is_that_of_a_new_problem() {
     let mut fresh = problem(|t| model(t, feet(t), dt(t)));
     let expected = untimed(solver(&fresh, 1).solve(&mut fresh, &xs, &us).unwrap());
     assert!(untimed(solver(&changed, 1).solve(&mut changed, &xs, &us).unwrap()) == expected);
-    // durations move with their knots
+    // when the horizon is shifted, durations move with their knots
     changed.shift(8).unwrap();
     let mut fresh = problem(|t| if t < 8 { model(t + 1, feet(t + 1), dt(t + 1)) } else { model(8, &ALL, DT) });
     let us = fresh.quasi_static(&xs).unwrap();
@@ -130,7 +130,7 @@ fn the_next_solve_allocates_nothing() {
     }
 }
 
-/// Models are added and dropped without end.
+/// Models can be added and dropped any number of times.
 #[test]
 fn memory_stays_bounded() {
     let mut problem = problem(|t| model(t, feet(t), DT));

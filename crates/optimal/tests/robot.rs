@@ -12,10 +12,10 @@ use condyle_optimal::{ActionModel, Error, Fddp, Hessian, LqKnot, NumDiff, Proble
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance of central differences: for a function with values and derivatives of order one they are accurate to about
-/// 1e-9.
+/// Tolerance of central differences. They are accurate to about 1e-9 for a function with values and derivatives of
+/// order one.
 const DIFFERENCES: f64 = 1e-6;
-/// Tolerance of two orders of the same sums, through a factorisation.
+/// Tolerance between sums that are added in different orders, computed with a factorisation.
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
@@ -23,20 +23,20 @@ fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
     (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
 }
 
-/// Returns a random state around neutral; no joint is near a singularity of its group.
+/// Returns a random state near the neutral state; no joint is near a singularity of its group.
 fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
     [q, random(model.nv(), 1.0, rng)].concat()
 }
 
-/// Returns the last frame, by its index and by its name.
+/// Returns the index and the name of the last frame.
 fn last_frame(model: &Model) -> (usize, FrameName) {
     let frames = model.frames();
     (frames.len() - 1, (&frames[frames.len() - 1]).into())
 }
 
-/// Returns every residual with every activation that fits it.
+/// Returns every residual, each with every activation that fits it.
 fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
     let nv = model.nv();
     let (number, frame) = last_frame(model);
@@ -175,7 +175,7 @@ fn a_cost_is_zero_at_its_reference() {
     assert_eq!(action.costs_mut().set_weight("rose", 3.0), Ok(false));
 }
 
-/// A residual of a frame refers to the frame by name. For each robot, its action looks up the index of the frame with
+/// A residual of a frame stores the name of the frame. The action of each robot looks up the index of the frame with
 /// that name.
 #[test]
 fn frames_travel_by_name() {
@@ -192,7 +192,7 @@ fn frames_travel_by_name() {
         let reach = Cost::new("reach", 1.0, Residual::FrameTranslation { frame, target }, Activation::Quadratic);
         let mut action = FreeDynamics::terminal(two.clone(), vec![reach.clone()]).unwrap();
         assert_eq!(action.calc(0, &x, &[], &mut x.clone()), 0.0);
-        // another robot, which lacks the frame, is rejected everywhere
+        // every function rejects another robot, which lacks the frame
         let quadruped = Arc::new(robots::quadruped());
         let unknown = |error: Error| assert!(error.to_string().contains("`reach`: unknown frame `tool`"), "{error}");
         unknown(FreeDynamics::terminal(quadruped.clone(), vec![reach.clone()]).map(|_| ()).unwrap_err());
@@ -200,14 +200,14 @@ fn frames_travel_by_name() {
         unknown(end.set_costs(1, vec![reach.clone()]).unwrap_err());
         let limit = Limit::equality("reach", reach.residual.clone());
         unknown(end.with_limits(vec![limit]).map(|_| ()).unwrap_err());
-        // and so is a file with this cost
+        // a file with this cost can be read, but not be built for a robot without the frame
         let knot = serde_json::to_string(&Knot::new(Dynamics::Terminal, vec![reach.clone()])).unwrap();
         let read: Knot = serde_json::from_str(&knot).unwrap();
         assert_eq!(read.costs, [reach]);
         assert!(read.build(&two).is_ok());
         unknown(read.build(&quadruped).map(|_| ()).unwrap_err());
     }
-    // among frames with the same name, the one of the requested kind is chosen, otherwise a link's
+    // among frames with the same name, the frame of the requested kind is chosen, or else the frame of a link
     let text = r#"<robot name="twice"><link name="base"/><link name="tip"/><joint name="tip" type="continuous">
         <parent link="base"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"#;
     let twice = Model::from_urdf_str(text, &UrdfOptions::default()).unwrap();
@@ -215,7 +215,7 @@ fn frames_travel_by_name() {
     assert_eq!(twice.frames()[named(Some(FrameKind::Joint))].kind, FrameKind::Joint);
     assert_eq!(named(None), twice.frame("tip").unwrap());
     assert_ne!(named(None), named(Some(FrameKind::Joint)));
-    assert_eq!(named(Some(FrameKind::User)), named(None)); // because no such frame exists
+    assert_eq!(named(Some(FrameKind::User)), named(None)); // no frame of this kind exists
 }
 
 #[test]
@@ -241,11 +241,11 @@ fn what_does_not_fit_is_refused_by_name() {
     assert_eq!(message(FreeDynamics::running(arm.clone(), 0.0, vec![])), "a knot of 0 s: its duration must be above 0");
 }
 
-/// Residual r = (v₁ u₁, sin q₂ + u₂² + t), of a robot whose position has `nq` entries.
+/// Residual r = (v₁ u₁, sin q₂ + u₂² + t), for a robot whose position has `nq` entries.
 struct OwnFunction {
     nq: usize,
     nv: usize,
-    /// Indices of the coordinates and controls that are used.
+    /// Indices of the coordinates and controls in the residual.
     place: [usize; 2],
 }
 
@@ -309,8 +309,8 @@ impl ResidualFunction for OwnCost {
     }
 }
 
-/// The knot contains the gradient and Hessian of a user-defined cost, times Δt and the weight. With another activation
-/// than the sum, here ½ r², it contains the whole Hessian of the activation's value.
+/// The knot contains the gradient and Hessian of a user-defined cost, times Δt and the weight. With the activation ½ r²
+/// instead of the sum, it contains the exact Hessian of ½ r².
 #[test]
 fn a_cost_of_ones_own_has_its_hessian() {
     let (arm, mut rng) = (Arc::new(robots::arm7()), StdRng::seed_from_u64(31));
@@ -345,7 +345,7 @@ fn a_cost_of_ones_own_has_its_hessian() {
     }
 }
 
-/// Iterates do not depend on the form of the knots, and the optimum does not depend on the Hessian.
+/// Iterates do not depend on the form of the knots. The optimum does not depend on whether the Hessian is exact.
 #[test]
 fn a_cost_of_ones_own_in_a_solve() {
     let arm = Arc::new(robots::arm7());

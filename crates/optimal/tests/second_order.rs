@@ -15,21 +15,21 @@ use condyle_optimal::{ActionModel, Fddp, Hessian, LqKnot, NumDiff, Problem, Stat
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Tolerance of second central differences of functions of size one to ten.
+/// Tolerance of second central differences, for functions with values of one to ten.
 const DIFFERENCES: f64 = 1e-5;
 
-/// Step of first central differences, and their tolerance; they are accurate to about 1e-8.
+/// Step of first central differences, and their tolerance; these differences are accurate to about 1e-8.
 const STEP: f64 = 6e-6;
 const SLOPES: f64 = 1e-7;
-/// Tolerance as `DIFFERENCES`, for a robot. Rounding grows with the condition number of its inertia matrix, and
-/// truncation with the squares of its sines.
+/// Tolerance of the same differences for a robot. Rounding errors grow with the condition number of the robot's inertia
+/// matrix, and truncation errors with the second powers of sines.
 const VALUES: f64 = 1e-4;
 /// Tolerance of symmetry: both triangles are sums of the same results of a factorisation, in different orders.
 const SYMMETRY: f64 = 1e-12;
 /// Relative accuracy of the arm's inverse inertia matrix, whose condition number is 1e4.
 const ROUNDING: f64 = 1e-12;
 
-/// Function ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: two knots combined into one terminal function.
+/// Function ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: the cost of a knot plus a cost of its next state.
 struct Chained<A>(A);
 
 impl<A: ActionModel> ActionModel for Chained<A> {
@@ -45,8 +45,8 @@ impl<A: ActionModel> ActionModel for Chained<A> {
     }
 }
 
-/// With the curvature, the quadratic model of a horizon of one knot is exact: it is the quadratic model of ℓ(x, u) +
-/// V(φ(x, u)).
+/// With the curvature of the dynamics, the quadratic model of a horizon of one knot is exact: it is the quadratic model
+/// of ℓ(x, u) + V(φ(x, u)).
 #[test]
 fn the_quadratic_model_is_exact() {
     let (x, u) = ([0.3, 0.7, -0.4, 1.3], [2.0]);
@@ -72,13 +72,13 @@ fn the_quadratic_model_is_exact() {
     assert!((&knot.Quu - &exact.R).amax() < DIFFERENCES, "{} {}", knot.Quu, exact.R);
     assert!((&knot.K - &K).amax() < DIFFERENCES * 10.0, "{} {K}", knot.K);
     assert!((&knot.Vxx - &Vxx).amax() < DIFFERENCES * 10.0, "{} {Vxx}", knot.Vxx);
-    // Without the curvature, it is not exact.
+    // Without the curvature, the quadratic model is not exact.
     sweep.run(&lq_knots, 0.0).unwrap();
     assert!((&sweep.feedback()[0].Vxx - &Vxx).amax() > 100.0 * DIFFERENCES);
 }
 
-/// Near the optimum, the error of a second-order step is the square of the previous error; with Gauss–Newton it is a
-/// fraction.
+/// Near the optimum, the error after a second-order step is about the square of the error before it. After a
+/// Gauss–Newton step it is a fraction of the error before it.
 #[test]
 fn convergence_is_quadratic() {
     let solve = |second_order: bool| {
@@ -86,7 +86,8 @@ fn convergence_is_quadratic() {
         let end = common::Cartpole { nu: 0, lanes: 1, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
         let mut problem = Problem::new(HANGING.to_vec(), models, vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
-        // First solve to near the optimum with Gauss–Newton, so that both methods converge to the same one.
+        // Both methods start near the optimum, where a Gauss–Newton solve ended, so that both converge to the same
+        // optimum.
         (solver.settings.tolerance, solver.settings.max_iterations) = (1e-4, 300);
         let near = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap().clone();
         assert_eq!(near.status, Status::Converged);
@@ -114,7 +115,7 @@ fn groups() -> Model {
     robot.build().unwrap()
 }
 
-/// Compares ∂²ψ with differences of ∂ψ and of ψ, at random states.
+/// Compares second derivatives of the dynamics with differences of first derivatives and of values, at random states.
 fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
     let mut random = random();
     let (nv, ndx, nu) = (model.nv(), action.ndx(), action.nu());
@@ -128,7 +129,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
         assert!(action.dynamics_hessian(0, &x, u, lambda, &mut ours));
         let largest = 1.0 + ours.xx.amax().max(ours.xu.amax()).max(ours.uu.amax());
 
-        // ψ(z) = λᵀ(φ(x ⊕ δx, u + δu) ⊖ φ(x, u)):   ∂ψ/∂x = E(δx)ᵀ Aᵀ L(φ(…) ⊖ φ)ᵀ λ,   ∂ψ/∂u = Bᵀ Lᵀ λ
+        // with ψ(z) = λᵀ(φ(x ⊕ δx, u + δu) ⊖ φ(x, u)):   ∂ψ/∂x = E(δx)ᵀ Aᵀ L(φ(…) ⊖ φ)ᵀ λ,   ∂ψ/∂u = Bᵀ Lᵀ λ
         let (mut centre, mut next, mut moved) = (x.clone(), x.clone(), x.clone());
         action.calc(0, &x, u, &mut centre);
         let mut change = vec![0.0; ndx];
@@ -155,7 +156,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             let above = gradient(&z);
             z[j] = -STEP;
             let below = gradient(&z);
-            // Both gradients are differences of numbers with rounding errors of a few bits.
+            // Both gradients are differences of numbers with rounding errors in a few bits.
             let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
             let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
             let (ours_x, ours_u) = match j < ndx {
@@ -166,7 +167,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
         }
 
-        // The same without the Jacobians of the groups, if the model has such joints.
+        // For joints whose positions form a group, ψ itself is also differenced, which needs no Jacobians of the group.
         if model.nq() > nv {
             let mut numeric = Hessian::zeros(ndx, nu);
             NumDiff(action.clone()).dynamics_hessian(0, &x, u, lambda, &mut numeric);
@@ -223,7 +224,7 @@ fn quadrotor(running: bool) -> FreeDynamics {
         .unwrap()
 }
 
-/// Action with exact Hessians: the cost's Hessian by differences, the dynamics' Hessian from the robot.
+/// Action with exact Hessians: the Hessian of the cost by differences, the Hessian of the dynamics from the robot.
 struct ExactCosts(NumDiff<FreeDynamics>);
 
 impl ActionModel for ExactCosts {
@@ -253,7 +254,7 @@ impl ActionModel for ExactCosts {
     }
 }
 
-/// A tumbling quadrotor comes to rest: its thrust turns with it, and its rotations do not commute.
+/// A tumbling quadrotor comes to rest. Its thrust turns with the body, and its rotations do not commute.
 #[test]
 fn convergence_is_quadratic_on_a_group() {
     const KNOTS: usize = 30;
@@ -270,7 +271,8 @@ fn convergence_is_quadratic_on_a_group() {
         };
         let mut problem = Problem::new(x0.to_vec(), vec![model(true)], vec![0; KNOTS], model(false)).unwrap();
         let mut solver = Fddp::new(&problem);
-        // First solve to near the optimum with Gauss–Newton, so that both methods converge to the same one.
+        // Both methods start near the optimum, where a Gauss–Newton solve ended, so that both converge to the same
+        // optimum.
         (solver.settings.tolerance, solver.settings.max_iterations) = (1e-2, 300);
         let near = solver.solve(&mut problem, &x0.repeat(KNOTS + 1), &[9.81 / 4.0; 4 * KNOTS]).unwrap().clone();
         assert_eq!(near.status, Status::Converged);
@@ -284,8 +286,8 @@ fn convergence_is_quadratic_on_a_group() {
         let ((newton, few), (gauss_newton, many)) = (solve(exact, true), solve(exact, false));
         assert!((newton - gauss_newton).abs() < 1e-8);
         assert!(2 * few.len() <= many.len(), "{few:?} {many:?}");
-        // The remaining improvement is the square of the error: with all Hessians exact, each is a multiple of the
-        // previous one squared.
+        // With all Hessians exact, the remaining improvement falls quadratically: it is a multiple of the square of the
+        // previous remaining improvement.
         assert!(!exact || few.windows(2).all(|stops| stops[1] < 10.0 * stops[0] * stops[0]), "{few:?}");
     }
 }

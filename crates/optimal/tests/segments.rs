@@ -1,4 +1,4 @@
-//! A sweep in several segments at the same time gives the same result as a sweep as one.
+//! A sweep in several segments at the same time gives the same result as a sweep in one segment.
 #![allow(non_snake_case)]
 
 mod common;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// more.
 const SAME: f64 = 1e-9;
 
-/// Tolerance of the cost of an iterate, on which an error of the step has only a small effect.
+/// Tolerance of the cost of an iterate. An error of the step has only a small effect on this cost.
 const COST: f64 = 1e-9;
 
 fn largest(x: &[f64]) -> f64 {
@@ -32,7 +32,7 @@ fn assert_same(found: &[KnotFeedback], expected: &[KnotFeedback], case: &str) {
             .chain([&knot.Vx, &knot.k, &knot.Qu].map(|vector| vector.as_slice().to_vec()))
             .collect::<Vec<_>>()
     };
-    // Vectors vanish where the trajectory is good, so they are compared with the largest entry of the horizon.
+    // Vectors vanish where the trajectory is optimal, so errors are relative to the largest entry of the whole horizon.
     let mut scales = [0.0_f64; 6];
     for knot in expected {
         for (scale, field) in scales.iter_mut().zip(fields(knot)) {
@@ -49,7 +49,7 @@ fn assert_same(found: &[KnotFeedback], expected: &[KnotFeedback], case: &str) {
     }
 }
 
-/// Returns the knots of a sweep as one, and of a sweep in segments; both must succeed.
+/// Returns the feedback of a sweep in one segment, and of a sweep in several segments; both sweeps must succeed.
 fn both(lq_knots: &[LqKnot], segments: usize, regularisation: f64) -> (Vec<KnotFeedback>, Vec<KnotFeedback>) {
     let mut sweep = Sweep::new(lq_knots);
     sweep.run(lq_knots, regularisation).unwrap();
@@ -96,7 +96,7 @@ fn segments_change_nothing_but_rounding() {
             for regularisation in [0.0, 1e-3] {
                 let (as_one, knots) = both(&lq_knots, segments, regularisation);
                 assert_same(&knots, &as_one, &format!("ndx {ndx}, horizon {horizon}, {segments} segments"));
-                assert!(knots != as_one, "ndx {ndx}: not in segments"); // other sums, so other roundings
+                assert!(knots != as_one, "ndx {ndx}: not in segments"); // different sums are rounded differently
             }
         }
     }
@@ -116,14 +116,15 @@ fn a_horizon_too_short_for_two_segments_is_swept_as_one() {
     assert_eq!(knots, as_one);
 }
 
-/// Segments give the minimum over all states and controls at once, computed from its Karush–Kuhn–Tucker system.
+/// A sweep in segments finds the minimum of the whole problem. One Karush–Kuhn–Tucker system of all states and controls
+/// gives the same minimum.
 #[test]
 fn segments_solve_the_whole_problem() {
     let mut random = random();
     for lq_knots in problems().into_iter().take(3) {
         let (n, horizon) = (lq_knots[0].ndx(), lq_knots.len() - 1);
         let x0: DVector<f64> = random_matrix(&mut random, n, 1).column(0).into_owned();
-        // Unknowns: x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
+        // The order of unknowns is x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
         let mut offsets = vec![horizon * n];
         for knot in &lq_knots[..horizon] {
             offsets.push(offsets[offsets.len() - 1] + knot.nu());
@@ -192,7 +193,7 @@ fn any_number_of_threads_finds_the_same_bits() {
     }
 }
 
-/// A fault anywhere stops a sweep in segments with the same error as a sweep as one.
+/// A fault at any knot stops a sweep in segments with the same error as a sweep in one segment.
 #[test]
 fn failures_are_those_of_a_sweep_as_one() {
     let mut random = random();
@@ -222,7 +223,7 @@ fn failures_are_those_of_a_sweep_as_one() {
     }
 }
 
-/// In these problems a single segment has no minimum, its value function is not convex, or controls are bounded.
+/// In these problems a segment alone has no minimum, its value function is not convex, or controls are bounded.
 #[test]
 fn what_segments_cannot_do_is_swept_as_one() {
     let mut random = random();
@@ -246,7 +247,7 @@ fn what_segments_cannot_do_is_swept_as_one() {
     }
 }
 
-/// A link would lose digits if controls cost 1e-12 of the states' cost. The sweep does not lose them.
+/// If controls cost 1e-12 of the states' cost, a link loses digits; the sweep nevertheless gives the accurate result.
 #[test]
 fn cheap_controls_lose_no_digits() {
     let mut random = random();
@@ -262,7 +263,7 @@ fn cheap_controls_lose_no_digits() {
     }
 }
 
-/// If nothing depends on some states, the value function is singular.
+/// If some states do not affect the cost, the value function is singular.
 #[test]
 fn states_may_cost_nothing() {
     let mut random = random();
@@ -286,8 +287,8 @@ fn no_segment_at_all_is_refused() {
     Sweep::new(&[LqKnot::zeros(2, 0)]).set_segments(0);
 }
 
-/// Creates the problem of a quadruped that shifts its weight on four feet and then reaches with one, from a warm start
-/// with gaps.
+/// Creates the problem of a quadruped that shifts its weight on four feet and then reaches with one foot. The warm
+/// start has gaps.
 fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
@@ -345,14 +346,14 @@ fn a_robots_solve_makes_the_same_iterates() {
             assert!((a.cost - b.cost).abs() < COST * b.cost.abs(), "{a:?} {b:?}");
         }
         assert!(solution.xs != expected.xs, "not in segments");
-        // once more with the same number of segments, and then as one again
+        // solve again with the same number of segments, and then with one segment
         let again = solver.solve(&mut problem, &xs, &us).unwrap().xs.clone();
         assert_eq!(again, solver.solve(&mut problem, &xs, &us).unwrap().xs);
         solver.settings.segments = 1;
         assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap().xs, expected.xs);
     }
 
-    // also compare each knot of sweeps at the last derivatives
+    // compare each knot of sweeps at the last derivatives, too
     let mut lq_knots = problem.lq_knots();
     problem.calc_diff(&expected.xs, &expected.us, &mut lq_knots);
     let mut random = random();

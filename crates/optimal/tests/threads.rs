@@ -1,4 +1,4 @@
-//! Several threads give the same result as one, to the last bit.
+//! Several threads give the same result as one thread, to the last bit.
 #![allow(non_snake_case)]
 
 mod common;
@@ -16,12 +16,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Creates a gait of a quadruped with every kind of knot: stance, an impact, an impact by differences that cannot be
-/// copied, flight by Runge–Kutta and by Euler. The lengths of its runs are not multiples of the lanes.
+/// copied, and flight by Runge–Kutta and by Euler. The lengths of its runs of knots are not multiples of the number of
+/// lanes.
 fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     gait_of(|impact| Box::new(NumDiff(impact)))
 }
 
-/// Creates the gait as [`gait`] does; `impact_again` creates the impacts of the second kind.
+/// Creates the gait of [`gait`]; `impact_again` creates the impacts of the second kind.
 fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
@@ -85,8 +86,8 @@ fn any_number_of_threads_finds_the_same_bits() {
     assert!(solve(&mut problem, &xs, &us, 1) == expected);
 }
 
-/// After a step shorter than 1, the next length is tried concurrently with the first, by copies of the models. All
-/// models can be copied here. In one case the first length is good, in the other it is not.
+/// After a step shorter than 1, the next step length is tried concurrently with the first, by copies of the models. All
+/// models can be copied here. In one case the first length is good, in the other case it is not.
 #[test]
 fn trials_beside_each_other_find_the_same_bits() {
     let (mut problem, xs, us) = gait_of(|impact| Box::new(impact));
@@ -133,7 +134,7 @@ fn a_solver_turns_to_another_problem() {
     assert!(solve(Some(&other), 1) == expected && solve(Some(&other), 2) == expected);
 }
 
-/// A changed model is copied again.
+/// When a model has changed, it is copied again.
 #[test]
 fn copies_follow_their_models() {
     let (mut problem, xs, us) = gait();
@@ -151,7 +152,7 @@ fn copies_follow_their_models() {
     assert!(after.cost != before.cost);
 }
 
-/// Models with different numbers of controls, in a moving horizon.
+/// Models with different numbers of controls serve a moving horizon.
 #[test]
 fn a_horizon_may_move() {
     let mut random = random();
@@ -195,20 +196,21 @@ fn a_sweep_that_fails_is_repeated() {
     assert!(solve(2) == expected && solve(4) == expected);
 }
 
-/// Without time for a single phase, the solve ends after the iteration that it always makes, on any number of threads.
+/// If there is no time for any phase, the solve ends after the first iteration, which always runs, on any number of
+/// threads.
 #[test]
 fn a_budget_holds_on_several_threads() {
     let (mut problem, xs, us) = gait();
     let mut solver = Fddp::new(&problem);
     (solver.settings.threads, solver.settings.max_iterations) = (3, 2);
-    let free = solver.solve(&mut problem, &xs, &us).unwrap().clone(); // the durations of phases are known from here on
+    let free = solver.solve(&mut problem, &xs, &us).unwrap().clone(); // from here on, phases have durations
     solver.settings.time_budget = Some(Duration::from_nanos(1));
     let solution = solver.solve(&mut problem, &xs, &us).unwrap();
     assert!(solution.status == Status::TimeLimit && solution.trace == free.trace[..1]);
     assert!(solution.timings.overrun > Duration::ZERO);
 }
 
-/// Unicycle whose derivatives panic at one knot, on whichever thread evaluates it.
+/// Unicycle whose derivatives panic at one knot, on whichever thread computes them.
 struct Fragile(Unicycle, usize);
 
 impl ActionModel for Fragile {

@@ -40,7 +40,7 @@ pub(super) type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 /// Limits that apply at all knots; `None` if there are no limits.
 pub(super) type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
 
-/// Collects the residuals of costs and limits that are written in Python.
+/// Collects the residuals that are written in Python, from costs and limits.
 pub(super) fn kept_at(
     py: Python<'_>,
     costs: &[PyRef<'_, Cost>],

@@ -16,12 +16,12 @@ pub(crate) struct Alone {
     pub(crate) robot: Option<Arc<condyle::Model>>,
     /// Whether the knot is terminal, so that it has no next state.
     pub(crate) end: bool,
-    /// Text that differs for different knots of this robot.
+    /// Text that identifies this knot among all knots of the robot.
     pub(crate) text: String,
 }
 
-/// Returns knot t of an action or of a problem. If t is `None`, `of` must be an action, and the result computes all its
-/// knots.
+/// Returns knot t of an action or of a problem. If t is `None`, `of` must be an action, and the result computes all
+/// knots of this action.
 pub(crate) fn alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
     let Ok(problem) = of.cast::<Problem>() else { return action_alone(of, t) };
     let (py, problem) = (of.py(), problem.get());

@@ -149,7 +149,7 @@ impl Cost {
 
 /// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// Limits apply at the beginning of a knot. `Fddp` alone treats them as costs for leaving the bounds.
+/// Limits apply at the beginning of a knot. `Fddp` alone treats them as costs of values outside the bounds.
 ///
 /// name: used in errors.
 /// residual: a `Residual`.

@@ -80,7 +80,7 @@ impl Problem {
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        // no Python code runs while these are locked
+        // no Python code runs while the objects are locked
         if let Ok(objects) = self.objects.try_lock() {
             objects.iter().try_for_each(|object| visit.call(object))?;
         }
@@ -272,12 +272,12 @@ impl Problem {
         Ok(())
     }
 
-    /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call it between
-    /// solves. The solver's next iterations do not allocate.
+    /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
+    /// between solves. The solver's next iterations do not allocate.
     ///
     /// knot: its index, 0 to N − 1.
-    /// model: the new model, with as many states and controls as the old one. Its costs for single knots count for the
-    ///     indices of this problem.
+    /// model: the new model, with as many states and controls as the old one. Costs that the model has for single
+    ///     knots belong to the knots of this problem with the same index.
     ///
     /// Raises `ProblemError` if the model does not fit.
     fn set_knot(&self, py: Python<'_>, knot: usize, model: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -286,8 +286,8 @@ impl Problem {
         self.replace(py, knot, new, object, residuals(model))
     }
 
-    /// Sets the duration of a knot, whose model keeps its duration at all other knots. Call it between solves. The
-    /// solver's next iterations do not allocate.
+    /// Sets the duration of a single knot; the knot's model keeps its duration at all other knots. Call this method
+    /// between solves. The solver's next iterations do not allocate.
     ///
     /// knot: its index, 0 to N − 1.
     /// dt: the duration (s).
@@ -318,7 +318,7 @@ impl Problem {
         by_knot(py, &problem, &[], |t, out| out.copy_from_slice(&us[problem.control_range(t)]))
     }
 
-    /// Computes the cost of states and controls and the results of the dynamics there, as an `Evaluation`.
+    /// Computes the cost of given states and controls, and the results of the dynamics for them, as an `Evaluation`.
     ///
     /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
     /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
@@ -370,7 +370,7 @@ impl Problem {
         problem.calc(&xs, &us, &mut next, &mut costs);
         problem.calc_diff(&xs, &us, &mut lq_knots);
         self.raise()?;
-        // the gap at the next state is stored in the knot of the knot before
+        // an LQ knot stores the gap at the state after it
         for (knot, gap) in lq_knots.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
             knot.f.copy_from_slice(gap);
         }

@@ -32,7 +32,7 @@ pub(crate) struct Residual(Kind);
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 enum Kind {
     Given(robot::Residual),
-    /// A Python function, with the number of its entries.
+    /// A Python function that returns a vector, with the number of entries of this vector.
     #[serde(skip)]
     Own(usize, Functions),
     /// A scalar cost, written in Python.
@@ -67,8 +67,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::Control { reference: numbers("reference", reference)? }))
     }
 
-    /// Returns the difference between the actual efforts and forces and those that hold the robot still, r = τ − g(q) +
-    /// Jᵀλ, nv numbers.
+    /// Returns r = τ − g(q) + Jᵀλ, nv numbers: the excess of the actual efforts and forces over the efforts and forces
+    /// that hold the robot still.
     #[staticmethod]
     fn control_gravity() -> Self {
         Self::from(robot::Residual::ControlGravity)

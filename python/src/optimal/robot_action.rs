@@ -103,7 +103,7 @@ impl<A: ActionModel + Clone> RobotAction<A> {
     }
 }
 
-/// A function that creates an object, and its arguments.
+/// A function that creates an object, and the arguments of this function.
 pub(super) type Reduced<'py> = (Bound<'py, PyAny>, (Py<Model>, String, WrittenAt<'py>));
 
 /// Residuals of a knot that are written in Python, with their indices.

@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use std::sync::Mutex;
 use std::time::Duration;
 
-/// Sets those fields of a `Settings` that are given by name. Some fields are read by a special function.
+/// Sets the fields of a `Settings` that are given by name. Some fields are read by a special function.
 macro_rules! set {
     ($settings:expr, $given:expr, { $($field:ident $(by $read:ident)?),* }) => {
         for (name, value) in $given.into_iter().flatten() {

@@ -13,8 +13,8 @@ from condyle.optimal import (
     ContactInverseDynamics,
     Cost,
     FreeDynamics,
-    ImpulseDynamics,
     FreeInverseDynamics,
+    ImpulseDynamics,
     Problem,
     Residual,
 )

@@ -10,24 +10,25 @@ const STEPS: usize = 100;
 /// Largest gradient entry of the free variables at which the iteration has converged.
 const GRADIENT: f64 = 1e-5;
 
-/// Fraction of the decrease predicted by the slope that a step must reach to be accepted.
+/// Fraction of the decrease that the slope predicts. A step is accepted if the objective falls by more than this
+/// fraction.
 const ACCEPT: f64 = 0.1;
 
-/// Number of step lengths tried, 2⁻ⁿ.
+/// Number of step lengths that a line search tries: 2⁻ⁿ for n = 0, 1, ….
 const STEP_LENGTHS: i32 = 10;
 
-/// Workspace for
+/// Workspace for a quadratic program with bounds,
 ///
 /// ```text
 /// minimise   ½ xᵀ H x + qᵀ x      subject to   lower ≤ x ≤ upper
 /// ```
 ///
 /// by the method of Tassa, Mansard, Todorov (ICRA 2014, section III), with the rules and constants of Crocoddyl's box
-/// solvers. A variable is clamped if it lies on a bound and the gradient pushes it outwards. The others are free and
-/// make a Newton step, which is clamped at the bounds.
-///
-/// In Crocoddyl's rule for a step, the slope of the free variables has the wrong sign, so a step may raise the
-/// objective. It usually converges nevertheless, to the same set of clamped variables. Where it cycles (18 of the 600
+/// solvers. A variable is clamped if it lies on a bound and the gradient pushes it outwards. The other variables are
+/// free and make a Newton step, which is clamped at the bounds.
+/// In Crocoddyl's rule for accepting a step, the slope of the free variables has the wrong sign, so a step may raise
+/// the objective. The iteration usually converges nevertheless, to the same set of clamped variables. Where it cycles
+/// (18 of the 600 problems of `tests/box_qp.rs`), the rule of the paper is used.
 /// problems of the test below), the rule of the paper is used.
 #[derive(Debug, Clone)]
 pub(crate) struct BoxQp {
@@ -37,7 +38,7 @@ pub(crate) struct BoxQp {
     gradient: Vec<f64>,
     step: Vec<f64>,
     trial: Vec<f64>,
-    /// [H_ff; g_fᵀ] of the free variables, and scratch for the factor of H_ff.
+    /// Matrix [H_ff; g_fᵀ] of the free variables f with gradient g; elimination replaces H_ff by its factor.
     H: Vec<f64>,
     upper: Vec<f64>,
 }
@@ -56,10 +57,10 @@ impl BoxQp {
         }
     }
 
-    /// Solves from `start`, moved into the bounds. The results are x and `free`.
+    /// Solves the program from `start`, which is first moved into the bounds. The results are `x` and `free`.
     ///
     /// # Errors
-    /// The variable and the pivot, if the block of H of the free variables is not positive definite.
+    /// Index of a variable and its pivot, if the block of H for the free variables is not positive definite.
     pub(crate) fn solve(
         &mut self,
         H: &DMatrix<f64>,
@@ -96,7 +97,7 @@ impl BoxQp {
         Ok(())
     }
 
-    /// Computes Δx_f = −H_ff⁻¹ g_f,   Δx = 0 for the clamped variables.
+    /// Computes the step Δx_f = −H_ff⁻¹ g_f of the free variables f, and Δx = 0 for the clamped variables.
     fn newton_step(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
         let Self { free, gradient, step, H: work, upper, .. } = self;
         let (count, stride) = (free.len(), free.len() + 1 + SLACK);
@@ -117,7 +118,8 @@ impl BoxQp {
         Ok(())
     }
 
-    /// Takes the longest good step, if one exists: by the rule of the paper if `careful`, else by Crocoddyl's rule.
+    /// Takes the longest accepted step length, if one exists. `careful` selects the rule by which steps are accepted:
+    /// the rule of the paper, or else Crocoddyl's.
     fn line_search(&mut self, H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64], careful: bool) {
         let m = q.len();
         if !careful {

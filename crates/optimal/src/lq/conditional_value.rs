@@ -1,5 +1,5 @@
-//! Conditional value functions: the cost of a segment of a horizon, for every state at its start and every cost after
-//! its end.
+//! Conditional value functions: the lowest cost of a segment of a horizon. They are functions of the state at the start
+//! of the segment, and of a multiplier for the state after its end.
 //!
 //! Let x be the state at the first knot of a segment and z the state after its last knot. The lowest cost of the
 //! segment plus λᵀz, with a multiplier λ as a parameter, is quadratic in x and λ:
@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The recursion starts after the segment with P = 0, p = 0, Θ = 1, θ = 0, C = 0. The elimination of a Riccati step
-//! then computes it knot by knot, if rows for λ are appended below H (notation as in [`Sweep`](crate::Sweep)):
+//! then computes V knot by knot, if rows for λ are appended below H (notation as in [`Sweep`](crate::Sweep)):
 //!
 //! ```text
 //! ⎡ H       ⎤      ⎡ L  ·   ⎤      Y = Θ⁺B L⁻ᵀ,   Θ = Θ⁺A − Y Xᵀ
@@ -17,8 +17,8 @@
 //! ⎣ Θ⁺[B A] ⎦      ⎣ Y  Θ   ⎦      C = C⁺ + Y Yᵀ
 //! ```
 //!
-//! The optimal z is ∂V/∂λ = Θ x + θ − C λ. If the cost after the segment is ½ zᵀP₁z + p₁ᵀz, its multiplier is λ = P₁z +
-//! p₁. Eliminate both, with P₁ = L Lᵀ and M = 1 + LᵀC L. The value function at the start of the segment then has
+//! The optimal z is ∂V/∂λ = Θ x + θ − C λ. If the cost after the segment is ½ zᵀP₁z + p₁ᵀz, the multiplier is λ = P₁z +
+//! p₁. Eliminate z and λ, with P₁ = L Lᵀ and M = 1 + LᵀC L. The value function at the start of the segment then has
 //!
 //! ```text
 //! P₀ = P + (ΘᵀL) M⁻¹ (ΘᵀL)ᵀ,      p₀ = p + Θᵀp₁ + (ΘᵀL) M⁻¹ Lᵀ(θ − C p₁)
@@ -37,7 +37,7 @@ use condyle_linalg::{
     product_of_upper_lower, product_with_upper, transpose,
 };
 
-/// Value function; P is symmetric and full, with padding rows.
+/// Value function ½ xᵀP x + pᵀx. P is symmetric, with both triangles filled, and has padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Value {
     pub(crate) P: Vec<f64>,
@@ -45,7 +45,7 @@ pub(crate) struct Value {
 }
 
 impl Value {
-    /// Creates the value function zero for n states.
+    /// Creates the value function that is zero for all states, for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
     }
@@ -56,8 +56,8 @@ impl Value {
     }
 }
 
-/// Part of a conditional value function that depends on the multiplier; P and p are in the [`Step`] of the segment.
-/// Matrices have padding rows.
+/// Terms Θ, θ and C of a conditional value function, which depend on the multiplier. P and p are in the [`Step`] of the
+/// segment. Matrices have padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentValue {
     /// Matrix Θ.
@@ -69,7 +69,7 @@ pub(crate) struct SegmentValue {
 }
 
 impl SegmentValue {
-    /// Creates zeros for n states.
+    /// Creates Θ, θ and C of zeros, for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         let square = || vec![0.0; (n + SLACK) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
@@ -105,7 +105,7 @@ impl SegmentValue {
         for j in 0..n {
             work.P[j * ldt + j] += regularisation;
         }
-        // Θ, with its columns rotated back, and Y
+        // copy Θ, and rotate its columns back to the order of the state; then update θ and C by Y
         let (below, split) = (&work.H[last + 1..], n - turn);
         copy_matrix(&mut Theta[turn * ldt..], ldt, View::new(&below[m * ld..], ld), [n, split]);
         if turn > 0 {
@@ -121,20 +121,20 @@ impl SegmentValue {
     }
 }
 
-/// Link from the value function at the end of a segment to the value function at its start, with scratch. Matrices have
-/// padding rows, and the stride n + 1 + SLACK.
+/// Computation of the value function at the start of a segment from the value function at its end, with scratch.
+/// Matrices have padding rows, and the stride n + 1 + SLACK.
 #[derive(Debug, Clone)]
 pub(crate) struct Link {
-    /// C, both triangles.
+    /// Matrix C, with both triangles filled.
     C: Vec<f64>,
     L: Vec<f64>,
-    /// Lᵀ, including its zeros.
+    /// Matrix Lᵀ, including its zeros.
     upper: Vec<f64>,
-    /// C L.
+    /// Product C L.
     CL: Vec<f64>,
-    /// (C L)ᵀ, and later [Θ, θ − C p₁]ᵀ.
+    /// Matrix (C L)ᵀ, and later [Θ, θ − C p₁]ᵀ.
     rows: Vec<f64>,
-    /// [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride 2n + 1 + SLACK.
+    /// Matrix [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride 2n + 1 + SLACK.
     H: Vec<f64>,
 }
 
@@ -145,9 +145,9 @@ impl Link {
         Self { C: square(), L: square(), upper: square(), CL: square(), rows: square(), H }
     }
 
-    /// Computes L of P₁ = L Lᵀ, and its transpose; returns whether the factorisation exists. If some states cost
-    /// nothing, P₁ may be singular, and rounding decides whether a pivot is positive. A second try therefore adds a
-    /// little to the diagonal.
+    /// Computes the factor L of P₁ = L Lᵀ, and Lᵀ; returns whether the factorisation exists. If some states cost
+    /// nothing, P₁ may be singular, and rounding decides whether a pivot is positive. A second try therefore adds n
+    /// rounding errors of the largest entry to the diagonal.
     fn factorise(&mut self, P: &[f64], n: usize) -> bool {
         let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
         let mut largest = 0.0_f64;
@@ -170,8 +170,8 @@ impl Link {
         false
     }
 
-    /// Computes the value function `start` at the start of a segment with P, p in `step`, from the value function at
-    /// its `end`. Returns whether the latter is convex.
+    /// Computes the value function `start` at the start of a segment from the value function `end` at its end. P and p
+    /// of the segment are in `step`. Returns whether `end` is convex.
     pub(crate) fn run(&mut self, step: &Step, segment: &SegmentValue, end: &Value, start: &mut Value) -> bool {
         let (n, work) = (end.p.len(), &step.work);
         let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
@@ -197,7 +197,8 @@ impl Link {
         }
         product_with_upper(&mut H[n..], ldh, [n + 1, n], View::new(rows, ld), upper);
 
-        // −P and −(p + Θᵀp₁): the elimination subtracts from them what must be added to P and p
+        // −P and −(p + Θᵀp₁): the signs are reversed, because the elimination subtracts the terms that are added to P
+        // and p
         for j in 0..n {
             let (H, P) = (&mut H[(n + j) * ldh + n..][..n + 1], &work.P[j * ldp..][..n]);
             for i in j..n {

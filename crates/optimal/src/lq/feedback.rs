@@ -1,4 +1,4 @@
-//! Results of a sweep at one knot, and the computation of gains from the elimination of other unknowns than controls.
+//! Results of a sweep at one knot, and computation of gains if the sweep eliminated other unknowns than the controls.
 #![allow(non_snake_case)] // the names of the literature: K, Vxx, and Y, U
 
 use super::knot::LqKnot;
@@ -21,15 +21,15 @@ pub struct KnotFeedback {
     pub Qu: DVector<f64>,
     /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
     pub Quu: DMatrix<f64>,
-    /// Quᵀk and kᵀQuu k: the change of the cost that a full step is expected to make, to first order and (twice) to
-    /// second order.
+    /// Expected change of the cost by a full step, [Quᵀk, kᵀQuu k]: the first-order term, and twice the second-order
+    /// term.
     pub expected: [f64; 2],
     /// Whether K, Qu and Quu store the factors from which [`Gains::finish`] computes K and k.
     pub(super) gains_deferred: bool,
 }
 
 impl KnotFeedback {
-    /// Creates a knot of zeros with ndx states and nu controls.
+    /// Creates a feedback of zeros for a knot with ndx states and nu controls.
     pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
         Self {
             K: DMatrix::zeros(nu, ndx),
@@ -44,8 +44,8 @@ impl KnotFeedback {
     }
 }
 
-/// Computation of gains, with its scratch. Its input is [L; X; yᵀ], the eliminated columns of the unknowns w, and the
-/// controls δu = U (w, δx):
+/// Computation of gains, with scratch. It starts from [L; X; yᵀ], the eliminated columns of the unknowns w, and from
+/// the rows U of the controls δu = U (w, δx):
 ///
 /// ```text
 /// Y = U_w L⁻ᵀ,     K = U_x − Y Xᵀ,     k = −Y y
@@ -54,9 +54,9 @@ impl KnotFeedback {
 /// No other knot needs the gains, so a sweep on several threads leaves them to idle threads.
 #[derive(Debug, Clone)]
 pub(crate) struct Gains {
-    /// U over (w, δv, δq), and later [Y K], with padding rows.
+    /// Matrix U with columns for (w, δv, δq), and later [Y K]; with padding rows.
     rows: Vec<f64>,
-    /// [L; X; yᵀ] of a knot whose gains were deferred, with padding rows.
+    /// Matrix [L; X; yᵀ] of a knot whose gains were deferred, with padding rows.
     left: Vec<f64>,
     /// Scratch of [`take_gains`].
     y: Vec<f64>,
@@ -68,7 +68,7 @@ impl Gains {
         Self { rows: vec![0.0; (m + SLACK) * (m + n)], left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
     }
 
-    /// Allocates the same scratch, with storage for deferred gains.
+    /// Allocates the scratch of [`new`](Self::new), and storage for deferred gains.
     pub(super) fn to_finish(n: usize, m: usize) -> Self {
         Self { left: vec![0.0; (m + n + 1 + SLACK) * m], ..Self::new(n, m) }
     }
@@ -107,8 +107,8 @@ impl Gains {
     }
 }
 
-/// Computes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from rows [Y K] over (w, δv, δq) and yᵀ. The length of `scratch`
-/// is twice the number of controls, plus padding.
+/// Computes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from yᵀ and from the rows [Y K], with columns for (w, δv, δq).
+/// The length of `scratch` is twice the number of controls, plus padding.
 pub(super) fn take_gains(
     rows: View<'_>,
     yt: View<'_>,

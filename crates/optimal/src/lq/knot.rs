@@ -50,7 +50,7 @@ pub struct LqKnot {
     pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
-/// Formats the fields that a user writes, without the scratch of the sweep.
+/// Formats the public fields, without the scratch of the sweep.
 impl fmt::Debug for LqKnot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, rows, structure, .. } = self;

@@ -1,4 +1,4 @@
-//! Linear-quadratic problem, which is all that a solver knows of a horizon, and the sweep that solves it.
+//! Linear-quadratic problem, the only form in which a solver sees a horizon, and the sweep that solves this problem.
 
 mod box_qp;
 mod conditional_value;

@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 /// lower ≤ C δx + D δu + c ≤ upper
 /// ```
 ///
-/// A row with equal bounds is an equation. Each row stores one run of consecutive columns of [C D], outside of which it
-/// is zero. A bound on one coordinate therefore takes one number. No memory is allocated before the first row.
+/// A row with equal bounds is an equation. Each row stores one run of consecutive columns of [C D]; its other entries
+/// are zero. A bound on one coordinate therefore takes one number. No memory is allocated before the first row.
 ///
 /// # Examples
 /// ```
@@ -29,14 +29,14 @@ use nalgebra::DMatrix;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ConstraintRows {
     rows: Vec<Row>,
-    /// Runs of all rows, one after the other.
+    /// Stored entries of all rows, one row after the other.
     numbers: Vec<f64>,
 }
 
 /// Row as it is stored.
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
-    /// First column of the run, and the end of its numbers.
+    /// First column of the run, and the end of the run in `numbers`.
     first: usize,
     end: usize,
     c: f64,
@@ -111,7 +111,7 @@ impl ConstraintRows {
         [C, D]
     }
 
-    /// Panics if a row does not end within some number of columns.
+    /// Panics if a row ends after the given number of columns.
     #[track_caller]
     pub(super) fn assert_columns(&self, columns: usize) {
         for (i, row) in self.iter().enumerate() {

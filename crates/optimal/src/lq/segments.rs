@@ -1,8 +1,8 @@
 //! Backward sweep in several segments of the horizon at the same time.
 //!
-//! To process S segments at a time, the horizon of N knots is cut into S + 1. A step of a conditional value function
-//! ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep. The last segment
-//! is therefore one and a half times as long as the others. The time, counted in steps of a sweep, is
+//! To process S segments at a time, the horizon of N knots is cut into S + 1 segments. A step of a conditional value
+//! function ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep. The
+//! last segment is therefore one and a half times as long as the others. The time, counted in steps of a sweep, is
 //! ```text
 //! segment            0      1 … S − 1     S
 //! at the same time          conditional   sweep         1½ N / (S + 1½)
@@ -14,9 +14,9 @@
 //! therefore the same to the last bit for any number of threads.
 //!
 //! A link loses digits if C and the value function are large, which happens where controls cost next to nothing. At the
-//! end, the value function with which a segment was swept is therefore compared with the one that the sweep of the next
-//! segment computed at the same knot. If they differ by more than rounding, or if anything failed before, the horizon
-//! is swept again as one.
+//! end, two value functions at each cut are therefore compared: the one from which a segment was swept, and the one
+//! that the sweep of the next segment computed. If they differ by more than rounding, or if anything failed before, the
+//! whole horizon is swept again as one segment.
 #![allow(non_snake_case)] // the names of the literature
 
 use super::conditional_value::{Link, SegmentValue, Value};
@@ -27,8 +27,9 @@ use super::step::{Step, SweepError, SweepOptions};
 use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
-/// Largest accepted difference between the value function with which a segment was swept and the one computed in the
-/// next segment, relative to the largest entry. Chosen as the accuracy of a sweep; robots show a thousandth of it.
+/// Largest accepted difference of two value functions at a cut: the one from which a segment was swept, and the one
+/// that the sweep of the next segment computed. The difference is relative to the largest entry. Chosen as the accuracy
+/// of a sweep; for robots the differences are a thousandth of it.
 const CONSISTENT: f64 = 1e-9;
 
 /// Segments of a horizon.
@@ -45,7 +46,7 @@ struct Segment {
     /// Knots of the segment.
     knots: Range<usize>,
     step: Step,
-    /// Conditional value function, together with the P and p of the step.
+    /// Terms Θ, θ and C of the conditional value function; P and p are in `step`.
     value: SegmentValue,
     /// Value function at the knot after the segment.
     end: Value,
@@ -57,7 +58,7 @@ struct Segment {
 
 impl Segments {
     /// Creates the segments for processing `at_once` of them at a time, in a horizon of `horizon` knots with the sizes
-    /// `sizes`. Returns `None` if `at_once` is one or the horizon too short for two.
+    /// `sizes`. Returns `None` if `at_once` is one, or if the horizon is too short for two segments.
     pub(super) fn new(at_once: usize, horizon: usize, sizes: Sizes) -> Option<Self> {
         let at_once = at_once.min(horizon.saturating_sub(2));
         if at_once < 2 {
@@ -75,13 +76,13 @@ impl Segments {
         Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(sizes.n) })
     }
 
-    /// Returns whether a segment may contain a knot. It may not if controls are bounded, since the value function is
-    /// then not quadratic in a multiplier. A knot with constraint rows is left to the sweep as one.
+    /// Returns whether a segment may contain a knot. A knot with bounded controls is excluded, since its value function
+    /// is not quadratic in a multiplier. A knot with constraint rows is left to the sweep in one segment.
     fn serve(knot: &LqKnot) -> bool {
         !knot.is_bounded() && knot.rows.is_empty()
     }
 
-    /// Sweeps the horizon; returns `None` if it must be swept as one.
+    /// Sweeps the horizon in segments; returns `None` if it must be swept as one segment.
     pub(crate) fn run(
         &mut self,
         knots: &[LqKnot],
@@ -141,7 +142,7 @@ impl Value {
     }
 }
 
-/// Pass of a task over a segment.
+/// Pass over the segments.
 #[derive(Clone, Copy)]
 enum Pass {
     /// Sweep of the last segment, and conditional value function of the others.
@@ -150,7 +151,7 @@ enum Pass {
     Finish,
 }
 
-/// Task that is done for each of some segments.
+/// Pass with its inputs, carried out for each segment of a slice.
 #[derive(Clone, Copy)]
 struct SegmentTask<'a> {
     pass: Pass,
@@ -162,12 +163,12 @@ struct SegmentTask<'a> {
 }
 
 impl SegmentTask<'_> {
-    /// Does the task for some of the segments, given the feedback of all knots.
+    /// Does the task for each of `segments`; `feedback` contains the feedback of all knots.
     fn over(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         self.run(segments, &mut feedback[segments[0].knots.start..]);
     }
 
-    /// Does the task for consecutive segments; `feedback` begins with the first knot of the first segment.
+    /// Does the task for consecutive segments; `feedback` begins at the first knot of the first segment.
     fn run(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         if let [segment] = segments {
             return self.run_one(segment, feedback);
@@ -182,7 +183,7 @@ impl SegmentTask<'_> {
         }
     }
 
-    /// Does the task for one segment, given the feedback of its knots.
+    /// Does the task for one segment; `feedback` begins at the first knot of the segment.
     fn run_one(self, segment: &mut Segment, feedback: &mut [KnotFeedback]) {
         let Self { pass, knots, regularisation, .. } = self;
         let Segment { knots: range, step, value, end, result, good } = segment;

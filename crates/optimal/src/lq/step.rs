@@ -46,7 +46,7 @@ pub(super) struct SweepOptions<'a> {
 }
 
 impl SweepOptions<'_> {
-    /// Returns the options for linear dynamics, with gains that are written at once.
+    /// Returns the options for linear dynamics, with gains that are not deferred.
     pub(super) fn linear(regularisation: f64) -> Self {
         Self { regularisation, defers_gains: false, curvature: None }
     }
@@ -77,7 +77,7 @@ impl Step {
         }
     }
 
-    /// Sweeps the end of a horizon. The first knot is knot `first`, and the last knot is the terminal one.
+    /// Sweeps `knots`, which begin with knot `first` and end with the terminal knot.
     pub(super) fn run(
         &mut self,
         first: usize,
@@ -92,7 +92,7 @@ impl Step {
         self.back(first, &knots[..last], feedback, options)
     }
 
-    /// Makes the steps at `knots`, whose first is knot `first`, from P, p of the knot after them.
+    /// Makes the steps at `knots`, which begin with knot `first`, from P and p of the knot after the last of them.
     pub(super) fn back(
         &mut self,
         first: usize,
@@ -132,8 +132,8 @@ impl Step {
         Ok(())
     }
 
-    /// Writes H of a knot, and below it the product of Θ and the map to δx⁺. Returns the workspace that contains it,
-    /// and the rotation of the states there.
+    /// Writes H of a knot, and below H the product of Θ and the map to δx⁺. Returns the workspace that contains H, and
+    /// the rotation of the states in H.
     pub(super) fn write_with_rows_below(
         &mut self,
         knot: &LqKnot,

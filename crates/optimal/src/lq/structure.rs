@@ -1,4 +1,4 @@
-//! Structure of a knot's dynamics, which a sweep may exploit: blocks of A and B, or equations instead of them.
+//! Structure of a knot's dynamics, which a sweep may exploit: blocks of A and B, or equations that replace A and B.
 #![allow(non_snake_case)] // A, B, T, E
 
 use condyle_linalg::{SLACK, SparseRows};
@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Maximum number of rows of a block, needed by a free joint.
 pub(crate) const LARGEST_BLOCK: usize = 6;
 
-/// Structure of the A and B of an [`LqKnot`](crate::LqKnot).
+/// Structure of the matrices A and B of an [`LqKnot`](crate::LqKnot).
 ///
 /// The structure is unknown unless the action sets it, each time that it differentiates. Let x = (q, v), with nv
 /// numbers each for a change of q and of v. The next state follows by semi-implicit Euler from an acceleration a(x, u):
@@ -19,10 +19,11 @@ pub(crate) const LARGEST_BLOCK: usize = 6;
 /// ```
 ///
 /// where A_v, B_v are the last nv rows of A and B. T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ at δ = v⁺ Δt are the identity,
-/// except for one block per joint whose configurations are not a vector space. A sweep that knows this multiplies only
-/// by A_v and B_v, with half the operations.
+/// except for one block per joint whose configurations are not a vector space. A sweep that knows the structure
+/// multiplies only by A_v and B_v, with half the operations.
 ///
-/// A and B must nevertheless contain all of their entries. The structure is a promise about them, which is not checked.
+/// A and B must nevertheless contain all of their entries. The structure is a promise about A and B, which is not
+/// checked.
 ///
 /// # Examples
 /// ```
@@ -70,9 +71,9 @@ impl DynamicsStructure {
         self.inverse_dynamics
     }
 
-    /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for a block
-    /// over each range of at most six rows and columns. Returns the blocks, which the caller must write. Allocates them
-    /// at the first call.
+    /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for one block
+    /// over each of `ranges`, at most six rows and columns each. Returns the blocks, which the caller must write.
+    /// Allocates the blocks at the first call.
     pub fn set_euler(&mut self, dt: f64, ranges: &[Range<usize>]) -> &mut [EulerBlock] {
         self.dt = Some(dt);
         let fits = |(block, range): (&EulerBlock, &Range<usize>)| block.range() == *range;
@@ -99,25 +100,26 @@ impl EulerBlock {
     }
 }
 
-/// Rows of a knot over (w, δv, δq); see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the block of
-/// `Q` for δq are taken from the knot; its `A`, `B`, `S` and `R` are not used.
+/// Equations of inverse dynamics at a knot, as rows with columns for (w, δv, δq); see
+/// [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the block of `Q` for δq are taken from the knot;
+/// its `A`, `B`, `S` and `R` are not used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
     /// Distance between consecutive rows, the same for all rows.
     pub(crate) stride: usize,
-    /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, and the number of both.
+    /// Runs of consecutive coordinates that are unknowns: [first coordinate, first unknown, number of coordinates].
     pub(crate) own: Vec<[usize; 3]>,
-    /// Other coordinates, in ascending order.
+    /// Coordinates that are not unknowns, in ascending order.
     pub(crate) dependent: Vec<usize>,
-    /// U: δu = U (w, δv, δq). Its masks are not written, because not every form reads them.
+    /// Matrix U of δu = U (w, δv, δq). Its masks are not written, because not every form reads masks.
     pub(crate) efforts: SparseRows,
-    /// D, one row for each dependent coordinate.
+    /// Matrix D, with one row for each dependent coordinate.
     pub(crate) steps: SparseRows,
-    /// G: the gradients of residuals that depend on more than δq.
+    /// Matrix G: the gradients of residuals that depend on more than δq.
     pub(crate) costs: SparseRows,
-    /// a′ and a″, first and second derivative of the cost with respect to each of these residuals.
+    /// First and second derivative of the cost, a′ and a″, with respect to each residual of `costs`.
     pub(crate) slopes: Vec<[f64; 2]>,
-    /// Diagonals of Q for δv and of R, one after the other.
+    /// Diagonal of Q for δv, followed by the diagonal of R.
     pub(crate) diagonal: Vec<f64>,
 }
 
@@ -135,7 +137,7 @@ impl InverseDynamicsForm {
         }
     }
 
-    /// Takes U and D out while G is being written.
+    /// Moves U and D out, into the returned form, while G is being written.
     pub(crate) fn lend(&mut self) -> Self {
         let stride = self.stride;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
@@ -143,7 +145,7 @@ impl InverseDynamicsForm {
         core::mem::replace(self, Self { stride, costs, slopes, diagonal, ..Self::default() })
     }
 
-    /// Puts back the parts that [`lend`](Self::lend) took out.
+    /// Puts back U and D, which [`lend`](Self::lend) moved out.
     pub(crate) fn take_back(&mut self, lent: Self) {
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
         let diagonal = core::mem::take(&mut self.diagonal);

@@ -64,7 +64,7 @@ use condyle_dynamics::level::level;
 pub struct Sweep {
     feedback: Vec<KnotFeedback>,
     step: Step,
-    /// Number of segments that was requested, and their workspaces, unless the number is one.
+    /// Requested number of segments, and the workspaces of the segments if the number is above one.
     at_once: usize,
     segments: Option<Segments>,
     /// Scratch for deferred gains, one for each thread: see [`follow`](Self::follow).
@@ -94,25 +94,25 @@ impl Sweep {
         Self { feedback, step, at_once: 1, segments: None, gains: Vec::new(), sizes }
     }
 
-    /// Sets the number of segments of the horizon that [`run`](Self::run) processes at the same time. It uses the
-    /// threads of the rayon pool in which it is called, or else of the global pool. The result is the same up to
-    /// rounding, and to the last bit for any number of threads. With 1, the default, it never leaves the caller's
-    /// thread.
+    /// Sets the number of segments of the horizon that [`run`](Self::run) processes at the same time. `run` uses the
+    /// threads of the rayon pool in which it is called, or else of the global pool. The number of segments changes the
+    /// result only by rounding; the number of threads does not change it at all. With 1 segment, the default, `run`
+    /// stays on the caller's thread.
     ///
-    /// S segments on S cores take at least the time of 2½ N / (S + 1½) + 1.8 (S − 1) of the N steps of a sweep as one;
-    /// beyond S = √N this no longer falls. The following upper limits of the speed-up come from measured parts
-    /// (`benches/riccati.rs`), for N = 100 and (ndx, nu) = (76, 32) / (36, 12) / (14, 7). They are 1.4 / 1.4 / 1.4 with
-    /// S = 2, 1.9 / 2.0 / 2.0 with S = 4 and 2.5 / 2.6 / 2.8 with S = 8. They exclude the time in which threads
-    /// synchronise. In solves on two cores, S = 2 was faster by 1.25 for a humanoid (5.3 ms per sweep), as fast for a
-    /// quadruped (0.9 ms), and slower for an arm (0.14 ms). On one core S segments are slower than one, by 1.3 to 3
-    /// times.
+    /// S segments on S cores take at least as long as 2½ N / (S + 1½) + 1.8 (S − 1) steps of a sweep; one segment takes
+    /// N steps. Beyond S = √N this time no longer falls. The following upper limits of the speed-up come from measured
+    /// times of the steps (`benches/riccati.rs`), for N = 100 and (ndx, nu) = (76, 32) / (36, 12) / (14, 7). They are
+    /// 1.4 / 1.4 / 1.4 with S = 2, 1.9 / 2.0 / 2.0 with S = 4 and 2.5 / 2.6 / 2.8 with S = 8. They exclude the time in
+    /// which threads synchronise. Measured on two cores, a solve with S = 2 was 1.25 times as fast as with S = 1 for a
+    /// humanoid (5.3 ms per sweep). It was as fast for a quadruped (0.9 ms), and slower for an arm (0.14 ms). On one
+    /// core, S segments take 1.3 to 3 times as long as one.
     ///
-    /// A sweep with bounds on controls or with curvature of the dynamics is nevertheless done as one. If segments lose
-    /// too many digits or have no minimum of their own, the sweep is repeated as one. To avoid this repetition, R must
-    /// be positive definite by itself.
+    /// A sweep with bounds on controls or with curvature of the dynamics nevertheless uses one segment. If segments
+    /// lose too many digits, or a segment by itself has no minimum, the sweep is repeated in one segment. To avoid this
+    /// repetition, R must be positive definite by itself.
     ///
     /// Sources: Särkkä and García-Fernández, 2023; Jallet, Dantec, Arlaud, Mansard, Carpentier, RSS 2024. Allocates if
-    /// the number has changed. `run` does not allocate, except by rayon itself.
+    /// the number of segments has changed. `run` does not allocate, except by rayon itself.
     ///
     /// # Panics
     /// If `segments` is 0.
@@ -164,7 +164,7 @@ impl Sweep {
 
     /// Sweeps as [`run`](Self::run) does, for dynamics with curvature. At each knot `curvature(t, λ, hessian)` is
     /// called for the second derivatives of λᵀ φₜ, where λ = Vx⁺ + Vxx⁺ f is the gradient of the value function at the
-    /// predicted state. It returns whether it wrote them.
+    /// predicted state. `curvature` returns whether it wrote the derivatives.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -183,14 +183,13 @@ impl Sweep {
         self.step.run(0, knots, &mut self.feedback, &mut options)
     }
 
-    /// Returns whether the sweep can proceed from knot to knot while they are computed; it cannot if it is cut into
-    /// segments.
+    /// Returns whether the sweep can process knots before all knots are computed; a sweep in several segments cannot.
     pub(crate) fn is_sequential(&self) -> bool {
         self.segments.is_none()
     }
 
-    /// Begins a sweep that receives the knots while they are computed, and defers their gains. Returns it, the feedback
-    /// that it writes, and scratch for `threads` threads that compute deferred gains.
+    /// Begins a sweep that receives the knots while they are computed, and defers their gains. Returns the sweep, the
+    /// feedback that it writes, and scratch for `threads` threads that compute deferred gains.
     pub(crate) fn follow(&mut self, threads: usize) -> (FollowingSweep<'_>, &mut [KnotFeedback], &mut [Gains]) {
         let Self { feedback, step, gains, sizes, .. } = self;
         gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.deferred_controls()));

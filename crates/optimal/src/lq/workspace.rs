@@ -9,16 +9,16 @@ use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetri
 /// are column-major with padding rows. P has the stride n + SLACK; the others have the stride [`stride`](Self::stride).
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
-    /// Vxx⁺, symmetric and full.
+    /// Hessian Vxx⁺ of the value function, symmetric and full.
     pub(crate) P: Vec<f64>,
-    /// Vx⁺, and later Vx⁺ + Vxx⁺ f.
+    /// Gradient Vx⁺ of the value function, and later Vx⁺ + Vxx⁺ f.
     pub(crate) p: Vec<f64>,
-    /// [B A]ᵀ, or the same of their last rows, in the order of the columns of H.
+    /// Matrix [B A]ᵀ, or the transpose of the last rows of [B A], in the order of the columns of H.
     pub(crate) F: Vec<f64>,
     /// Product of P with [B A], transposed, and similar products.
     pub(crate) W: Vec<f64>,
-    /// Lower triangle of the quadratic form [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ]. The rows below it are used by a segment, or hold
-    /// the map from the unknowns and δx to the controls.
+    /// Lower triangle of the quadratic form [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ]. Additional rows below it are used by a segment,
+    /// or hold the map from the unknowns and δx to the controls.
     pub(crate) H: Vec<f64>,
     /// Number of rows below the quadratic form.
     below: usize,
@@ -43,7 +43,7 @@ impl Workspace {
         m + self.p.len() + 1 + self.below + SLACK
     }
 
-    /// Sets P, p = Q, q of the terminal knot.
+    /// Sets P = Q and p = q, from the terminal knot.
     pub(crate) fn start(&mut self, knot: &LqKnot) {
         let n = knot.ndx();
         self.p.copy_from_slice(knot.q.as_slice());
@@ -57,8 +57,8 @@ impl Workspace {
         }
     }
 
-    /// Sets P, p = Vxx, Vx from H (stride `ld`), whose first `eliminated` columns are eliminated and whose states are
-    /// rotated by `turn`.
+    /// Sets P = Vxx and p = Vx from H, with stride `ld`. The first `eliminated` columns of H are eliminated, and the
+    /// states of H are rotated by `turn`.
     pub(crate) fn take_value(&mut self, ld: usize, eliminated: usize, turn: usize) {
         let Self { P, p, H, .. } = self;
         let n = p.len();
@@ -74,7 +74,7 @@ impl Workspace {
         }
     }
 
-    /// Adds ϱ 1 to P. Writes p to the feedback, and P if `keep` is set. Returns whether they are finite and have not
+    /// Adds ϱ 1 to P. Writes p to the feedback, and P if `keep` is set. Returns whether P and p are finite and have not
     /// diverged.
     pub(crate) fn finish_value(&mut self, feedback: &mut KnotFeedback, regularisation: f64, keep: bool) -> bool {
         let Self { P, p, .. } = self;

@@ -2,7 +2,7 @@
 
 use super::action::ActionModel;
 
-/// Actions of all knots: a problem's own, or copies of them.
+/// Actions of all knots, used by one thread: the actions of the problem, or copies of them.
 pub(crate) struct ActionView<'a> {
     /// Initial state x̂₀.
     pub(super) x0: &'a [f64],
@@ -20,7 +20,7 @@ pub(super) enum Actions<'a> {
     Copied(&'a mut [Option<Box<dyn ActionModel>>]),
 }
 
-/// Message for a violated condition that [`Problem::two`](super::Problem::two) and the users of copies guarantee.
+/// Message for a violated guarantee of [`Problem::two`](super::Problem::two) and of the users of copies.
 const COPIED: &str = "copies serve the knots before the terminal one";
 
 impl ActionView<'_> {
@@ -39,7 +39,7 @@ impl ActionView<'_> {
         }
     }
 
-    /// Returns the action of knot t, for computing.
+    /// Returns the action of knot t, mutable for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         let place = self.knot_models.get(t).map(|model| self.places[*model][0]);
         match (&mut self.actions, place) {

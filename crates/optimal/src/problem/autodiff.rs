@@ -28,7 +28,7 @@ pub trait GenericAction: Any + Send + Sync {
         None
     }
 
-    /// Returns a copy that computes the same, as [`ActionModel::try_clone`] does; `None` by default.
+    /// Returns a copy that computes the same results, as [`ActionModel::try_clone`] does; `None` by default.
     fn try_clone(&self) -> Option<Self>
     where
         Self: Sized,
@@ -39,14 +39,14 @@ pub trait GenericAction: Any + Send + Sync {
     /// Computes x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
     fn calc<S: Scalar>(&mut self, t: usize, x: &[S], u: &[S], next: &mut [S]) -> S;
 
-    /// Computes x ⊕ δx into `out` (nx), by default the sum of a vector space.
+    /// Computes x ⊕ δx into `out` (nx). The default is the sum x + δx, for states in a vector space.
     fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
         for ((out, &x), &dx) in out.iter_mut().zip(x).zip(dx) {
             *out = x + dx;
         }
     }
 
-    /// Computes x₁ ⊖ x₀ into `out` (ndx), by default the difference of a vector space.
+    /// Computes x₁ ⊖ x₀ into `out` (ndx). The default is x₁ − x₀, for states in a vector space.
     fn difference<S: Scalar>(&self, x0: &[S], x1: &[S], out: &mut [S]) {
         for ((out, &x0), &x1) in out.iter_mut().zip(x0).zip(x1) {
             *out = x1 - x0;
@@ -54,18 +54,18 @@ pub trait GenericAction: Any + Send + Sync {
     }
 }
 
-/// Action with exact first and second derivatives: [`GenericAction::calc`] is differentiated by num-dual's hyper-dual
-/// numbers,
+/// Action with exact first and second derivatives of a [`GenericAction`]. Its function [`calc`](GenericAction::calc) is
+/// differentiated by num-dual's hyper-dual numbers,
 ///
 /// ```text
 /// f(z + ε₁eᵢ + ε₂eⱼ) = f + ε₁ ∂f/∂zᵢ + ε₂ ∂f/∂zⱼ + ε₁ε₂ ∂²f/∂zᵢ∂zⱼ
 /// ```
 ///
-/// with z = (δx, δu) along ⊕. The cost is n (n + 1) / 2 calls for n = ndx + nu, each about ten times as slow as a call
-/// with plain numbers. It is meant for knots of few states, and for first versions. The Hessian of ℓ is the exact one,
-/// not the Gauss–Newton approximation. The curvature of the dynamics ([`second_order`](crate::Settings::second_order))
-/// is exact too. Allocates only if `calc` does. Source: Fike and Alonso, *The development of hyper-dual numbers for
-/// exact second-derivative calculations* (2011).
+/// with z = (δx, δu) along ⊕. With n = ndx + nu, the cost is n (n + 1) / 2 calls, each about ten times as slow as a
+/// call with plain numbers. It is meant for knots of few states, and for first versions. The Hessian of ℓ is the exact
+/// one, not the Gauss–Newton approximation. The curvature of the dynamics
+/// ([`second_order`](crate::Settings::second_order)) is exact too. Allocates only if `calc` does. Source: Fike and
+/// Alonso, *The development of hyper-dual numbers for exact second-derivative calculations* (2011).
 ///
 /// # Examples
 /// ```
@@ -106,7 +106,7 @@ pub struct AutoDiff<A> {
 }
 
 impl<A: GenericAction> AutoDiff<A> {
-    /// Creates the action of `action`.
+    /// Creates an action that differentiates `action`.
     pub fn new(action: A) -> Self {
         let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
         let zeros = |n| vec![HyperDual64::from(0.0); n];
@@ -122,12 +122,12 @@ impl<A: GenericAction> AutoDiff<A> {
         }
     }
 
-    /// Returns the differentiated action, for changes.
+    /// Returns the differentiated action, so that it can be changed.
     pub fn action_mut(&mut self) -> &mut A {
         &mut self.action
     }
 
-    /// Computes φ(x, u), the reference point of all changes.
+    /// Computes φ(x, u), from which all changes of the next state are measured.
     #[track_caller]
     fn start(&mut self, t: usize, x: &[f64], u: &[f64]) {
         assert_length("x", x.len(), self.x.len());
@@ -135,7 +135,7 @@ impl<A: GenericAction> AutoDiff<A> {
         let lift = |to: &mut [HyperDual64], from: &[f64]| (0..to.len()).for_each(|k| to[k] = from[k].into());
         lift(&mut self.x, x);
         lift(&mut self.u, u);
-        lift(&mut self.centre, x); // a terminal action does not write it
+        lift(&mut self.centre, x); // a terminal action does not write the next state
         lift(&mut self.next, x);
         self.dx.fill(0.0.into());
         self.action.calc(t, &self.x, &self.u, &mut self.centre);

@@ -9,16 +9,16 @@ use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
 
-/// Action with constraints. The following term is added to its cost, with the multipliers y and the penalty 1/μ chosen
-/// by [`AugmentedLagrangian`](crate::AugmentedLagrangian):
+/// Action with constraints lower ≤ g(x, u) ≤ upper. The following term is added to its cost, with the multipliers y and
+/// the penalty 1/μ chosen by [`AugmentedLagrangian`](crate::AugmentedLagrangian):
 ///
 /// ```text
 /// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: into the bounds
 /// ```
 ///
 /// The Hessian of the term is the Gauss–Newton approximation. For a solver without constraints, the term is an ordinary
-/// cost for leaving the bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes the dynamics
-/// once for cost and constraints.
+/// cost of values outside the bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes the
+/// dynamics once for cost and constraints.
 pub struct Constrained {
     action: Box<dyn ActionModel>,
     constraint: Box<dyn PathConstraint>,
@@ -32,7 +32,7 @@ pub struct Constrained {
 }
 
 impl Constrained {
-    /// Adds `constraint` to `action`, at all knots that the action serves.
+    /// Creates `action` with `constraint` at all knots that the action serves.
     pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn PathConstraint>) -> Self {
         let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
         let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
@@ -52,15 +52,15 @@ impl Constrained {
         constraint.downcast_mut()
     }
 
-    /// Computes the term of the cost.
+    /// Computes the term that the constraints add to the cost.
     fn term(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         self.constraint.calc(t, x, u, &mut self.g);
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.value(t, 0, &self.g, lower, upper)
     }
 
-    /// Adds the gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, …. Here d and D are the
-    /// term's first and second derivatives with respect to g.
+    /// Adds the gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, and likewise r, R and S.
+    /// Here d and D are the term's first and second derivatives with respect to g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
@@ -188,7 +188,7 @@ impl KnotGroup for Constrained {
         lanes(&mut *self.action)
     }
 
-    /// Evaluates the action, and adds the term of each knot.
+    /// Evaluates the action, and adds the constraints' term of each knot.
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
         let (nx, nu) = (self.nx(), self.nu());

@@ -14,18 +14,18 @@ use core::ops::Range;
 /// the knots.
 ///
 /// A **group** consists of consecutive knots of the horizon, or of the trials of a line search at one knot. Each knot
-/// of a group is given by its index t in the horizon. States and controls are stored one after the other, and so are
-/// the states that are written.
+/// of a group is given by its index t in the horizon. States and controls are stored one knot after the other, and so
+/// are the next states.
 pub trait GroupModel: ActionModel {
-    /// Returns the number of states that a group call computes at the cost of one; 1 unless it uses vector lanes.
+    /// Returns the number of states that a group call computes in the time of one state; 1 unless it uses vector lanes.
     ///
     /// A line search tries this number of step lengths side by side.
     fn lanes(&self) -> usize {
         1
     }
 
-    /// Returns whether `other` computes the same as this action, so that the knots of both form one group. Only `self`
-    /// is then used. By default false.
+    /// Returns whether `other` computes the same results as this action, so that the knots of both form one group. Only
+    /// `self` is then used. By default false.
     fn is_same(&self, other: &dyn ActionModel) -> bool {
         let _ = other;
         false
@@ -54,17 +54,18 @@ pub trait GroupModel: ActionModel {
 /// Quantities that a group computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Evaluation<'m> {
-    /// Next states and costs, and the motions that lead there if the results keep them.
+    /// Next states and costs, and the motions (accelerations and forces) if the results store them.
     Values,
     /// Derivatives of dynamics and costs.
     Derivatives,
     /// Derivatives, with the dynamics as equations of inverse dynamics where a knot supports that. They are taken at
-    /// the motions (accelerations and forces) of the group, in equal parts. If no motions are given, they are computed.
+    /// the given motions (accelerations and forces), which have equal length at each knot. If no motions are given,
+    /// they are computed.
     Equations(&'m [f64]),
 }
 
 impl Evaluation<'_> {
-    /// Returns the evaluation of some of `count` knots.
+    /// Returns the evaluation of the knots `knots` of a group of `count` knots.
     pub(crate) fn part(self, knots: Range<usize>, count: usize) -> Self {
         match self {
             Self::Equations(motions) => {
@@ -76,14 +77,15 @@ impl Evaluation<'_> {
     }
 }
 
-/// Results of a group. An evaluation writes either the first three, or the last one.
+/// Outputs of a group evaluation. It writes either the first three fields, or the last one.
 #[derive(Debug)]
 pub struct Results<'a> {
     /// Next states, one after the other.
     pub(crate) next: &'a mut [f64],
     /// Costs.
     pub(crate) costs: &'a mut [f64],
-    /// Accelerations and forces, at the beginning of one equal part per knot; empty if they are not kept.
+    /// Accelerations and forces. Each knot has an equal share, and uses the beginning of it; empty if they are not
+    /// stored.
     pub(crate) motions: &'a mut [f64],
     /// LQ knots with the derivatives.
     pub(crate) lq_knots: &'a mut [LqKnot],
@@ -106,7 +108,7 @@ impl<'a> Results<'a> {
 ///
 /// One group may represent several models of a robot that differ only in costs, limits and durations.
 pub trait KnotGroup {
-    /// Returns the number of states that are computed at the cost of one.
+    /// Returns the number of states that are computed in the time of one state.
     fn lanes(&mut self) -> usize;
 
     /// Evaluates knot `knots[i]` at the i-th state of `xs` and the i-th control of `us`, for all i.
@@ -117,23 +119,23 @@ pub trait KnotGroup {
     /// order.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>);
 
-    /// Returns the number of accelerations and forces of a knot from which its equations of inverse dynamics start, and
-    /// the maximum numbers of dependent coordinates and of rows of costs. `None` without such equations.
+    /// Returns the number of accelerations and forces at which the equations of inverse dynamics of a knot are taken.
+    /// Also returns the maximum numbers of dependent coordinates and of rows of costs. `None` without such equations.
     fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         None
     }
 
-    /// Allocates the workspace, unless it exists.
+    /// Allocates the workspace, unless it is already allocated.
     fn reserve(&mut self) {}
 
-    /// Takes over the model of another action of the same kind, as model `place` or as a new model. Returns whether it
-    /// did so; the other action is then unused.
+    /// Takes over the model of another action of the same kind, as model `place` or as a new model. Returns whether
+    /// this succeeded; the other action is then unused.
     fn merge(&mut self, other: &mut dyn ActionModel, place: Option<usize>) -> bool {
         let _ = (other, place);
         false
     }
 
-    /// Selects, among the models that this action represents, the one that is to be changed.
+    /// Selects the model to be changed, among the models that this action represents.
     fn choose(&mut self, model: usize) {
         let _ = model;
     }
@@ -143,18 +145,18 @@ pub trait KnotGroup {
         let _ = (t, horizon, model);
     }
 
-    /// Sets the duration (s) of knot t of the chosen model; returns whether the knot has one.
+    /// Sets the duration (s) of knot t of the selected model; returns whether the knot has a duration.
     fn set_duration(&mut self, t: usize, dt: f64) -> bool {
         let _ = (t, dt);
         false
     }
 
-    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute besides the next state.
+    /// Passes to `show` the vectors that the dynamics of knot t compute besides the next state, each with its name.
     fn show_outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         let _ = (t, x, u, show);
     }
 
-    /// Returns the dynamics of the knots, whose type their module knows.
+    /// Returns the dynamics of the knots; the module of the group knows their type.
     fn dynamics(&mut self) -> Option<&mut dyn Any> {
         None
     }
@@ -182,7 +184,7 @@ pub(crate) fn evaluate(
     }
 }
 
-/// Returns the number of states that an action computes at the cost of one.
+/// Returns the number of states that an action computes in the time of one state.
 pub(crate) fn lanes(action: &mut dyn ActionModel) -> usize {
     let lanes = match action.knot_group_mut() {
         Some(group) => group.lanes(),
@@ -191,7 +193,7 @@ pub(crate) fn lanes(action: &mut dyn ActionModel) -> usize {
     lanes.max(1)
 }
 
-/// Returns the group that an action is, or the group of the innermost action that it wraps.
+/// Returns the innermost wrapped action as a group of knots, or the action itself if it wraps none.
 pub(crate) fn innermost(action: &mut dyn ActionModel) -> Option<&mut dyn KnotGroup> {
     if action.inner_mut().is_some() {
         return innermost(action.inner_mut()?);

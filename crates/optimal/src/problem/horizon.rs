@@ -22,8 +22,8 @@ use std::ops::{ControlFlow, Range};
 /// one action per knot costs no more than one action for all knots. All models share nx and ndx; nu may differ from
 /// model to model.
 ///
-/// Trajectories are flat: `xs` is x₀ … x_N one after the other, (N + 1)·nx numbers; `us` is u₀ … u_{N−1}, each with
-/// the nu of its knot.
+/// Trajectories are flat: `xs` contains x₀ … x_N one after the other, (N + 1)·nx numbers. `us` contains u₀ … u_{N−1},
+/// each with the nu of its knot.
 ///
 /// # Examples
 /// ```
@@ -61,7 +61,7 @@ pub struct Problem {
     shape: Shape,
     /// Maximal runs of knots with one action: (action, knots).
     runs: Vec<(usize, Range<usize>)>,
-    /// 0, 1, …, N; the knots of a group are a slice of it.
+    /// Indices 0, 1, …, N; the knots of a group are a slice of this vector.
     knots: Vec<usize>,
     /// Copies of the models, for other threads.
     copies: Copies,
@@ -70,8 +70,8 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Creates a problem that starts at x̂₀. Knot t is served by `models[knot_models[t]]`, t = 0 … N − 1, and the end by
-    /// `terminal`.
+    /// Creates a problem that starts at x̂₀. Knot t is served by `models[knot_models[t]]`, t = 0 … N − 1, and the
+    /// terminal knot by `terminal`.
     ///
     /// # Errors
     /// [`Error`] if
@@ -99,7 +99,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Computes the offsets of the controls and the runs of knots from the knot_models.
+    /// Computes the offsets of the controls, and the runs of knots with one action, from `knot_models`.
     fn arrange(&mut self) {
         let Self { models, knot_models, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
@@ -120,15 +120,15 @@ impl Problem {
     }
 
     /// Moves the horizon by one knot, as an MPC does after each step. Knot t becomes knot t − 1 and keeps the costs and
-    /// limits that belong to a robot's knot. The new last knot is served by the model `last`, with the costs that this
-    /// model has for all knots. The models are [notified](ActionModel::shift), and are assigned their knots by the new
-    /// indices. Allocates nothing.
+    /// limits that belong to this single knot. The new last knot is served by the model `last`, with the costs that
+    /// this model has for all knots. The models are [notified](ActionModel::shift), and are assigned their knots by the
+    /// new indices. Allocates nothing.
     ///
     /// [`Fddp::shift`](crate::Fddp::shift) moves the solver's trajectory accordingly.
     ///
     /// # Errors
-    /// [`Error::UnknownModel`] if the model does not exist, [`Error::NoNextState`] if it is only made for the end; the
-    /// problem is then unchanged.
+    /// [`Error::UnknownModel`] if the model does not exist, [`Error::NoNextState`] if the model is only made for the
+    /// terminal knot; the problem is then unchanged.
     pub fn shift(&mut self, last: usize) -> Result<(), Error> {
         let horizon = self.horizon();
         if last >= self.models.len() {
@@ -146,14 +146,14 @@ impl Problem {
     }
 
     /// Replaces the model of knot t, as an MPC does when a contact is made earlier than planned. The solver needs no
-    /// other changes, and its next iterations do not allocate. This function allocates; a model that was given to knot
-    /// t in the same way before is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
+    /// other changes, and its next iterations do not allocate. This function allocates. A model that an earlier call
+    /// gave to knot t is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
     ///
-    /// Costs and limits that the model has for a single knot count for that index.
+    /// Costs and limits that the model has for a single knot keep the index of that knot.
     ///
     /// # Errors
-    /// [`Error::Dimension`] if nx, ndx or nu differ from the old model's sizes, [`Error::NoNextState`] for a terminal
-    /// model; the problem is then unchanged.
+    /// [`Error::Dimension`] if nx, ndx or nu differ from the sizes of the old model, [`Error::NoNextState`] for a
+    /// terminal model; the problem is then unchanged.
     ///
     /// # Panics
     /// If t ≥ N.
@@ -221,7 +221,7 @@ impl Problem {
         self.shape.ndx
     }
 
-    /// Returns the number of controls of knot t; 0 for the terminal one, t = N.
+    /// Returns the number of controls of knot t; 0 for the terminal knot, t = N.
     ///
     /// # Panics
     /// If t > N.
@@ -249,7 +249,8 @@ impl Problem {
     /// Sets the initial state, as an MPC does before each solve.
     ///
     /// # Errors
-    /// [`Error`] if its length is not nx, an entry is not finite, or it is an invalid state; the old one is then kept.
+    /// [`Error`] if the length of `x0` is not nx, an entry is not finite, or the state is invalid; the old state is
+    /// then kept.
     pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
         Error::check("x0", x0, self.nx())?;
         self.terminal.check_state(x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
@@ -257,14 +258,15 @@ impl Problem {
         Ok(())
     }
 
-    /// Returns the action model `index` as a `T`, if it exists and has that type; for changing a reference between
-    /// solves. Its dimensions must not change. If one action represents several models, only this model is changed.
+    /// Returns the action model `index` as a `T`, if it exists and has that type, so that a reference can be changed
+    /// between solves. The dimensions of the model must not change. If one action represents several models, only this
+    /// model is changed.
     pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
         let model: &mut dyn Any = self.chosen(index)?;
         model.downcast_mut()
     }
 
-    /// Returns the action of model `index`, to change this model.
+    /// Returns the action that represents model `index`, with this model selected for changes.
     pub(crate) fn chosen(&mut self, index: usize) -> Option<&mut dyn ActionModel> {
         if index < self.models.len() {
             self.copies.forget(self.models.place(index)[0]);
@@ -283,7 +285,7 @@ impl Problem {
     /// A problem is not [`Clone`]: a user-defined action can be copied only if its
     /// [`try_clone`](ActionModel::try_clone) returns a copy. All actions of this crate can be copied, except
     /// [`NumDiff`](crate::NumDiff). [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied
-    /// if their parts can.
+    /// if the actions and constraints in them can.
     ///
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
@@ -292,7 +294,7 @@ impl Problem {
         let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
         let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
         reserve(&mut *terminal);
-        let mut runs = Vec::with_capacity(knot_models.len()); // capacity that a shift may need
+        let mut runs = Vec::with_capacity(knot_models.len()); // a shift may need this capacity
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
         Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread })
@@ -305,16 +307,16 @@ impl Problem {
     }
 
     /// Returns the states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates
-    /// them.
+    /// the states.
     ///
     /// # Errors
-    /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
+    /// [`Error`] if `us` has a wrong length or an entry that is not finite, or if a state becomes infinite.
     pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
         self.rollout_while(us, || ControlFlow::Continue(()))
     }
 
-    /// Computes as [`rollout`](Self::rollout) does, and calls `go_on` at each knot, which returns whether to continue.
-    /// The states of knots that were not reached are zeros.
+    /// Computes as [`rollout`](Self::rollout) does. At each knot, calls `go_on`, which returns whether to continue. The
+    /// states of knots that were not reached are zeros.
     ///
     /// # Errors
     /// As [`rollout`](Self::rollout).
@@ -345,8 +347,8 @@ impl Problem {
         self.calc_with_motions(xs, us, next, costs, &mut []);
     }
 
-    /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`: N equal parts, which
-    /// are empty or have [`motion_size`](Self::motion_size) numbers.
+    /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`. This consists of N
+    /// equal parts, which are empty or have [`motion_size`](Self::motion_size) numbers each.
     #[track_caller]
     pub(crate) fn calc_with_motions(
         &mut self,
@@ -428,12 +430,12 @@ impl Problem {
         copies.calc_diff(models, runs, all, lq_knots, found, gains, sweep);
     }
 
-    /// Copies the multipliers of models to the copies that other threads use.
+    /// Copies the multipliers of the models into the copies of the models that other threads use.
     pub(crate) fn share_multipliers(&mut self) {
         self.copies.share_multipliers(&mut self.models.actions, &self.runs);
     }
 
-    /// Checks the lengths, and resets the structures of A and B, which the actions set.
+    /// Checks the lengths, and resets the structures of A and B, which the actions set again.
     #[track_caller]
     fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         self.assert_trajectory(xs, us);
@@ -444,8 +446,8 @@ impl Problem {
         }
     }
 
-    /// Computes for each knot by itself the controls that hold its state still, as far as that is possible: see
-    /// [`quasi_static`](ActionModel::quasi_static). Allocates.
+    /// Returns for each knot the controls that hold its state still, as far as that is possible: see
+    /// [`quasi_static`](ActionModel::quasi_static). Each knot is treated alone. Allocates.
     ///
     /// # Errors
     /// [`Error`] if the length of `xs` is not (N + 1)·nx, or an entry is not finite.
@@ -474,8 +476,8 @@ impl Problem {
 
     /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute at (x, u) besides the next
     /// state. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of each
-    /// contact. A contact's force is expressed in the axes of its rows; at an impact it is an impulse. User-defined
-    /// accelerations have `acceleration`; other actions have no such vectors.
+    /// contact. The force of a contact is expressed in the axes of the contact's rows; at an impact it is an impulse.
+    /// User-defined accelerations have `acceleration`; other actions have no such vectors.
     ///
     /// # Panics
     /// If t > N or a length is wrong.
@@ -488,7 +490,7 @@ impl Problem {
         }
     }
 
-    /// Creates knots of zeros with the dimensions of the knots, the terminal one last.
+    /// Creates LQ knots of zeros with the dimensions of this problem's knots, the terminal knot last.
     pub fn lq_knots(&self) -> Vec<LqKnot> {
         (0..=self.horizon()).map(|t| LqKnot::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
@@ -503,8 +505,8 @@ impl Problem {
         self.models.actions.iter().filter_map(|action| action.knot_group()?.inverse_dynamics())
     }
 
-    /// Allocates memory in LQ knots for the equations of inverse dynamics, for any order of the actions in the horizon.
-    /// Returns whether an action supports them.
+    /// Allocates memory in LQ knots for the equations of inverse dynamics; it suffices for any order of the actions in
+    /// the horizon. Returns whether an action supports these equations.
     pub(crate) fn reserve_inverse_dynamics(&self, lq_knots: &mut [LqKnot]) -> bool {
         let sizes = self.inverse_dynamics().map(|(_, sizes)| sizes);
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
@@ -520,12 +522,12 @@ impl Problem {
         &self.shape
     }
 
-    /// Returns the model of knot t; the terminal one for t = N.
+    /// Returns the model of knot t; for t = N, the terminal model.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
         self.knot_models.get(t).map_or(&*self.terminal, |&model| self.models.of(model))
     }
 
-    /// Returns the model of knot t, for computing.
+    /// Returns the model of knot t, mutable for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         self.knot_models.get(t).map_or(&mut *self.terminal, |&model| self.models.of_mut(model))
     }
@@ -537,8 +539,8 @@ impl Problem {
         ActionView { x0, knot_models, places, actions: Actions::Own(actions, &mut **terminal) }
     }
 
-    /// Returns the actions of all knots, and copies of all but the terminal one, which compute the same on another
-    /// thread. Returns `None` if an action cannot be copied, or no copies exist yet.
+    /// Returns the actions of all knots, and copies of all actions but the terminal one, which compute the same results
+    /// on another thread. Returns `None` if an action cannot be copied, or no copies exist yet.
     pub(crate) fn two(&mut self) -> Option<[ActionView<'_>; 2]> {
         let Self { x0, models, knot_models, terminal, copies, .. } = self;
         let copies = copies.first().filter(|copies| copies.iter().all(Option::is_some))?;
@@ -562,7 +564,7 @@ impl Problem {
                 }
             }
             for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
-                // false for NaN
+                // written so that NaN is an error
                 if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
                     return Err(Error::Bounds { knot, control, lower, upper });
                 }
@@ -572,7 +574,7 @@ impl Problem {
         Ok(bounded)
     }
 
-    /// Returns the largest number of lanes that one of the models uses.
+    /// Returns the largest number of lanes of all models.
     pub(crate) fn lanes(&self) -> usize {
         self.models.lanes.iter().copied().max().unwrap_or(1)
     }

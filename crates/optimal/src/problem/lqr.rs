@@ -4,8 +4,8 @@
 use super::action::ActionModel;
 use crate::lq::LqKnot;
 
-/// Action x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper. The names are the fields
-/// of its [`LqKnot`].
+/// Action x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper. These matrices and vectors
+/// are fields of an [`LqKnot`].
 ///
 /// Without controls it is a terminal action. In Crocoddyl: `ActionModelLQR`.
 ///
@@ -24,7 +24,7 @@ use crate::lq::LqKnot;
 pub struct Lqr(LqKnot);
 
 impl Lqr {
-    /// Creates the action of a knot.
+    /// Creates the action with the matrices of `knot`.
     ///
     /// # Panics
     /// If the shapes of the knot's matrices do not fit each other, or the knot has constraint rows.
@@ -47,7 +47,7 @@ impl Lqr {
         Self(knot)
     }
 
-    /// Returns the knot of the action.
+    /// Returns the knot with the matrices of the action.
     pub fn knot(&self) -> &LqKnot {
         &self.0
     }

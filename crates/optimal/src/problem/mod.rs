@@ -1,4 +1,4 @@
-//! Optimal control problem: actions, horizons of actions, and derivatives for actions without their own.
+//! Optimal control problem: actions, horizons of actions, and derivatives of actions that do not compute any.
 
 mod action;
 mod action_view;

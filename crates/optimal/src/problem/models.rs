@@ -6,15 +6,15 @@ use super::group::{innermost, lanes as group_lanes};
 use super::shape::{MOST_ENTRIES, MOST_KNOTS};
 use crate::error::Error;
 
-/// Maximum number of entries in the matrices [A B] of all knots: a solver stores several objects of that size, 2 GiB
+/// Maximum number of entries in the matrices [A B] of all knots. A solver stores several arrays of that size, 2 GiB
 /// each.
 const MOST_NUMBERS: usize = 1 << 28;
 
-/// Number of most recent actions with which a model is compared. It is limited so that a horizon whose knots all differ
-/// is created in linear time.
+/// Maximum number of actions with which a new model is compared; the most recent actions are taken. The limit makes the
+/// time to create a horizon linear in its length, even if all knots differ.
 const COMPARED: usize = 64;
 
-/// Places of models in actions.
+/// Positions of the models within the actions.
 #[derive(Clone, Default)]
 struct Places {
     /// Action that represents each model, and the model's index in that action.
@@ -29,14 +29,15 @@ struct Places {
 #[derive(Default)]
 pub(crate) struct Models {
     pub(crate) actions: Vec<Box<dyn ActionModel>>,
-    /// Number of states that each action computes at the cost of one.
+    /// Number of states that each action computes in the time of one state.
     pub(crate) lanes: Vec<usize>,
     places: Places,
     /// Number of models with which the problem was created.
     given: usize,
 }
 
-/// Moves a model into an action of the same kind, as its model `place` or as a new one; returns whether it did so.
+/// Moves a model into an action of the same kind, as model `place` of the action or as a new one; returns whether it
+/// did.
 fn merge(action: &mut dyn ActionModel, model: &mut dyn ActionModel, place: Option<usize>) -> bool {
     match action.knot_group_mut() {
         Some(group) => group.merge(model, place),
@@ -52,7 +53,7 @@ pub(super) fn reserve(action: &mut dyn ActionModel) {
 }
 
 impl Models {
-    /// Merges the models that differ only in costs, limits and durations, and allocates the memory of all.
+    /// Merges models that differ only in costs, limits and durations, and allocates the workspaces of all actions.
     pub(crate) fn new(models: Vec<Box<dyn ActionModel>>) -> Self {
         let mut all = Self { given: models.len(), ..Self::default() };
         for model in models {
@@ -63,7 +64,7 @@ impl Models {
         all
     }
 
-    /// Finds an action of the model's kind that represents the model from now on, or adds it as an action.
+    /// Finds an action of the model's kind, which represents the model from now on, or adds the model as a new action.
     fn place_of(&mut self, mut model: Box<dyn ActionModel>) -> [usize; 2] {
         let Self { actions, lanes, places: Places { counts, free, .. }, .. } = self;
         let first = actions.len().saturating_sub(COMPARED);
@@ -76,7 +77,7 @@ impl Models {
             }
         }
         lanes.push(group_lanes(&mut *model));
-        // an action without models is replaced
+        // an action that represents no model any more is replaced
         match (0..actions.len()).find(|&k| free[k].len() == counts[k]) {
             Some(k) => {
                 (actions[k], lanes[k], counts[k]) = (model, lanes.pop().expect("was just pushed"), 1);
@@ -92,8 +93,8 @@ impl Models {
         }
     }
 
-    /// Adds a model in the place of model `unused`, if that was added as well. Otherwise it becomes a new model.
-    /// Returns its index. Allocates.
+    /// Adds a model. It replaces model `unused`, if `unused` was added after the problem was created; otherwise it
+    /// becomes a new model. Returns the index of the added model. Allocates.
     pub(crate) fn add(&mut self, model: Box<dyn ActionModel>, unused: Option<usize>) -> usize {
         let index = unused.filter(|index| *index >= self.given).unwrap_or(self.len());
         if let Some(&[action, own]) = self.places.of.get(index) {
@@ -108,7 +109,7 @@ impl Models {
         index
     }
 
-    /// Returns the models that were added after the problem was created.
+    /// Returns the indices of the models that were added after the problem was created.
     pub(crate) fn added(&self) -> core::ops::Range<usize> {
         self.given..self.len()
     }
@@ -133,12 +134,12 @@ impl Models {
         &*self.actions[self.places.of[model][0]]
     }
 
-    /// Returns the action that represents a model, for computing.
+    /// Returns the action that represents a model, mutable for computing.
     pub(crate) fn of_mut(&mut self, model: usize) -> &mut dyn ActionModel {
         &mut *self.actions[self.places.of[model][0]]
     }
 
-    /// Returns the action that represents a model; changes made through it only change that model.
+    /// Returns the action that represents a model, with this model selected: changes affect only this model.
     pub(crate) fn chosen(&mut self, model: usize) -> Option<&mut dyn ActionModel> {
         let [action, own] = *self.places.of.get(model)?;
         let action = &mut *self.actions[action];
@@ -148,7 +149,7 @@ impl Models {
         Some(action)
     }
 
-    /// Copies all actions, for the same models.
+    /// Copies all actions; each copy represents the same models.
     ///
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.

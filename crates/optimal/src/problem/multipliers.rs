@@ -4,14 +4,14 @@ use crate::error::Error;
 use std::sync::Arc;
 
 /// Multipliers y of constraints lower ≤ g(x, u) ≤ upper at the knots that an action serves, and the penalty 1/μ. At
-/// each knot, the following term is added to the action's cost,
+/// each knot, the following term is added to the cost of the action,
 ///
 /// ```text
 /// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: into the bounds
 /// ```
 ///
-/// with the derivative e / μ with respect to g, and the Gauss–Newton curvature: 1/μ outside the bounds and at
-/// equalities, else 0.
+/// with the derivative e / μ with respect to g. Its Gauss–Newton curvature is 1/μ outside the bounds and at equalities,
+/// else 0.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Multipliers {
     mu: f64,
@@ -19,9 +19,10 @@ pub(crate) struct Multipliers {
     size: usize,
     /// Multipliers y of each knot. Shape: knots × size, padded with zeros. Written by: `start`, `update`.
     y: Vec<f64>,
-    /// e / μ at each knot's last derivatives, which are better multipliers. Written by: `slopes`.
+    /// Next multipliers e / μ, from each knot's last derivatives. Written by: `slopes`.
     next: Vec<f64>,
-    /// g − Π g at each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by: `slopes`.
+    /// Violations g − Π g at each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by:
+    /// `slopes`.
     excess: Vec<f64>,
     /// Term of the cost at each knot's last derivatives. Written by: `begin`, `slopes`.
     terms: Vec<f64>,
@@ -50,7 +51,7 @@ pub struct Bounded<'a> {
     pub(crate) count: usize,
     pub(crate) lower: &'a [f64],
     pub(crate) upper: &'a [f64],
-    /// Parts of the constraints that have a name; empty for user-defined constraints.
+    /// Groups of constraints that have a name; empty for user-defined constraints.
     pub(crate) parts: &'a [Part],
     pub(crate) multipliers: &'a mut Multipliers,
 }
@@ -59,7 +60,7 @@ pub struct Bounded<'a> {
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) name: Arc<str>,
-    /// First row of the part; it ends before the first row of the next part.
+    /// First row of the group; the group ends before the first row of the next one.
     pub(crate) first: usize,
     /// Whether the rows are functions of the state alone.
     pub(crate) of_state: bool,
@@ -93,21 +94,21 @@ pub(crate) fn leave_a_value(lower: f64, upper: f64) -> bool {
     lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY // false for NaN
 }
 
-/// Penalty 1/μ unless a solve has chosen another.
+/// Penalty 1/μ that is used unless a solve has chosen another.
 pub(crate) const PENALTY: f64 = 10.0;
 
-/// Returns the signed distance of z beyond its bounds.
+/// Returns the signed distance of z from the interval [lower, upper]; zero within it.
 #[inline(always)]
 fn outside(z: f64, lower: f64, upper: f64) -> f64 {
     match z {
         z if z > upper => z - upper,
         z if z >= lower => 0.0,
-        z => z - lower, // a NaN remains
+        z => z - lower, // a NaN in z remains NaN
     }
 }
 
 impl Multipliers {
-    /// Creates zeros, for at most `size` constraints per knot.
+    /// Creates multipliers of zero, for at most `size` constraints per knot.
     pub(crate) fn new(size: usize) -> Self {
         Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], excess: vec![], terms: vec![] }
     }
@@ -147,8 +148,8 @@ impl Multipliers {
         self.y[knot.clone()].copy_from_slice(&self.next[knot]);
     }
 
-    /// Returns g − Π g of the first `count` constraints, their next multipliers, and the term of the cost, at the last
-    /// derivatives of knot t.
+    /// Returns three results of the last derivatives of knot t. They are the violations g − Π g and the next
+    /// multipliers of the first `count` constraints, and the term of the cost.
     pub(crate) fn measured(&self, t: usize, count: usize) -> (&[f64], &[f64], f64) {
         let first = t * self.size;
         (&self.excess[first..][..count], &self.next[first..][..count], self.terms[t])
@@ -158,7 +159,7 @@ impl Multipliers {
         self.y.get(t * self.size + row).copied().unwrap_or(0.0)
     }
 
-    /// Returns the term of the cost for the constraints from `first` on, with the values g.
+    /// Returns the term of the cost for the constraints from index `first` on, which have the values g.
     pub(crate) fn value(&self, t: usize, first: usize, g: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
         let mut term = 0.0;
         for i in 0..g.len() {
@@ -169,7 +170,7 @@ impl Multipliers {
         term
     }
 
-    /// Begins the derivatives of knot t.
+    /// Begins the derivatives of knot t: sets its term of the cost to zero.
     pub(crate) fn begin(&mut self, t: usize) {
         if let Some(term) = self.terms.get_mut(t) {
             *term = 0.0;

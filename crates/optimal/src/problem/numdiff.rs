@@ -1,4 +1,4 @@
-//! Derivatives of any action by finite differences: a reference for tests of hand-written derivatives.
+//! Derivatives of any action by finite differences, with which tests compare derivatives written by hand.
 
 use super::action::ActionModel;
 use super::action::differences::{SECOND, at, calc_diff, write_curvature};
@@ -9,7 +9,7 @@ use crate::lq::{Hessian, LqKnot};
 ///
 /// First derivatives are accurate to about 1e-9, second derivatives to about 1e-7 (relative to the size of cost and
 /// state). The Hessian is the exact one; a Gauss–Newton approximation differs from it where the residuals are
-/// nonlinear. Meant for tests: it takes 2 (ndx + nu) + 2 (ndx + nu)² calls, and allocates.
+/// nonlinear. `NumDiff` is meant for tests: its derivatives take 2 (ndx + nu) + 2 (ndx + nu)² calls, and allocate.
 ///
 /// # Examples
 /// ```

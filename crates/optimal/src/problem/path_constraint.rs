@@ -1,4 +1,5 @@
-//! General constraints on states and controls, with Jacobians by hand, by dual numbers or by differences.
+//! General constraints on states and controls. Their Jacobians are written by hand, or computed by dual numbers or
+//! differences.
 
 use super::action::ActionModel;
 use super::action::differences::FIRST;
@@ -35,22 +36,22 @@ pub trait PathConstraint: Any + Send + Sync {
     /// Returns the number of functions.
     fn size(&self) -> usize;
 
-    /// Returns the smallest and largest allowed values at knot t, infinite where a function is unbounded. They must not
-    /// change during a solve.
+    /// Returns the smallest and largest allowed values at knot t, infinite where a function is unbounded. The bounds
+    /// must not change during a solve.
     fn bounds(&self, t: usize) -> (&[f64], &[f64]);
 
     /// Computes gₜ(x, u) into `g`.
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
 
     /// Computes ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu).
-    /// Returns whether it did so. The default returns false: the solver then takes central differences of
+    /// Returns whether it computed them. The default returns false: the solver then takes central differences of
     /// [`calc`](Self::calc), which are slow, allocate, and are accurate to about 1e-9.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         let _ = (t, x, u, gx, gu);
         false
     }
 
-    /// Returns a copy that computes the same, as [`ActionModel::try_clone`] does; `None` by default.
+    /// Returns a copy that computes the same results, as [`ActionModel::try_clone`] does; `None` by default.
     fn try_clone(&self) -> Option<Box<dyn PathConstraint>> {
         None
     }
@@ -89,7 +90,7 @@ pub(super) fn calc_diff(
 }
 
 /// Functions of state and control that must stay within bounds, written for any [`Scalar`]. [`AutoDiffConstraint`]
-/// turns them into a [`PathConstraint`]. For a robot's own residuals, which share its kinematics, see
+/// turns them into a [`PathConstraint`]. For user-defined residuals of a robot, which share its kinematics, see
 /// [`OwnConstraint`](crate::robot::OwnConstraint).
 pub trait GenericConstraint: Any + Clone + Send + Sync {
     /// Returns the number of functions.
@@ -101,7 +102,7 @@ pub trait GenericConstraint: Any + Clone + Send + Sync {
     /// Computes gₜ(x, u) into `g`.
     fn calc<S: Scalar>(&self, t: usize, x: &[S], u: &[S], g: &mut [S]);
 
-    /// Computes x ⊕ δx into `out` (nx), by default the sum of a vector space. It must be the ⊕ of the action.
+    /// Computes x ⊕ δx into `out` (nx), by default the sum x + δx of a vector space. It must equal the ⊕ of the action.
     fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
         for ((out, &x), &dx) in out.iter_mut().zip(x).zip(dx) {
             *out = x + dx;
@@ -145,13 +146,14 @@ pub struct AutoDiffConstraint<C> {
 }
 
 impl<C: GenericConstraint> AutoDiffConstraint<C> {
-    /// Creates the path constraint of `constraint`. The first derivatives allocate its workspace.
+    /// Creates a path constraint that differentiates `constraint`. The first call of `calc_diff` allocates its
+    /// workspace.
     pub fn new(constraint: C) -> Self {
         let [x, moved, dx, u, g] = [(); 5].map(|()| Vec::new());
         Self { constraint, x, moved, dx, u, g }
     }
 
-    /// Returns the differentiated constraint, for changes.
+    /// Returns the differentiated constraint, so that it can be changed.
     pub fn constraint_mut(&mut self) -> &mut C {
         &mut self.constraint
     }

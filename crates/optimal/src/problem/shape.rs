@@ -10,13 +10,13 @@ pub(crate) const MOST_KNOTS: usize = 1 << 20;
 /// MiB each.
 pub(crate) const MOST_ENTRIES: usize = LqKnot::MOST_SIZE;
 
-/// Dimensions of a horizon, by which trajectories and workspaces are allocated.
+/// Dimensions of a horizon. They determine the lengths of trajectories and workspaces.
 #[derive(Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Shape {
     pub(crate) nx: usize,
     pub(crate) ndx: usize,
-    /// Offset of uₜ in the flat controls; N + 1 entries, the last is the length of the controls.
+    /// Offset of uₜ in the flat controls, N + 1 entries. The last entry is the length of the controls.
     pub(crate) offsets: Vec<usize>,
 }
 
@@ -25,7 +25,7 @@ impl Clone for Shape {
         Self { nx: self.nx, ndx: self.ndx, offsets: self.offsets.clone() }
     }
 
-    /// Copies without allocating if the horizon has the same length.
+    /// Copies the dimensions, without allocating if both horizons have the same length.
     fn clone_from(&mut self, other: &Self) {
         (self.nx, self.ndx) = (other.nx, other.ndx);
         self.offsets.clone_from(&other.offsets);
@@ -56,7 +56,7 @@ impl Shape {
         self.offsets[t]..self.offsets[t] + self.nu(t)
     }
 
-    /// Checks that a shape from a file is the shape of a problem.
+    /// Checks that a shape from a file can be the shape of a problem.
     #[cfg(feature = "serde")]
     pub(crate) fn check_itself(&self) -> Result<(), String> {
         let Self { nx, ndx, offsets } = self;

@@ -1,8 +1,9 @@
 //! Derivatives of a horizon on several threads, each with its own copies of the actions, concurrent with the sweep.
 //!
 //! A group has as many knots as its model has lanes. From the end of the horizon to its beginning, each group passes
-//! through three steps. The first free thread computes its derivatives. The calling thread sweeps it; while the
-//! derivatives it needs are missing, it computes derivatives itself. An idle thread computes the group's gains.
+//! through three steps. The first free thread computes the derivatives of the group. The calling thread sweeps the
+//! group; while it waits for derivatives, it computes derivatives itself. An idle thread computes the gains of the
+//! group.
 
 use super::action::ActionModel;
 use super::group::{Evaluation, Results, evaluate};
@@ -12,7 +13,7 @@ use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
 use core::sync::atomic::AtomicU8;
 
-/// Steps of the work on a group.
+/// Steps that each group passes through.
 const DERIVE: u8 = 0;
 const SWEEP: u8 = 1;
 const FINISH: u8 = 2;
@@ -21,26 +22,26 @@ const FINISH: u8 = 2;
 /// no thread waits for ever, even if other work occupies the pool.
 const PATIENCE: usize = 4096;
 
-/// Copies of actions for threads, and the groups of knots that these compute.
+/// Copies of actions for threads, and the groups of knots that the copies compute.
 #[derive(Default)]
 pub(crate) struct Copies {
     /// Copy of each model, for each thread except the first one.
     of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
     /// First knot of each group, and the end of the horizon.
     cuts: Vec<usize>,
-    /// Model of each group.
+    /// Index of the action of each group.
     owners: Vec<usize>,
     /// Scratch for [`Parts`].
     states: Vec<AtomicU8>,
 }
 
 impl Copies {
-    /// Returns the copies of the second thread, as far as they exist.
+    /// Returns the copies for the second thread, if they exist.
     pub(super) fn first(&mut self) -> Option<&mut [Option<Box<dyn ActionModel>>]> {
         self.of.first_mut().map(Vec::as_mut_slice)
     }
 
-    /// Drops the copies of an action that may change, or that is new.
+    /// Drops the copies of an action that may have changed, or that is new.
     pub(crate) fn forget(&mut self, action: usize) {
         for copies in &mut self.of {
             copies.resize_with(copies.len().max(action + 1), || None);
@@ -62,7 +63,7 @@ impl Copies {
         }
     }
 
-    /// Creates the missing copies of all models that can be copied, for `threads` threads in all.
+    /// Creates the missing copies of all models that can be copied, for `threads` threads including the calling one.
     fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
         self.of.resize_with(threads - 1, Vec::new);
         for copies in &mut self.of {
@@ -76,7 +77,7 @@ impl Copies {
         }
     }
 
-    /// Computes the groups of knots, counted from the start of a run as on a single thread.
+    /// Computes the groups of knots. They are counted from the start of a run of knots, as on a single thread.
     fn group(&mut self, lanes: &[usize], runs: &[(usize, Range<usize>)]) {
         let Self { cuts, owners, .. } = self;
         cuts.clear();
@@ -90,7 +91,7 @@ impl Copies {
         cuts.push(runs.last().map_or(0, |(_, run)| run.end));
     }
 
-    /// Copies the multipliers of the models to their copies.
+    /// Copies the multipliers of the models into the copies of the models.
     pub(super) fn share_multipliers(&mut self, models: &mut [Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
         for copies in &mut self.of {
             for (model, run) in runs {
@@ -139,7 +140,7 @@ impl Copies {
                         sweep(&*models[owners[group]], first, lq_knots, found);
                     }) {
                         if parts.is_abandoned() {
-                            return; // another thread has panicked, and so will this one
+                            return; // another thread has panicked, so this thread will panic too
                         } else if tried > 0 {
                             tried -= 1;
                             groups.derive(tried, &mut *models[owners[tried]]);
@@ -171,7 +172,7 @@ pub(super) struct Knots<'a> {
     pub(super) what: Evaluation<'a>,
 }
 
-/// Groups of knots, as used by all threads.
+/// Groups of knots, as all threads use them.
 #[derive(Clone, Copy)]
 struct Groups<'a> {
     parts: &'a Parts<'a, LqKnot, KnotFeedback>,
@@ -180,7 +181,7 @@ struct Groups<'a> {
 }
 
 impl Groups<'_> {
-    /// Computes the derivatives at the knots of a group, by its model or a copy of it, unless another thread does.
+    /// Computes the derivatives at the knots of a group, by its model or a copy, unless another thread computes them.
     fn derive(self, group: usize, model: &mut dyn ActionModel) {
         let Knots { knots, xs, us, nx, offsets, what } = self.knots;
         self.parts.work(group, DERIVE, |first, lq_knots, _| {
@@ -191,12 +192,13 @@ impl Groups<'_> {
         });
     }
 
-    /// Writes the deferred gains of a group, if it has been swept and no other thread does; returns whether it did so.
+    /// Writes the deferred gains of a group, and returns true, if the group has been swept and no other thread writes
+    /// its gains.
     fn finish(self, group: usize, gains: &mut Gains) -> bool {
         self.parts.work(group, FINISH, |_, lq_knots, found| gains.finish(lq_knots, found))
     }
 
-    /// Distributes the groups over threads, each with its own copies, until no group is left.
+    /// Lets several threads work on the groups, each thread with its own copies of the actions, until no group is left.
     fn spread(self, copies: &mut [Vec<Option<Box<dyn ActionModel>>>], gains: &mut [Gains]) {
         let ([copies], [gains]) = (&mut *copies, &mut *gains) else {
             let half = copies.len() / 2;

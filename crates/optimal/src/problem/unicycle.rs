@@ -3,13 +3,13 @@
 use super::action::ActionModel;
 use crate::lq::{Hessian, LqKnot};
 
-/// Unicycle: x = (x, y, θ), u = (v, ω),
+/// Unicycle with the state x = (x, y, θ) and the control u = (v, ω):
 ///
 /// ```text
 /// x⁺ = x + Δt (v cos θ, v sin θ, ω),      ℓ = ½ (w₁² ‖x‖² + w₂² ‖u‖²)
 /// ```
 ///
-/// These are the rules of Crocoddyl's `ActionModelUnicycle`. Allocates nothing.
+/// Dynamics and cost equal Crocoddyl's `ActionModelUnicycle`. Allocates nothing.
 ///
 /// ```
 /// use condyle_optimal::{Fddp, Problem, Status, Unicycle};

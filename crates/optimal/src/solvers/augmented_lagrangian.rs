@@ -12,9 +12,9 @@ use crate::time::Instant;
 use nalgebra::DVector;
 
 /// Augmented Lagrangian solver around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and
-/// robots with [`Limit`](crate::robot::Limit)s. It follows the bound-constrained Lagrangian method (Conn, Gould, Toint,
-/// 1991; Nocedal and Wright, algorithm 17.4) as ProxDDP does (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier,
-/// 2023).
+/// robots with [`Limit`](crate::robot::Limit)s. It uses the bound-constrained Lagrangian method (Conn, Gould, Toint,
+/// 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP does (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard,
+/// Carpentier, 2023).
 ///
 /// ```text
 /// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω
@@ -77,8 +77,8 @@ use nalgebra::DVector;
 pub struct AugmentedLagrangian {
     /// Settings of the constraints; may be changed between solves.
     pub settings: ConstraintSettings,
-    /// Settings of the inner solves. The solver chooses their tolerances. Their time budget applies to all inner solves
-    /// together.
+    /// Settings of the inner solves. The solver chooses the tolerances itself. The time budget applies to all inner
+    /// solves together.
     pub inner: Settings,
     solver: SolverLoop,
     outcome: Outcome,
@@ -92,15 +92,15 @@ pub struct AugmentedLagrangian {
 
 /// Residuals of the stopping tests, in addition to the residuals in [`Outcome`].
 struct Residuals {
-    /// Largest violation that controls can change, gaps included.
+    /// Largest violation of a constraint that controls can change, or largest gap.
     primal: f64,
-    /// Largest violation of a constraint on x̂₀ alone.
+    /// Largest violation of a constraint that depends on x̂₀ alone.
     fixed: Option<Violation>,
     /// Whether the trajectory minimises the augmented Lagrangian, up to rounding.
     stationary: bool,
 }
 
-/// Largest gradient entry of the augmented Lagrangian at a stationary trajectory, relative to the largest multiplier.
+/// Largest gradient entry of the augmented Lagrangian that counts as stationary, relative to the largest multiplier.
 /// Chosen because rounding at the largest penalty leaves four digits of the violation's gradient.
 const STATIONARY: f64 = 1e-4;
 
@@ -118,8 +118,8 @@ impl AugmentedLagrangian {
         }
     }
 
-    /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of
-    /// zero.
+    /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, with multipliers that
+    /// start at zero.
     ///
     /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances.
     /// It is [`Status::ConstraintsViolated`] if the penalty reached its limit and the inner solve found a minimum, but
@@ -128,11 +128,11 @@ impl AugmentedLagrangian {
     /// of the inner solve that stopped early.
     ///
     /// The cost of the solution contains the terms of the constraints; the cost of the outcome does not. After the
-    /// solve, the problem does not keep the multipliers.
+    /// solve, the multipliers in the problem are zero again.
     ///
     /// Controls of the warm start outside their bounds are moved to the bounds, whatever the value of
-    /// [`Settings::project_warm_start`] in [`inner`](Self::inner). A solve that fails from its warm start is repeated
-    /// from x̂₀ held still: see [`ConstraintSettings::restart`].
+    /// [`Settings::project_warm_start`] in [`inner`](Self::inner). If the solve fails, it is repeated from a start that
+    /// holds x̂₀ still: see [`ConstraintSettings::restart`].
     ///
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if no value satisfies the bounds of a constraint.
@@ -156,9 +156,9 @@ impl AugmentedLagrangian {
     }
 
     /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new
-    /// references or, after [`shift`](Self::shift), for the next horizon. If the last solve ended as
-    /// [`Status::NotFinite`], or with violated constraints at the largest penalty, the multipliers start at zero and
-    /// the penalty at its first value.
+    /// references or, after [`shift`](Self::shift), for the next horizon. The multipliers and the penalty are reset if
+    /// the last solve ended as [`Status::NotFinite`], or with violated constraints at the largest penalty. The
+    /// multipliers then start at zero, and the penalty at its first value.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -175,12 +175,13 @@ impl AugmentedLagrangian {
         self.run(problem, None, &mut observer)
     }
 
-    /// Turns the solution and its multipliers into a warm start for a problem that has been [shifted](Problem::shift)
-    /// by one knot since, as [`Fddp::shift`] does. The new last knot gets the multipliers of the knot before it, if
-    /// both have the same number of constraints.
+    /// Turns the solution and its multipliers into a warm start for a problem that has since been
+    /// [shifted](Problem::shift) by one knot, as [`Fddp::shift`] does. The new last knot gets the multipliers of the
+    /// knot before it, if both knots have the same number of constraints.
     ///
     /// # Errors
-    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls differ from the numbers of the last problem, shifted
+    /// once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         self.solver.shift(problem, &self.inner)?;
         let horizon = problem.horizon();
@@ -227,7 +228,7 @@ impl AugmentedLagrangian {
         Ok(self.solver.end(&settings, &watch))
     }
 
-    /// Makes one attempt: passes of the solver's loop, with an update of the multipliers or of the penalty after each.
+    /// Makes one attempt: passes of the solver's loop, each followed by an update of the multipliers or of the penalty.
     fn attempt(
         &mut self,
         problem: &mut Problem,
@@ -248,12 +249,12 @@ impl AugmentedLagrangian {
         self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
         self.lost = false;
         self.solver.begin(problem, settings, warm_start)?;
-        // tolerances of one pass, which follow μ
+        // tolerances of one pass: eta for the constraints, omega for the gradient; both follow from μ
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
         let mut status = Status::MaxIterations;
         let mut residuals = Residuals { primal: f64::INFINITY, fixed: None, stationary: false };
         for solve in 0..self.settings.max_solves {
-            // the expected improvement of a pass is about the square of its gradient
+            // the tolerance of a pass is squared, because its expected improvement is about the square of its gradient
             let dual = omega.max(0.1 * tolerance_dual);
             let resumes = warm_start.is_none() && solve == 0;
             self.solver.clock.reserve = self.measuring.median();
@@ -295,12 +296,12 @@ impl AugmentedLagrangian {
         Ok(status)
     }
 
-    /// Makes a second attempt after a failed one: from x̂₀ at all knots and the controls that hold it still, with
+    /// Makes a second attempt after a failed one: from x̂₀ at all knots and the controls that hold x̂₀ still, with
     /// multipliers of zero. Returns the status of the better attempt, and keeps its solution and outcome. A converged
     /// attempt is better; otherwise the attempt with the smaller violation is.
     ///
-    /// Does nothing if the first attempt started there or no time is left. It also does nothing without constraints and
-    /// bounds, where the solve equals [`Fddp`](crate::Fddp)'s.
+    /// Does nothing if the first attempt already started from x̂₀ held still, or if no time is left. It also does
+    /// nothing without constraints and bounds, where the solve equals a solve by [`Fddp`](crate::Fddp).
     fn restart(
         &mut self,
         problem: &mut Problem,
@@ -337,8 +338,8 @@ impl AugmentedLagrangian {
         Ok(kept)
     }
 
-    /// Computes cost and residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺. The vectors q and r contain the
-    /// terms yᵀ∂g of the constraints, with the multipliers y that an update would give.
+    /// Computes the cost and the residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺. The vectors q and r contain
+    /// the terms yᵀ∂g of the constraints, with the multipliers y that the next update would give.
     fn measure(&mut self, problem: &mut Problem) -> Residuals {
         let Self { settings, solver: SolverLoop { iterate, knots, .. }, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
@@ -354,7 +355,7 @@ impl AugmentedLagrangian {
             _ => measured.worst,
         };
         let primal = larger(*gap, measured.rest);
-        let mut slope_of_free = 0.0; // controls that are not pressed against a bound
+        let mut slope_of_free = 0.0; // largest ∂L/∂u of controls that are not pressed against a bound
         lambda.copy_from(&knots[horizon].q);
         for t in (0..horizon).rev() {
             let knot = &knots[t];

@@ -13,7 +13,7 @@ const SAME_COST: f64 = 1e-12;
 const RUNAWAY: f64 = 1e8;
 
 /// Merit of an iterate, and the data from which its feedback was computed. An iterate within the bounds on controls is
-/// better than one outside. Next, the smaller gap is better, and for equal gaps the lower cost.
+/// better than an iterate outside. Next, the smaller gap is better, and for equal gaps the lower cost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Merit {
     /// Largest gap.
@@ -29,17 +29,17 @@ pub(super) struct Merit {
     pub(super) regularisation: f64,
 }
 
-/// Best iterate from which a direction could be computed.
+/// Best iterate at which a direction could be computed.
 ///
-/// When a step is accepted, the old iterate may be stored here by an exchange of buffers; nothing is copied.
+/// When a step is accepted, the old iterate may be stored here. Buffers are exchanged for this, and nothing is copied.
 #[derive(Debug, Clone)]
 pub(super) struct Best {
     xs: Vec<f64>,
     us: Vec<f64>,
-    /// φₜ(xₜ, uₜ), N·nx.
+    /// Next states φₜ(xₜ, uₜ), N·nx.
     next: Vec<f64>,
     merit: Option<Merit>,
-    /// Lowest cost of all iterates of this solve, warm start included.
+    /// Lowest cost of all iterates of this solve, including the warm start.
     lowest: f64,
 }
 
@@ -67,8 +67,8 @@ impl Best {
         (self.merit, self.lowest) = (None, f64::INFINITY);
     }
 
-    /// Exchanges the iterate that a step leaves with the best one, unless it is worse. Returns whether it is now the
-    /// best.
+    /// Exchanges the iterate before an accepted step with the best one, unless the best one is better. Returns whether
+    /// the iterate before the step is now the best.
     pub(super) fn leave(&mut self, iterate: &mut Iterate, merit: Merit) -> bool {
         self.lowest = self.lowest.min(merit.cost);
         let good = !self.is_better_than(&merit);

@@ -27,12 +27,12 @@ use crate::problem::Problem;
 /// K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
 ///
 /// The first step length is tried alone. If it fails, the next four are tried side by side, and then the others. The
-/// number tried at once is limited by the [`lanes`](crate::GroupModel::lanes) of the actions. The longest good step is
-/// taken, as in a search of one length after the other.
+/// number of lengths tried at once is limited by the [`lanes`](crate::GroupModel::lanes) of the actions. The longest
+/// good step is taken, as in a search that tries one length after the other.
 ///
 /// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace, and workspaces for
-/// [`segments`](Settings::segments). Copies of actions for [`threads`](Settings::threads) are allocated by the first
-/// solve that needs them. Nothing else is allocated, except by rayon itself.
+/// [`segments`](Settings::segments). The first solve that needs copies of actions for [`threads`](Settings::threads)
+/// allocates them. Nothing else is allocated, except by rayon itself.
 ///
 /// # Examples
 /// ```
@@ -108,7 +108,7 @@ impl Fddp {
     /// [`shift`](Self::shift), for the next horizon.
     ///
     /// A lost trajectory is replaced by x̂₀ held still at all knots, if that costs less. A trajectory is lost if it is
-    /// not finite, or costs more than ten times as much as the last solution, with 1 added to both. If the last solve
+    /// not finite, or if its cost exceeds the cost c of the last solution by more than 10 (1 + |c|). If the last solve
     /// ran out of time or iterations with a rejected step, the regularisation starts at its last value.
     ///
     /// # Errors
@@ -126,17 +126,18 @@ impl Fddp {
         self.run(problem, None, &mut observer)
     }
 
-    /// Turns the solution into a warm start for a problem that has been [shifted](Problem::shift) by one knot since.
-    /// States, controls and gains move one knot to the front, and the last control is repeated (it is zero where the
-    /// number of controls changes). Allocates only if the number of controls differs along the horizon.
+    /// Turns the solution into a warm start for a problem that has since been [shifted](Problem::shift) by one knot.
+    /// States, controls and gains move one knot towards the beginning, and the last control is repeated (it is zero
+    /// where the number of controls changes). Allocates only if the number of controls differs along the horizon.
     ///
     /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory comes from a warm
-    /// start or from a solve that took a step. At each further shift without such a solve, the last state is repeated,
-    /// x_N = x_{N−1}, and the next solve closes the gap. Nothing stabilises a rollout with repeated controls: without
-    /// this rule, the end of the horizon would diverge exponentially while solves run out of time.
+    /// start or from a solve that took a step. If further shifts follow without such a solve, the last state is
+    /// repeated, x_N = x_{N−1}, and the next solve closes the gap. The reason is that nothing stabilises a rollout with
+    /// repeated controls: the end of the horizon would diverge exponentially while solves run out of time.
     ///
     /// # Errors
-    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls differ from the numbers of the last problem, shifted
+    /// once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         self.solver.shift(problem, &self.settings)
     }

@@ -5,7 +5,8 @@ use crate::problem::Problem;
 use crate::time::Instant;
 use condyle_linalg::max_abs;
 
-/// Sum that is rounded only once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
+/// Sum that is rounded only once, at the end, because near an optimum costs differ in their last digits. (Neumaier,
+/// 1974.)
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sum {
     sum: f64,
@@ -29,16 +30,16 @@ impl Sum {
 /// Iterate, and the storage in which its cost and gaps are computed.
 #[derive(Debug, Clone)]
 pub(super) struct Iterate {
-    /// Solution, whose trajectory and cost are the trajectory and cost of the iterate.
+    /// Solution. Its trajectory and cost are the trajectory and cost of the iterate.
     pub(super) solution: Solution,
-    /// φₜ(xₜ, uₜ), N·nx.
+    /// Next states φₜ(xₜ, uₜ), N·nx.
     pub(super) next: Vec<f64>,
-    /// Accelerations and forces, N equal parts, for knots in inverse-dynamics form.
+    /// Accelerations and forces at knots in inverse-dynamics form, N equal parts.
     pub(super) motions: Vec<f64>,
     /// Whether `motions` belongs to the trajectory.
     pub(super) knows_motions: bool,
     costs: Vec<f64>,
-    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
+    /// Gaps f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
     pub(super) gaps: Vec<f64>,
 }
 
@@ -56,7 +57,7 @@ impl Iterate {
         }
     }
 
-    /// Computes dynamics, cost and gaps of the trajectory; returns ‖f‖∞.
+    /// Computes dynamics, cost and gaps of the trajectory; returns the largest gap ‖f‖∞.
     pub(super) fn evaluate(&mut self, problem: &mut Problem) -> f64 {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
@@ -69,7 +70,7 @@ impl Iterate {
         self.update_gaps(problem)
     }
 
-    /// Computes f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns ‖f‖∞.
+    /// Computes the gaps f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns the largest gap ‖f‖∞.
     pub(super) fn update_gaps(&mut self, problem: &Problem) -> f64 {
         let (shape, xs) = (self.solution.shape(), &self.solution.xs);
         for t in 0..=shape.horizon() {
@@ -84,7 +85,7 @@ impl Iterate {
         max_abs(&self.gaps)
     }
 
-    /// Returns the knot, the entry of the tangent space, and the size of the largest gap.
+    /// Returns the knot of the largest gap, its entry in the tangent space, and its size.
     pub(super) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
         let ndx = self.solution.shape().ndx;
         let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });

@@ -1,4 +1,4 @@
-//! Solvers: one loop of derivatives, sweeps and searches, and the methods that use it.
+//! Solvers: a loop of derivatives, sweeps and searches that all solvers share, and the methods that use it.
 
 mod augmented_lagrangian;
 mod best;

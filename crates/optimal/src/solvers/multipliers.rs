@@ -11,11 +11,11 @@ pub(super) struct Measured {
     pub(super) worst: Option<Violation>,
     /// Largest violation of a constraint that no control can change, because it depends on x₀ = x̂₀ alone.
     pub(super) fixed: Option<Violation>,
-    /// Amount of the largest violation of all other constraints.
+    /// Largest violation of all other constraints, which controls can change.
     pub(super) rest: f64,
-    /// Largest absolute value of the next multipliers of all other constraints, |z − Π z| / μ.
+    /// Largest next multiplier |z − Π z| / μ of the constraints that controls can change.
     pub(super) multiplier: f64,
-    /// Sum of the constraints' terms of the cost.
+    /// Sum of the terms that the constraints add to the cost.
     pub(super) terms: f64,
 }
 
@@ -30,7 +30,7 @@ impl Problem {
     /// Sets all multipliers to zero, and the penalty to 1/μ.
     ///
     /// # Errors
-    /// [`Error`] if bounds have a wrong length or no value satisfies them.
+    /// [`Error`] if bounds have a wrong length or no value satisfies the bounds.
     pub(super) fn start_constraints(&mut self, mu: f64) -> Result<(), Error> {
         let horizon = self.horizon();
         for t in 0..=horizon {
@@ -101,7 +101,7 @@ impl Problem {
         let mut all = Measured::default();
         for t in 0..=self.horizon() {
             let without_controls = self.nu(t) == 0;
-            let mut before = 0; // number of this knot's constraints visited before
+            let mut before = 0; // number of constraints of this knot in earlier visits
             self.constraints(t, &mut |bounded| {
                 let (excess, next, term) = bounded.multipliers.measured(t, bounded.count);
                 all.terms += term;

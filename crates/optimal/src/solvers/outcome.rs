@@ -1,4 +1,4 @@
-//! Outcome of a solve with constraints, and the evidence of a constraint that does not hold.
+//! Outcome of a solve with constraints, and the row of a constraint that does not hold.
 
 use core::fmt;
 use std::sync::Arc;
@@ -6,13 +6,13 @@ use std::sync::Arc;
 /// State of the constraints after a solve; the trajectory is in the [`Solution`](crate::Solution).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
-    /// Cost Σ ℓ without the terms of the constraints.
+    /// Cost Σ ℓ without the terms that the constraints add to it.
     pub cost: f64,
     /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
     pub primal: f64,
-    /// Row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]. `None` if all constraints hold
-    /// exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on x̂₀ with the
-    /// largest violation.
+    /// Row with the violation or gap in `primal`: the evidence of [`Status::ConstraintsViolated`]. `None` if all
+    /// constraints hold exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on
+    /// x̂₀ with the largest violation.
     ///
     /// [`Status::ConstraintsViolated`]: crate::Status::ConstraintsViolated
     /// [`Status::Infeasible`]: crate::Status::Infeasible
@@ -20,8 +20,8 @@ pub struct Outcome {
     /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on their bounds.
     pub dual: f64,
     /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
-    /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in their
-    /// order. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
+    /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in the order
+    /// of the limits. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
     pub multipliers: Vec<Vec<f64>>,
     /// Penalty 1/μ at the end of the solve.
     pub penalty: f64,
@@ -74,12 +74,12 @@ pub struct Violation {
     pub kind: ViolationKind,
     /// Index of the knot, 0 … N.
     pub knot: usize,
-    /// Index of the row: for a constraint the index in [`Outcome::multipliers`](crate::Outcome::multipliers) of the
-    /// knot, for a gap the entry of the tangent vector.
+    /// Index of the row. For a constraint, the index in the knot's
+    /// [`Outcome::multipliers`](crate::Outcome::multipliers); for a gap, the entry of the tangent vector.
     pub row: usize,
     /// Name of the [`Limit`](crate::robot::Limit), if the row belongs to one.
     pub name: Option<Arc<str>>,
-    /// Index of the row within the named limit; equals `row` without a name.
+    /// Index of the row within the named limit; without a name, equal to `row`.
     pub entry: usize,
     /// Distance from the bound, or size of the gap, in the units of the row; infinite if it is NaN.
     pub amount: f64,

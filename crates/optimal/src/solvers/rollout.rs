@@ -17,9 +17,9 @@ pub(super) struct Trials {
     width: usize,
     xs: Vec<f64>,
     us: Vec<f64>,
-    /// φₜ(xₜ, uₜ), N knots. It differs from the next x by the remaining gap.
+    /// Next states φₜ(xₜ, uₜ) of N knots. Each differs from x of the next knot by the remaining gap.
     next: Vec<f64>,
-    /// Motion of each knot (accelerations and forces), in equal parts.
+    /// Accelerations and forces of each knot, in equal parts.
     motions: Vec<f64>,
     motion_size: usize,
     /// Sum of the costs of each trial; meaningless if the trial `failed`.
@@ -33,12 +33,12 @@ pub(super) struct Trials {
     unread: Vec<f64>,
 }
 
-/// Trajectory from which trials start, and the direction.
+/// Trajectory from which trials start, and direction of their steps.
 #[derive(Clone, Copy)]
 pub(super) struct Nominal<'a> {
     pub(super) xs: &'a [f64],
     pub(super) us: &'a [f64],
-    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
+    /// Gaps f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
     pub(super) gaps: Option<&'a [f64]>,
     pub(super) feedback: &'a [KnotFeedback],
 }
@@ -72,7 +72,7 @@ impl Trials {
         self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
     }
 
-    /// Sets the number of entries of each knot's motion that the next runs keep.
+    /// Sets the number of accelerations and forces of each knot that the next runs store.
     pub(super) fn keep_motions(&mut self, size: usize) {
         self.motion_size = size;
         self.motions.resize(self.shape.horizon() * self.width * size, 0.0);
@@ -87,7 +87,7 @@ impl Trials {
     ///
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
     ///
-    /// with uₜ moved into its bounds. The knots begin the horizon or follow the knots of the last call.
+    /// with uₜ moved into its bounds. The given knots begin the horizon, or follow the knots of the last call.
     pub(super) fn run(
         &mut self,
         view: &mut ActionView<'_>,
@@ -113,7 +113,7 @@ impl Trials {
                 let (x_nominal, u_nominal) = (&nominal.xs[shape.x(t)], &nominal.us[shape.u(t)]);
                 u.copy_from_slice(u_nominal);
                 if failed[i] {
-                    x.copy_from_slice(x_nominal); // a valid state: the group call evaluates the action there
+                    x.copy_from_slice(x_nominal); // a valid state, at which the group call evaluates the action
                     continue;
                 }
                 let action = view.action(t);

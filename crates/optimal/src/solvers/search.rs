@@ -1,5 +1,5 @@
-//! Line search of differential dynamic programming: the expected improvement of a step, and the test of whether it is
-//! reached.
+//! Line search of differential dynamic programming: the expected improvement of a step, and the test whether a trial
+//! achieves it.
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;
@@ -14,16 +14,16 @@ use condyle_linalg::threads::join;
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Number of step lengths that are tried side by side when 1 fails, unless ½ is likely to succeed. One of four usually
-/// succeeds. Four take two to three times as long as one, in which branches of the robot are computed in parallel
-/// lanes.
+/// Number of step lengths that are tried side by side when 1 fails, unless ½ is likely to succeed. One of four lengths
+/// usually succeeds. A group of four takes two to three times as long as a single trial, in which branches of the robot
+/// are computed in parallel lanes.
 const SECOND: usize = 4;
 
-/// Number of searches after a shortened step in which shorter steps are tried concurrently; every second or third needs
-/// one.
+/// Number of searches after a shortened step in which shorter steps are tried concurrently. Every second or third of
+/// these searches needs a shorter step.
 const WARY: usize = 3;
 
-/// Outcome of a line search, for the accepted trial or else the last trial that stayed finite.
+/// Outcome of a line search: data of the accepted trial, or else of the last trial that stayed finite.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Search {
     pub(super) step: f64,
@@ -32,18 +32,18 @@ pub(super) struct Search {
     pub(super) decrease: f64,
     pub(super) expected_decrease: f64,
     pub(super) accepted: bool,
-    /// Reason why no further trial was made, if the solve must stop.
+    /// Reason why the search ended early, if the solve must stop.
     pub(super) stopped: Option<Status>,
     /// Whether the iterate before the accepted step is now the best one.
     pub(super) left_best: bool,
 }
 
-/// Iterate with its feedback, and the parts of a solver that a search around it uses.
+/// Iterate with its feedback, and the fields of a solver that a search around the iterate uses.
 pub(super) struct Surroundings<'a, 'o> {
     /// Iterate, which the accepted trial replaces.
     pub(super) iterate: &'a mut Iterate,
     pub(super) merit: Merit,
-    /// Best iterate before this one.
+    /// Best earlier iterate.
     pub(super) best: &'a mut Best,
     /// Feedback and value functions.
     pub(super) feedback: &'a [KnotFeedback],
@@ -56,15 +56,15 @@ pub(super) struct Surroundings<'a, 'o> {
 #[derive(Debug, Clone)]
 pub(super) struct LineSearch {
     trials: Trials,
-    /// Trial that another thread rolls out while this thread tries the first step.
+    /// Trials that another thread rolls out while this thread tries the first step.
     ahead: Option<Trials>,
-    /// Number of following searches that try several lengths concurrently, if that is allowed.
+    /// Number of following searches that may try several lengths concurrently.
     wary: usize,
     /// Step lengths, 1, ½, ¼, ….
     steps: Vec<f64>,
-    /// Vxx f, (N + 1)·ndx.
+    /// Products Vxx f of all knots, (N + 1)·ndx.
     curved_gaps: Vec<f64>,
-    /// dg and dq, the expected improvement without the part that depends on the trial.
+    /// Terms dg and dq of the expected improvement, which do not depend on the trial.
     expected: [f64; 2],
 }
 
@@ -101,12 +101,12 @@ impl LineSearch {
         self.steps.extend((0..count).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
     }
 
-    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate. With several threads, if a recent
+    /// Tries α = 1, ½, ¼, … until a step is accepted; its trial becomes the iterate. With several threads, if a recent
     /// search needed a shorter step than 1, another thread tries the next length at the same time as the first.
     ///
     /// A trial that diverges keeps the expected improvement of the trial before it. If the first trial diverges, it
     /// keeps the expected improvement of the previous line search, `last`. In DDP the expected improvement does not
-    /// depend on the trial, so the value of this search is kept.
+    /// depend on the trial, so a diverging trial keeps the value of this search.
     #[inline(never)] // `benches/instructions.py` counts this function by name
     pub(super) fn run(&mut self, problem: &mut Problem, around: Surroundings<'_, '_>, last: Search) -> Search {
         self.expect(&around);
@@ -185,7 +185,7 @@ impl LineSearch {
         search
     }
 
-    /// Computes dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP omits the gaps f.
+    /// Computes the terms dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP omits the gaps f.
     fn expect(&mut self, around: &Surroundings<'_, '_>) {
         let Surroundings { iterate, merit, feedback, settings, .. } = around;
         let ((mut dg, mut dq), counts_gaps) = ((0.0, 0.0), settings.counts_gaps(merit.feasible));
@@ -206,13 +206,13 @@ impl LineSearch {
     }
 }
 
-/// Rule by which a trial is accepted, for one iterate.
+/// Rule that decides whether a trial from one iterate is accepted.
 struct Rule<'a> {
     settings: &'a Settings,
     feasible: bool,
-    /// dg and dq.
+    /// Terms dg and dq of the expected improvement.
     expected: [f64; 2],
-    /// Vxx f, if gaps count.
+    /// Products Vxx f of all knots, if gaps count.
     curved_gaps: Option<&'a [f64]>,
     /// States and cost of the iterate.
     xs: &'a [f64],
@@ -220,8 +220,8 @@ struct Rule<'a> {
 }
 
 impl Rule<'_> {
-    /// Writes the expected and the actual decrease of trial i, with step length α, to `search`. Returns its cost if it
-    /// is good.
+    /// Writes the expected and the actual decrease of trial i, with step length α, to `search`. Returns the trial's
+    /// cost if the trial is good.
     ///
     /// ```text
     /// d₁ = dg + dv,   d₂ = dq − 2 dv,   dv = −Σ fᵀVxx (x ⊖ x_trial),   expected decrease α (d₁ + ½ α d₂)
@@ -247,7 +247,8 @@ impl Rule<'_> {
 
 impl Search {
     /// Returns whether the step lowers the cost enough. While gaps exist, a step is also good if it raises the cost
-    /// little enough (FDDP), or is expected to lower the cost of the rollout that closes the gaps (DDP).
+    /// little enough (FDDP). In DDP it is then good if it is expected to lower the cost of the rollout that closes the
+    /// gaps.
     fn is_good(&self, settings: &Settings, feasible: bool) -> bool {
         let Self { d1, decrease, expected_decrease, .. } = *self;
         let closes_gaps = !feasible && settings.method == DdpMethod::Ddp;

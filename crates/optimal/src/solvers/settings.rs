@@ -11,7 +11,7 @@ use std::time::Duration;
 #[non_exhaustive]
 pub enum DdpMethod {
     /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`. Every trial is a plain rollout from
-    /// x̂₀, so the first accepted step closes the gaps of a warm start at once, at any cost.
+    /// x̂₀. The first accepted step therefore closes the gaps of a warm start at once, however much this costs.
     Ddp,
     /// Feasibility-driven differential dynamic programming (Mastalli et al., ICRA 2020), Crocoddyl's `SolverFDDP`: a
     /// trial of length α keeps the fraction 1 − α of each gap.
@@ -47,8 +47,9 @@ pub struct Settings {
     /// Method, which decides how gaps are closed and which steps are accepted.
     pub method: DdpMethod,
     /// Whether the curvature of the dynamics is included: Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action computes
-    /// it. This is full DDP, which converges quadratically; Quu may need more regularisation. Among a robot's knots,
-    /// the knots without contacts that use semi-implicit Euler compute it, exactly. All others count as linear.
+    /// it. This is full DDP, which converges quadratically; Quu may need more regularisation. A robot's knots compute
+    /// the exact curvature if they have no contacts and use semi-implicit Euler. All other knots of robots count as
+    /// linear.
     pub second_order: bool,
     /// Whether the sweep receives a robot's knots as equations of inverse dynamics, with accelerations and contact
     /// forces as unknowns instead of the controls. This is possible without bounds on controls and without
@@ -58,14 +59,15 @@ pub struct Settings {
     /// made.
     pub max_iterations: usize,
     /// Tolerance of the expected decrease |d₁ + ½ d₂| of the cost. A solve has converged when the iterate was feasible
-    /// and the expected decrease is below it.
+    /// and the expected decrease is below the tolerance.
     pub tolerance: f64,
-    /// Tolerance of problems with bounds on controls: the expected decrease does not include the bounds' multipliers.
+    /// Tolerance for problems with bounds on controls, whose expected decrease does not include the multipliers of the
+    /// bounds.
     pub tolerance_bounded: f64,
     /// Whether a warm start outside the bounds on controls is moved into them, entry by entry, before a solve. This
-    /// applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl keeps such a
-    /// start, so reproducing its iterates needs `false`. With either value, a solution that violates a bound is never
-    /// [`Converged`].
+    /// applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl does not move
+    /// such a start, so its iterates are reproduced only with `false`. With either value, a solution that violates a
+    /// bound is never [`Converged`].
     ///
     /// [`solve`]: crate::Fddp::solve
     /// [`resume`]: crate::Fddp::resume
@@ -75,29 +77,28 @@ pub struct Settings {
     /// phase (derivatives, a sweep, a trial; with several threads, derivatives and sweep together) starts only if it is
     /// predicted to end in time. The prediction is the median of the last five durations of that phase, over all
     /// solves, so one or two delays do not shorten later solves. A solve that takes longer reports
-    /// [`Timings::overrun`](crate::Timings::overrun): the budget is shorter than an iteration, or something delayed it.
-    /// A solve that restores a better iterate may need one more sweep.
+    /// [`Timings::overrun`](crate::Timings::overrun): the budget was shorter than an iteration, or something delayed
+    /// the solve. A solve that restores a better iterate may need one more sweep.
     pub time_budget: Option<Duration>,
     /// Number of segments of the horizon that a sweep processes at the same time: see [`Sweep::set_segments`]. It is
-    /// independent of the number of threads, which belong to rayon's pool; any number of threads gives the same result.
-    /// At most 1024.
+    /// independent of the number of threads in rayon's pool; any number of threads gives the same result. At most 1024.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,
     /// Number of threads that share an iteration, at most 1024. They belong to the rayon pool in which a solve is
-    /// called, otherwise to the global one. They compute derivatives and gains while the calling thread sweeps, and try
-    /// a second step length when the first is often too long. The result is the same to the last bit for any number.
-    /// More than 1 needs copies of the actions ([`try_clone`]), which are made when they are missing or a model has
-    /// changed.
+    /// called, otherwise to the global pool. They compute derivatives and gains while the calling thread sweeps, and
+    /// try a second step length when the first is often too long. The result is the same to the last bit for any number
+    /// of threads. More than one thread needs copies of the actions ([`try_clone`]). The copies are made when they are
+    /// missing or a model has changed.
     ///
     /// [`try_clone`]: crate::ActionModel::try_clone
     pub threads: usize,
-    /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
+    /// Number of step lengths that a line search tries, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,
     /// Fraction of the expected decrease by which the cost must fall for a step to be accepted.
     pub accept: f64,
-    /// Factor for steps that are expected to raise the cost, while gaps exist: such a step is accepted if the cost
-    /// rises by less than this times the expected rise.
+    /// Factor for steps that are expected to raise the cost, while gaps exist. Such a step is accepted if the rise of
+    /// the cost is less than this factor times the expected rise.
     pub accept_ascent: f64,
     /// Bound on |d₁| below which any step that is expected to lower the cost is accepted.
     pub flat: f64,
@@ -118,7 +119,7 @@ pub struct Settings {
 /// Maximum number of segments and of threads: each has its own memory.
 const MOST_AT_ONCE: usize = 1024;
 
-/// `MOST_AT_ONCE` in words.
+/// Valid range of the numbers of segments and threads, in words.
 const AT_ONCE: &str = "at least 1 and at most 1024";
 
 impl Default for Settings {
@@ -154,17 +155,17 @@ impl Settings {
         !feasible && self.method == DdpMethod::Fddp
     }
 
-    /// Returns a larger regularisation, up to the largest.
+    /// Returns the regularisation raised by one factor, but not above the largest regularisation.
     pub(super) fn increased(&self, regularisation: f64) -> f64 {
         (regularisation * self.regularisation_factor).min(self.regularisation_max)
     }
 
-    /// Returns a smaller regularisation, down to the smallest.
+    /// Returns the regularisation lowered by one factor, but not below the smallest regularisation.
     pub(super) fn decreased(&self, regularisation: f64) -> f64 {
         (regularisation / self.regularisation_factor).max(self.regularisation_min)
     }
 
-    /// Checks the settings, as each solve does.
+    /// Checks the settings, as each solve does at its beginning.
     ///
     /// # Errors
     /// [`Error::Setting`] for the first invalid field.
@@ -197,10 +198,10 @@ impl Settings {
     }
 }
 
-/// Setting: name, value, whether it is valid, and the valid range in words.
+/// Setting to check: name, value, whether the value is valid, and the valid range in words.
 type Checked = (&'static str, f64, bool, &'static str);
 
-/// Returns the error of the first invalid setting, if one is invalid.
+/// Returns the error of the first invalid setting, if there is one.
 fn check_all<const N: usize>(settings: [Checked; N]) -> Result<(), Error> {
     match settings.into_iter().find(|(_, _, good, _)| !good) {
         Some((name, value, _, allowed)) => Err(Error::Setting { name, value, allowed }),
@@ -235,11 +236,11 @@ pub struct ConstraintSettings {
     pub penalty_max: f64,
     /// Factor by which the penalty 1/μ rises.
     pub penalty_factor: f64,
-    /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold it still
+    /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold x̂₀ still
     /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if it ends as not finite, or with violated
-    /// constraints at the largest penalty. The better result is kept. Typical causes are warm starts that diverge or
-    /// saturate the controls. The repetition allocates. `resume` never repeats, nor does a problem without constraints
-    /// and bounds.
+    /// constraints at the largest penalty. The better result is kept. Typical causes of failures are warm starts that
+    /// diverge or saturate the controls. The repetition allocates. `resume` never repeats a solve, and neither is a
+    /// problem without constraints and bounds solved twice.
     pub restart: bool,
 }
 

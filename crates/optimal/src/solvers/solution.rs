@@ -11,9 +11,9 @@ use std::time::Duration;
 
 /// Outcome of a solve. Whatever the status, the [`Solution`] holds the best iterate found. A converged iterate is the
 /// best. Otherwise the candidates are the last iterate and all iterates from which a step could be computed. Among them
-/// the iterate with the smallest gap is the best, and among equal gaps the one with the lowest cost. An iterate within
-/// the bounds on controls precedes a warm start outside. An iterate has diverged, and is not a candidate, if its cost
-/// exceeds the lowest of the solve by more than 1e8·(1 + |lowest|).
+/// the iterate with the smallest gap is the best, and among equal gaps the iterate with the lowest cost. An iterate
+/// within the bounds on controls precedes a warm start outside. An iterate has diverged, and is not a candidate, if its
+/// cost exceeds the lowest cost of the solve by more than 1e8·(1 + |lowest|).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -33,12 +33,12 @@ pub enum Status {
     /// warm start, or a larger penalty, may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the
     /// largest violation.
     ConstraintsViolated,
-    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself
+    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof. The initial state x̂₀ itself
     /// violates a constraint of knot 0 that no control can change, such as a built-in residual of the state alone. The
     /// solution satisfies the other constraints, as far as the solve progressed.
     Infeasible,
     /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so no direction can be computed. The
-    /// solution is the best iterate before it. If that is the warm start itself, its cost may be infinite. States and
+    /// solution is the best earlier iterate. If that is the warm start itself, its cost may be infinite. States and
     /// controls are finite. Another warm start may help, such as x̂₀ held still
     /// ([`Problem::quasi_static`](crate::Problem::quasi_static)).
     NotFinite,
@@ -86,15 +86,15 @@ pub struct Iteration {
     pub cost: f64,
     /// Largest gap, ‖f‖∞, of the iterate before the step.
     pub gap: f64,
-    /// |d₁ + ½ d₂|, the expected decrease of the cost by the full step, which is compared with the tolerance.
+    /// Expected decrease of the cost by the full step, |d₁ + ½ d₂|, which is compared with the tolerance.
     pub stop: f64,
-    /// Step length α tried last; if a step was accepted, its length.
+    /// Length α of the accepted step, or else the step length tried last.
     pub step: f64,
     /// Regularisation after the iteration.
     pub regularisation: f64,
-    /// Slope of the expected change: the expected decrease of the cost is α (d₁ + ½ α d₂).
+    /// Slope d₁ of the expected change: the expected decrease of the cost is α (d₁ + ½ α d₂).
     pub d1: f64,
-    /// Curvature of the expected change.
+    /// Curvature d₂ of the expected change.
     pub d2: f64,
     /// Actual decrease of the cost by the step tried last.
     pub decrease: f64,
@@ -115,11 +115,11 @@ pub struct Timings {
     pub calc: Duration,
     /// Derivatives. With several threads, the time in which the sweep waited for derivatives or computed some itself.
     pub calc_diff: Duration,
-    /// Backward sweeps, repeated ones included.
+    /// Backward sweeps, including repeated ones.
     pub sweep: Duration,
     /// Trial rollouts of the line searches, accepted or not.
     pub rollout: Duration,
-    /// Whole solve, observer included.
+    /// Whole solve, including the time in the observer.
     pub total: Duration,
     /// Time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time. It is
     /// positive if the budget is shorter than the first iteration, or a phase took longer than predicted. A budget of
@@ -137,7 +137,7 @@ impl Timings {
     }
 }
 
-/// Result of a solve. Reading one from a file checks that the lengths of its parts fit one horizon.
+/// Result of a solve. Reading a solution from a file checks that the lengths of its fields fit one horizon.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(remote = "Self"))] // serde reads the fields; the implementations below check them
@@ -146,10 +146,11 @@ pub struct Solution {
     pub xs: Vec<f64>,
     /// Controls u₀ … u_{N−1}, flat.
     pub us: Vec<f64>,
-    /// Feedback gains of the last sweep, per knot nu × ndx: near the trajectory the control is uₜ + Kₜ (x ⊖ xₜ).
+    /// Feedback gains of the last sweep, a matrix nu × ndx per knot. Near the trajectory the control is uₜ + Kₜ (x ⊖
+    /// xₜ).
     #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::matrices"))]
     pub K: Vec<DMatrix<f64>>,
-    /// Feed-forward terms of the last sweep, per knot nu: the full step of the controls.
+    /// Feed-forward terms of the last sweep, nu numbers per knot: the full step of the controls.
     pub k: Vec<DVector<f64>>,
     /// Cost of the trajectory; infinite if it is NaN.
     pub cost: f64,
@@ -157,7 +158,7 @@ pub struct Solution {
     pub gap: f64,
     /// Whether the trajectory satisfies the dynamics: it is a plain rollout from x̂₀.
     pub feasible: bool,
-    /// Regularisation at the end.
+    /// Regularisation at the end of the solve.
     pub regularisation: f64,
     /// Outcome of the solve.
     pub status: Status,
@@ -211,9 +212,9 @@ impl Solution {
         &self.us[self.shape.u(t)]
     }
 
-    /// Returns the regularisation with which a resumed solve begins: `start`, unless the last solve ran out of time or
-    /// iterations after a rejected step. It is then the regularisation of its end, as with a smaller one the same step
-    /// would be rejected again.
+    /// Returns the regularisation with which a resumed solve begins. It is `start`, unless the last solve ran out of
+    /// time or iterations after a rejected step. It is then the last regularisation of that solve, because with a
+    /// smaller one the same step would be rejected again.
     pub(super) fn resumed_regularisation(&self, start: f64) -> f64 {
         let stopped = matches!(self.status, Status::TimeLimit | Status::MaxIterations | Status::Interrupted);
         match self.trace.last() {
@@ -222,8 +223,8 @@ impl Solution {
         }
     }
 
-    /// Drops the first knot and appends one at the end, with its dimensions in `shape`. The new knot copies the last
-    /// state and, if its size fits, the last control; its gains are zero.
+    /// Drops the first knot and appends one at the end, so that the dimensions become `shape`. The new knot copies the
+    /// last state and, if its size fits, the last control; the gains of the new knot are zero.
     pub(crate) fn shift(&mut self, shape: &Shape) {
         let (nx, last, ndx) = (shape.nx, shape.horizon() - 1, shape.ndx);
         self.xs.copy_within(nx.., 0);
@@ -250,7 +251,7 @@ impl Solution {
         &self.shape
     }
 
-    /// Moves the controls of some knots into their bounds.
+    /// Moves the controls of `knots` into their bounds.
     pub(crate) fn project(&mut self, problem: &Problem, knots: Range<usize>) {
         for t in knots {
             let Some((lower, upper)) = problem.action(t).bounds(t) else { continue };
@@ -280,7 +281,7 @@ impl Solution {
         })
     }
 
-    /// Checks that each part of a solution from a file has the length that its horizon requires.
+    /// Checks that each field of a solution from a file has the length that the solution's horizon requires.
     #[cfg(feature = "serde")]
     fn check(&self) -> Result<(), String> {
         self.shape.check_itself()?;

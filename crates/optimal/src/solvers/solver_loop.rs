@@ -17,7 +17,7 @@ use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::time::Instant;
 use std::time::Duration;
 
-/// Number of iterations for which the trace is allocated when a solve begins; with more it grows.
+/// Number of iterations for which the trace is allocated when a solve begins; the trace grows if more are made.
 const FORESEEN: usize = 10_000;
 
 /// Iterate of a solver, the linear-quadratic problem around it, and the workspace of an iteration.
@@ -37,21 +37,21 @@ pub(super) struct SolverLoop {
     bounded: bool,
     /// Whether a trajectory exists from which a solve can resume.
     started: bool,
-    /// Whether the trajectory was given or found since the last shift. Without a step in between, a shift repeats the
-    /// last state.
+    /// Whether the trajectory was given or found since the last shift. If not, the next shift repeats the last state.
     pub(super) renewed: bool,
 }
 
-/// Properties of a pass that its solver chooses, besides the settings.
+/// Properties of a pass that the calling solver chooses, in addition to the settings.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pass {
-    /// Tolerance, instead of the tolerance in the settings.
+    /// Tolerance that replaces the tolerance in the settings.
     pub(super) tolerance: Option<f64>,
     /// Whether a warm start without gaps counts as feasible if a control lies on its bound. Crocoddyl's value is false:
-    /// the bounds then only clamp trials until the first full step, which is never accepted where the bounds are
-    /// active.
+    /// the bounds then only clamp trials until the first full step. Where the bounds are active, the full step is never
+    /// accepted.
     pub(super) trusts_start: bool,
-    /// Whether the pass continues the last solve, instead of a warm start or an earlier pass of the same solve.
+    /// Whether the pass continues the last solve, instead of starting from a warm start or an earlier pass of the same
+    /// solve.
     pub(super) resumes: bool,
 }
 
@@ -63,7 +63,7 @@ struct Progress {
     was_feasible: bool,
     /// Whether this pass has computed gains.
     swept: bool,
-    /// Whether these gains belong to the best iterate, from which the last step started.
+    /// Whether the gains of this pass belong to the best iterate, from which the last step started.
     swept_best: bool,
 }
 
@@ -113,7 +113,7 @@ impl SolverLoop {
         settings.check()?;
         solution.shape().check(problem.shape())?;
         if self.knots[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.knots) {
-            self.sweep = Sweep::new(&self.knots); // the problem given to `new` did not have this form
+            self.sweep = Sweep::new(&self.knots); // `new` was given a problem without equations of inverse dynamics
         }
         self.bounded = problem.check_bounds()?;
         self.inverse_dynamics = settings.inverse_dynamics_form && !self.bounded && !settings.second_order;
@@ -126,7 +126,7 @@ impl SolverLoop {
         self.clock.start(watch.begin, settings.time_budget);
     }
 
-    /// Iterates from the current trajectory until there is a reason to stop, and completes the solution.
+    /// Iterates from the current trajectory until there is a reason to stop, and then completes the solution.
     pub(super) fn pass(
         &mut self,
         problem: &mut Problem,
@@ -166,7 +166,7 @@ impl SolverLoop {
         status
     }
 
-    /// Ends a solve.
+    /// Ends a solve: completes its timings, and returns the solution.
     pub(super) fn end(&mut self, settings: &Settings, watch: &Watch<'_>) -> &Solution {
         self.iterate.solution.timings.end(watch.begin.elapsed(), settings.time_budget);
         &self.iterate.solution
@@ -238,7 +238,7 @@ impl SolverLoop {
     /// larger regularisation while Quu is not positive definite.
     ///
     /// # Errors
-    /// Reason to stop, if no direction was found or the time is over.
+    /// The reason to stop, if no direction was found or no time is left.
     fn find_direction(
         &mut self,
         problem: &mut Problem,
@@ -274,9 +274,9 @@ impl SolverLoop {
         Ok(())
     }
 
-    /// Computes the LQ problem at the iterate. It contains the gaps until the first full step, and the bounds
-    /// afterwards. With several threads, the sweep follows the derivatives from knot to knot if it can, and its outcome
-    /// is returned.
+    /// Computes the linear-quadratic problem at the iterate. It contains the gaps until the first full step, and the
+    /// bounds afterwards. With several threads, if possible, the sweep processes knots as soon as their derivatives are
+    /// known; its outcome is returned.
     #[inline(never)] // `benches/instructions.py` counts this function by name
     fn calc_diff(
         &mut self,
@@ -339,7 +339,7 @@ impl SolverLoop {
         Some(outcome)
     }
 
-    /// Returns whether the sweep follows the derivatives.
+    /// Returns whether the sweep processes knots as soon as their derivatives are known.
     fn follows(&self, settings: &Settings) -> bool {
         settings.threads > 1 && !settings.second_order && self.sweep.is_sequential()
     }
@@ -399,7 +399,7 @@ impl SolverLoop {
 }
 
 impl Progress {
-    /// Takes over the outcome of a search, after which the iterate has the given cost.
+    /// Stores the outcome of a search in the solution; the iterate now has the given cost.
     fn advance(&mut self, search: &Search, settings: &Settings, cost: f64) {
         let Self { merit, was_feasible, swept_best, .. } = self;
         merit.cost = cost;

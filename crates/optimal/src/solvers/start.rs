@@ -1,4 +1,4 @@
-//! Starts of a solve that follow from the last one: its trajectory shifted by a knot, or x̂₀ held still where that
+//! Starts of a solve that follow from the last solve: its trajectory shifted by a knot, or x̂₀ held still if that
 //! trajectory is lost.
 
 use super::iterate::Iterate;
@@ -8,12 +8,12 @@ use crate::error::Error;
 use crate::lq::{LqKnot, Sweep};
 use crate::problem::Problem;
 
-/// Factor by which the cost of a start may exceed the cost of the last solution, with 1 added to both. A push of the
-/// state or a new reference rarely raises the cost more. A horizon whose end diverges exceeds it within a few shifts
+/// Maximum excess of the cost of a start over the cost c of the last solution, relative to 1 + |c|. A push of the state
+/// or a new reference rarely raises the cost more. A horizon whose end diverges exceeds the limit within a few shifts
 /// (measured: 0.3, 1e3, 2e4, 3e7).
 const LOST: f64 = 10.0;
 
-/// Returns x̂₀ at all knots, and the controls that hold it still. Allocates.
+/// Returns x̂₀ at all knots, and the controls that hold x̂₀ still. Allocates.
 ///
 /// # Errors
 /// [`Error`] if an entry of x̂₀ is not finite.
@@ -24,9 +24,9 @@ pub(super) fn quasi_static_start(problem: &mut Problem) -> Result<[Vec<f64>; 2],
 }
 
 impl SolverLoop {
-    /// Replaces the start of a resumed solve by x̂₀ at all knots and the controls that hold it still, if the start is
-    /// lost and this costs less. A start is lost if its cost or a gap is not finite, or if it costs far more than the
-    /// last solution. Returns the largest gap of the start. Allocates only if a start is lost.
+    /// Replaces a lost start of a resumed solve by x̂₀ at all knots and the controls that hold x̂₀ still, if this costs
+    /// less. A start is lost if its cost or a gap is not finite, or if it costs far more than the last solution.
+    /// Returns the largest gap of the start. Allocates only if a start is lost.
     pub(super) fn recover(&mut self, problem: &mut Problem, settings: &Settings, gap: f64, last_cost: f64) -> f64 {
         let cost = self.iterate.solution.cost;
         let limit = if last_cost.is_finite() { LOST * (1.0 + last_cost.abs()) } else { f64::INFINITY };
@@ -53,7 +53,8 @@ impl SolverLoop {
     /// Shifts the trajectory and its gains by one knot: see [`Fddp::shift`](crate::Fddp::shift).
     ///
     /// # Errors
-    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls differ from the numbers of the last problem, shifted
+    /// once.
     pub(super) fn shift(&mut self, problem: &mut Problem, settings: &Settings) -> Result<(), Error> {
         let Iterate { solution, next, .. } = &mut self.iterate;
         let (old, new) = (solution.shape(), problem.shape());

@@ -20,12 +20,12 @@ use std::time::Duration;
 /// ```
 pub trait Observer {
     /// Receives an iteration that has ended, and returns whether to continue. The return value is ignored if the solve
-    /// has ended by itself.
+    /// would end now anyway.
     fn iteration(&mut self, now: &Iteration) -> ControlFlow<()>;
 
     /// Returns whether to continue, while an iteration is running. It is called between the phases of an iteration
-    /// (derivatives, sweep, trials), at most every 10 ms. A program can check for signals here, or a flag that another
-    /// thread sets.
+    /// (derivatives, sweep, trials), at most every 10 ms. A program can check here for signals, or for a flag that
+    /// another thread sets.
     fn go_on(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -58,7 +58,7 @@ impl Verdict for ControlFlow<()> {
 /// Minimum time between two calls of [`Observer::go_on`].
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// Observer of a solve, and the times at which the solve began and at which it was called last.
+/// Observer of a solve, the time at which the solve began, and the time at which the observer was called last.
 pub(super) struct Watch<'a> {
     observer: &'a mut dyn Observer,
     pub(super) begin: Instant,
@@ -95,9 +95,9 @@ pub(super) enum Phase {
     Rollout,
 }
 
-/// Number of durations from which the duration of a phase is predicted, by their median. Two delays among five then
-/// change nothing, and a slower machine is noticed after three. (The minimum would never notice it, and each solve
-/// would overrun.)
+/// Number of durations whose median predicts the next duration of a phase. Two delays among five then change nothing,
+/// and a slower machine is noticed after three durations. (The minimum would never notice a slower machine, and each
+/// solve would overrun.)
 const RECENT: usize = 5;
 
 /// Last durations of a phase, of this solve and the previous ones.
@@ -115,7 +115,7 @@ impl Recent {
         self.count += 1;
     }
 
-    /// Returns the median, the lower one of an even number; zero if no duration is stored.
+    /// Returns the median, or the lower of the two middle values; zero if no duration is stored.
     pub(super) fn median(&self) -> Duration {
         let mut sorted = self.durations;
         let known = &mut sorted[..self.count.min(RECENT)];
@@ -129,7 +129,7 @@ impl Recent {
 pub(super) struct Clock {
     /// Beginning and time limit of the solve.
     limit: Option<(Instant, Duration)>,
-    /// Part of the time that phases must leave unused.
+    /// Time at the end of the budget that phases must leave unused.
     pub(super) reserve: Duration,
     /// Whether phases run regardless of the time, as in the first iteration of a solve.
     guaranteed: bool,
@@ -137,7 +137,7 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Starts a solve with the time limit `budget`. Its first iteration runs regardless of the time, unless the budget
+    /// Starts a solve with the time limit `budget`. The first iteration runs regardless of the time, unless the budget
     /// is zero.
     pub(super) fn start(&mut self, begin: Instant, budget: Option<Duration>) {
         self.limit = budget.map(|budget| (begin, budget));

@@ -1,5 +1,5 @@
 //! Actions without a robot, for tests.
-#![allow(dead_code)] // each test file uses some of them
+#![allow(dead_code)] // each test file uses only some of the items
 #![allow(non_snake_case)] // A, B, T, E
 
 use condyle_optimal::{ActionModel, GroupModel, LqKnot, Problem};
@@ -32,8 +32,8 @@ pub(crate) fn random_knot(random: &mut impl Rng, ndx: usize, nu: usize) -> LqKno
     knot
 }
 
-/// Returns a knot as [`random_node`] does, whose A and B belong to semi-implicit Euler. q and v have nv entries each. T
-/// and E are the identity, except for random blocks over `blocks`.
+/// Returns a knot like [`random_knot`], but with A and B of semi-implicit Euler. q and v have nv entries each. T and E
+/// are the identity, except for random blocks over `blocks`.
 pub(crate) fn random_euler_knot(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqKnot {
     let (mut knot, dt) = (random_knot(random, 2 * nv, nu), 0.05);
     let (mut T, mut E) = (DMatrix::identity(nv, nv), DMatrix::identity(nv, nv));
@@ -81,8 +81,8 @@ impl ActionModel for Linear {
     }
 }
 
-/// Unicycle with x = (x, y, θ), u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖² + ‖u‖²); without u at the
-/// terminal knot.
+/// Unicycle with x = (x, y, θ), u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖² + ‖u‖²). The terminal
+/// knot has no u.
 pub(crate) struct Unicycle {
     pub(crate) nu: usize,
     pub(crate) lanes: usize,
@@ -134,7 +134,7 @@ impl ActionModel for Unicycle {
     }
 }
 
-/// Action whose controls are bounded, by the same numbers at every knot.
+/// Action with the same bounds on its controls at every knot.
 pub(crate) struct Limited<A> {
     pub(crate) action: A,
     pub(crate) lower: Vec<f64>,
@@ -191,7 +191,7 @@ pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_unicycle(x0, horizon, lanes, None)
 }
 
-/// Pole on a cart, θ = 0 upright, x = (y, θ, ẏ, θ̇), u = (f): semi-implicit Euler steps of Δt = 0.03 s.
+/// Cart with a pole. θ = 0 is upright, x = (y, θ, ẏ, θ̇), u = (f). Semi-implicit Euler steps of Δt = 0.03 s:
 ///
 /// ```text
 /// μ = m₁ + m₂ sin²θ
@@ -200,7 +200,7 @@ pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
 /// x⁺ = x + Δt (ẏ + Δt ÿ, θ̇ + Δt θ̈, ÿ, θ̈)
 /// ```
 ///
-/// ℓ = ½ Σ wᵢ² (θ, y, ẏ, θ̇, f)ᵢ², times Δt except at the terminal knot.
+/// The cost is ℓ = ½ Σ wᵢ² (θ, y, ẏ, θ̇, f)ᵢ², times Δt except at the terminal knot.
 pub(crate) struct Cartpole {
     pub(crate) nu: usize,
     pub(crate) lanes: usize,
@@ -289,15 +289,15 @@ impl ActionModel for Cartpole {
     }
 }
 
-/// Start of the swing-up in Crocoddyl's examples.
-#[allow(clippy::approx_constant)] // nearly hanging, not π
+/// Initial state of the swing-up in Crocoddyl's examples.
+#[allow(clippy::approx_constant)] // the pole hangs nearly straight down; the number is not meant to be π
 pub(crate) const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
 
 pub(crate) fn cartpole(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_cartpole(x0, horizon, lanes, None)
 }
 
-/// Returns a knot of the swing-up.
+/// Returns the action of a knot of the swing-up.
 pub(crate) fn cartpole_action() -> Cartpole {
     Cartpole { nu: 1, lanes: 1, weights: [1.0, 0.1, 0.1, 0.1, 0.3] }
 }
@@ -317,8 +317,8 @@ pub(crate) fn straight(first: &[f64], last: &[f64], horizon: usize) -> Vec<f64> 
     (0..=horizon).flat_map(at).collect()
 }
 
-/// State on a unit circle as a manifold: x = (cos φ, sin φ), nx = 2, ndx = 1. The control u turns it, ℓ = ½ (φ² + 0.1
-/// u²).
+/// State on a unit circle as a manifold: x = (cos φ, sin φ), nx = 2, ndx = 1. The control u turns the state; ℓ = ½ (φ²
+/// + 0.1 u²).
 pub(crate) struct Circle {
     pub(crate) nu: usize,
 }

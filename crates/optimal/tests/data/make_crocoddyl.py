@@ -3,7 +3,7 @@
 
 pip install crocoddyl==3.2.1 pin==4.0.0 && python make_crocoddyl.py
 
-Crocoddyl's sign of K and k: u = ubar - alpha k - K dx.
+K and k have Crocoddyl's sign: u = ubar - alpha k - K dx.
 """
 import json, math, pathlib
 import numpy as np

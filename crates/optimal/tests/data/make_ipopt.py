@@ -30,7 +30,9 @@ def cartpole(x, u, dt=0.03):
 
 
 def solve(step, nu, x0, horizon, cost, end, constraints, end_constraints, guess):
-    """Solves by multiple shooting; constraints(x, u) and end_constraints(x) return lists of (lower, g, upper)."""
+    """Solves a problem by multiple shooting.
+
+    constraints(x, u) and end_constraints(x) return lists of (lower, g, upper)."""
     opti = casadi.Opti()
     xs, us = opti.variable(len(x0), horizon + 1), opti.variable(nu, horizon)
     total = end(xs[:, horizon])
@@ -125,7 +127,7 @@ class Arm:
                 rows = [("ixx", "ixy", "ixz"), ("ixy", "iyy", "iyz"), ("ixz", "iyz", "izz")]
                 inertia = R @ casadi.DM([[i[name] for name in row] for row in rows]) @ R.T
                 f = m * (dv + casadi.cross(dw, c) + casadi.cross(w, casadi.cross(w, c)))
-                n = inertia @ dw + casadi.cross(w, inertia @ w) + casadi.cross(p + c, f)  # about the origin
+                n = inertia @ dw + casadi.cross(w, inertia @ w) + casadi.cross(p + c, f)  # moment about the origin
             else:
                 f, n = casadi.DM.zeros(3), casadi.DM.zeros(3)
             bodies.append((axis, p, f, n))
@@ -138,8 +140,8 @@ class Arm:
 
 
 def reach(q0, horizon, dt, target, effort, speed):
-    """Solves for an arm that comes to rest with its tool at a point, with bounds on efforts and speeds; forces by
-    inverse dynamics."""
+    """Solves the problem of an arm that comes to rest with its tool at a point, with bounds on efforts and speeds.
+    Inverse dynamics relates efforts and accelerations."""
     arm, opti = Arm(ARM, "tool"), casadi.Opti()
     qs, vs, us = (opti.variable(7, n) for n in (horizon + 1, horizon + 1, horizon))
     opti.subject_to(qs[:, 0] == q0)
@@ -178,7 +180,7 @@ def main():
     def line(a, b, n):
         return [[p + (q - p) * t / n for p, q in zip(a, b, strict=True)] for t in range(n + 1)]
 
-    # around a disc, with bounded speed and turning rate, to rest at the origin
+    # a unicycle moves around a disc, with bounded speed and turning rate, and comes to rest at the origin
     start, n = [-1.0, -1.0, 1.0], 40
     disc = [-0.55, -0.6, 0.2]
 
@@ -190,7 +192,7 @@ def main():
     ways = [park_on(start, n, disc, guess) for guess in (line(start, [0.0, 0.0, 0.0], n), around(1), around(-1))]
     park = min(ways, key=lambda found: found["cost"])
 
-    # a leaning pole is caught on a short track: bounds on the cart and its force, upright and at rest at the end
+    # a leaning pole is caught on a short track: cart and force are bounded, the pole ends upright and at rest
     start, n = [0.0, 0.3, 0.0, 0.0], 60
     w, h = [0.01, 1.0, 0.01, 0.01, 0.09], 0.03
     catch = solve(

@@ -5,21 +5,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Budget of each solve and one delay (ms). Both are long compared with an iteration of some µs and with disturbances
-/// by other processes.
+/// Budget of each solve, and duration of the delay (ms). Both are long compared with an iteration of a few µs and with
+/// disturbances by other processes.
 const BUDGET: Duration = Duration::from_millis(400);
 const DELAY: u64 = 900;
-/// Horizon of the problem: a solve takes several iterations from a new initial state.
+/// Horizon of the problem; it is so long that a solve takes several iterations from a new initial state.
 const HORIZON: usize = 30;
-/// Largest |x| that occurs in the closed loop; a diverging rollout exceeds it by orders of magnitude.
+/// Bound on |x| in the closed loop; a diverging rollout exceeds it by orders of magnitude.
 const SANE: f64 = 50.0;
 
-/// Unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1: its state triples in 6 knots under a constant control.
-/// On request, its derivatives sleep or become NaN.
+/// Unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1 s. Under a constant control, its state triples in 6
+/// knots. On request, its derivatives sleep or become NaN.
 #[derive(Clone)]
 struct Unstable {
     nu: usize,
-    /// Duration for which the next derivatives sleep (ms).
+    /// Time for which the next call of `calc_diff` sleeps (ms).
     delay: Arc<AtomicU64>,
     /// Whether derivatives are NaN.
     broken: Arc<AtomicU64>,
@@ -57,7 +57,7 @@ impl ActionModel for Unstable {
     }
 }
 
-/// One of the two solvers.
+/// Either of the two solvers.
 enum Solver {
     Fddp(Box<Fddp>),
     Constrained(Box<AugmentedLagrangian>),
@@ -135,7 +135,7 @@ impl Loop {
         })
     }
 
-    /// Makes one control period: the plant follows the plan, the horizon moves by one knot, and the next plan is
+    /// Simulates one control period: the plant follows the plan, the horizon moves by one knot, and the next plan is
     /// computed.
     fn step(&mut self) -> Solution {
         let plan = self.solver.solution();
@@ -150,12 +150,12 @@ impl Loop {
     }
 }
 
-/// Returns the largest entry of a trajectory.
+/// Returns the largest absolute value in the trajectory of a solution.
 fn size(solution: &Solution) -> f64 {
     solution.xs.iter().chain(&solution.us).fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// One delay makes one solve late, which reports it; the following solves are normal.
+/// A delay makes one solve late, which reports an overrun; the following solves are normal.
 #[test]
 fn a_controller_recovers_from_a_delay() {
     for mut now in Loop::all() {
@@ -191,7 +191,7 @@ fn a_budget_below_an_iteration_is_overrun() {
 }
 
 /// With a budget of zero no iteration is made. Horizons that are only shifted end in copies of their last state. A
-/// solve with time then gives the same result as one that starts from scratch.
+/// later solve with time gives the same result as a solve that starts from scratch.
 #[test]
 fn horizons_stay_sane_without_iterations() {
     for mut now in Loop::all() {
@@ -203,7 +203,7 @@ fn horizons_stay_sane_without_iterations() {
             now.solver.shift(&mut now.problem).unwrap();
             assert!(size(now.solver.solution()) < SANE);
         }
-        // x_N follows from the last control once, and is copied afterwards
+        // x_N follows from the last control once, and is copied at later shifts
         let xs = &now.solver.solution().xs;
         assert_eq!(xs[..2].repeat(HORIZON), xs[2..]);
         now.solver.settings().time_budget = None;
@@ -214,7 +214,7 @@ fn horizons_stay_sane_without_iterations() {
     }
 }
 
-/// With several shifts in a row, the first rolls the last control out, and the others copy.
+/// At several shifts in a row, the first shift computes the last state from the last control, and the others copy it.
 #[test]
 fn only_a_new_trajectory_is_rolled_out() {
     for mut now in Loop::all() {
@@ -229,7 +229,7 @@ fn only_a_new_trajectory_is_rolled_out() {
     }
 }
 
-/// Solves that end as not finite do not make the horizon diverge either.
+/// After solves that end as not finite, shifts do not make the horizon diverge either.
 #[test]
 fn horizons_stay_sane_when_nothing_is_finite() {
     for mut now in Loop::all() {

@@ -1,4 +1,4 @@
-//! Derivatives of a Python function whose user gave no function for them. Four methods are tried in this order: one
+//! Derivatives of a Python function whose derivatives the user did not give. Four methods are tried in this order: one
 //! call for all knots with numbers that carry their derivatives; one such call for each knot; hyper-dual numbers, which
 //! the functions of a model also accept; and central differences. A method that fails for a function is not tried
 //! again.
@@ -81,7 +81,7 @@ impl Differentiated<'_> {
     }
 
     /// Writes the derivatives of the accelerations at a knot to `slopes`, nv × n, row by row, and the derivatives of
-    /// the cost to a knot. Returns false if no method works.
+    /// the cost to `knot`. Returns false if no method works.
     pub(super) fn dynamics(
         &self,
         py: Python<'_>,
@@ -124,7 +124,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of m numbers at a knot, m × n, row by row. Returns false if no method works.
+    /// Writes the derivatives of a vector of m numbers at a knot, m × n, row by row. Returns false if no method works.
     pub(super) fn vector(
         &self,
         py: Python<'_>,
@@ -152,7 +152,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the gradient and the Hessian of a number at a knot. Returns false if no method works.
+    /// Writes the gradient and the Hessian of a scalar function at a knot. Returns false if no method works.
     pub(super) fn number(
         &self,
         py: Python<'_>,
@@ -182,7 +182,8 @@ impl Differentiated<'_> {
     }
 
     /// Writes the derivatives of the accelerations a at a knot, as `dynamics` does, and the second derivatives of μᵀ a.
-    /// The latter are stored in the knot instead of the Hessian of a cost. Returns false if no method works.
+    /// The second derivatives are stored in the knot instead of the Hessian of a cost. Returns false if no method
+    /// works.
     pub(super) fn curvature(
         &self,
         py: Python<'_>,
@@ -302,7 +303,7 @@ impl Differentiated<'_> {
         self.functions.call(py, 0, (t, x, u))
     }
 
-    /// Calls the function with each pair of directions, and passes its two results to `read`.
+    /// Calls the function with each pair of directions, and passes both results of the function to `read`.
     fn hyper_pairs(
         &self,
         py: Python<'_>,

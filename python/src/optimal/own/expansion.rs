@@ -92,7 +92,7 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// Creates a variable that is one of the directions, with these values at the knots.
+    /// Creates a variable whose change is one of the directions; `values` are its values at the knots.
     pub(super) fn variable(directions: Directions, direction: usize, values: impl Iterator<Item = f64>) -> Self {
         let mut numbers = Vec::new();
         for value in values {
@@ -103,7 +103,7 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// Creates a constant, with these values at the knots.
+    /// Creates a constant; `values` are its values at the knots.
     pub(super) fn constant(directions: Directions, values: impl Iterator<Item = f64>) -> Self {
         let mut numbers = Vec::new();
         for value in values {
@@ -357,7 +357,7 @@ Expansion {
 }
 }
 
-/// Returns an array of objects with these numbers.
+/// Returns an array of objects: the given numbers with their derivatives.
 pub(super) fn objects<'py>(py: Python<'py>, numbers: impl Iterator<Item = Expansion>) -> PyResult<Bound<'py, PyAny>> {
     let numbers = numbers.map(|number| Ok(Py::new(py, number)?.into_any())).collect::<PyResult<Vec<_>>>()?;
     Ok(PyArray1::from_vec(py, numbers).into_any())

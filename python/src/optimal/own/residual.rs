@@ -30,7 +30,7 @@ pub(in crate::optimal) struct OwnFunction {
     pub fault: Fault,
 }
 
-/// Returns the variables for errors of those residuals of a knot that are written in Python.
+/// Returns the variables that store the errors of a knot's residuals, for all residuals written in Python.
 pub(in crate::optimal) fn faults(knot: &Knot) -> Vec<Fault> {
     let costs = knot.costs.iter().chain(knot.costs_at.values().flatten());
     let limits = knot.limits.iter().chain(knot.limits_at.values().flatten());

@@ -48,7 +48,7 @@ impl Space {
         ))
     }
 
-    /// Returns the space as the argument from which `new` reads it.
+    /// Returns the argument from which `new` creates this space.
     pub(super) fn argument<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         Ok(match self {
             Self::Vector(_) => None,
@@ -119,8 +119,8 @@ impl Space {
         }
     }
 
-    /// Returns x ⊕ δ at several knots, with derivatives with respect to δ, whose entries are the first directions. `xs`
-    /// contains the states of the knots one after the other.
+    /// Returns x ⊕ δ at several knots, with derivatives with respect to δ. The entries of δ are the first directions.
+    /// `xs` contains the states of the knots one after the other.
     pub(super) fn expand<'py>(&self, py: Python<'py>, d: Directions, xs: &[f64]) -> PyResult<Bound<'py, PyAny>> {
         let (nx, ndx) = (self.nx(), self.ndx());
         let each = |i: usize| xs.iter().skip(i).step_by(nx).copied();

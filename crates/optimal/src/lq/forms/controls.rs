@@ -24,8 +24,8 @@ impl Controls {
     }
 
     /// Computes L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a
-    /// bound. Stores Qu and Quu in the feedback and, if there are bounds, k in the scratch. Returns the number of these
-    /// controls.
+    /// bound. Stores Qu and Quu in the feedback and, if there are bounds, k in the scratch. Returns the number of
+    /// eliminated controls.
     ///
     /// # Errors
     /// The control and its pivot, if the pivot is not positive.
@@ -56,7 +56,7 @@ impl Controls {
         Ok(self.free)
     }
 
-    /// Computes [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination. The states are rotated by `turn`.
+    /// Computes the gains [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination, whose states are rotated by `turn`.
     pub(super) fn write_gains(
         &mut self,
         work: &mut Workspace,
@@ -98,7 +98,8 @@ impl Controls {
     }
 }
 
-/// Moves the rows and columns of the `free` controls, out of m, to the front of H, followed by the rest of H.
+/// Moves the rows and columns of the free controls, whose indices among m are `free`, to the front of H. The states
+/// follow.
 fn keep_free(H: &mut [f64], stride: usize, m: usize, n: usize, free: &[usize]) {
     let (kept, rows) = (free.len(), m + n + 1);
     for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {

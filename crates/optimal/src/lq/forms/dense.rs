@@ -43,7 +43,7 @@ impl KnotForm for Dense {
         add_to_diagonal(H, ld, m, regularisation);
     }
 
-    /// Writes Θ [B A].
+    /// Writes Θ [B A] below H.
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
@@ -70,7 +70,7 @@ impl KnotForm for Dense {
 /// the curvature of the dynamics.
 pub(super) fn write_cost(work: &mut Workspace, knot: &LqKnot, turn: usize, curvature: &mut Curvature<'_>) {
     let (n, m) = (knot.ndx(), knot.nu());
-    let (ld, split) = (work.stride(m), n - turn); // `split`: number of states in H before the rotation wraps around
+    let (ld, split) = (work.stride(m), n - turn); // `split`: number of states before the rotated order wraps around
     let Workspace { H, p, .. } = work;
     let (R, S, Q) = (View::new(knot.R.as_slice(), m), View::new(knot.S.as_slice(), n), View::new(knot.Q.as_slice(), n));
     copy_lower(H, ld, R, m);
@@ -112,7 +112,7 @@ fn add_hessian(H: &mut [f64], ld: usize, Hessian { xx, xu, uu }: &Hessian, turn:
     }
 }
 
-/// Adds ϱ 1 to Quu.
+/// Adds the regularisation ϱ to the diagonal of Quu.
 pub(super) fn add_to_diagonal(H: &mut [f64], ld: usize, m: usize, regularisation: f64) {
     for j in 0..m {
         H[j * ld + j] += regularisation;

@@ -1,4 +1,4 @@
-//! Knots as equations of inverse dynamics, for small robots with all coordinates driven and in a vector space: arms.
+//! Knots as equations of inverse dynamics, for small arms: all coordinates are driven, and they form a vector space.
 //!
 //! This is the form of [`inverse_dynamics`](super::inverse_dynamics) in which every coordinate is an unknown, y = δv +
 //! w, and T = E = 1:
@@ -9,7 +9,8 @@
 //!     ⎣ Nᵀ Nᵀ P₁₁    ⎦
 //! ```
 //!
-//! The elimination adds the rows of U and G, scaled so that their squares are added, to H tile by tile.
+//! The elimination scales the rows of U and G by the square roots of their weights, and adds their outer products to H
+//! tile by tile.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, U
 
 use super::super::feedback::{KnotFeedback, take_gains};
@@ -22,7 +23,7 @@ use condyle_linalg::{
     transpose_block,
 };
 
-/// Maximum number of coordinates. For more, the form that skips the zeros of rows is faster.
+/// Maximum number of coordinates. For more coordinates, the form that skips the zeros of rows is faster.
 const MOST: usize = 16;
 /// Maximum number of rows of costs.
 const MOST_COSTS: usize = 16;
@@ -30,11 +31,11 @@ const MOST_COSTS: usize = 16;
 /// Form of driven robots, with its scratch.
 #[derive(Debug, Clone)]
 pub(in crate::lq) struct Driven {
-    /// Scaled rows of U and G over (w, δv, δq), each with its entry of the gradient, and zeros. Shape:
-    /// `stride` × MOST + MOST_COSTS; empty for larger robots.
+    /// Scaled rows of U and G with columns for (w, δv, δq), each followed by its entry of the gradient and by zeros.
+    /// Shape: `stride` × MOST + MOST_COSTS; empty for larger robots.
     rows: Vec<f64>,
     stride: usize,
-    /// Number of rows.
+    /// Number of scaled rows.
     count: usize,
     /// Scratch of [`take_gains`].
     y: Vec<f64>,
@@ -48,7 +49,7 @@ impl Driven {
         Self { rows: vec![0.0; stride * (nv + MOST_COSTS)], stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
     }
 
-    /// Returns the number of rows that the form has below H.
+    /// Returns the number of rows that the form stores below H.
     pub(in crate::lq) fn rows_below(n: usize, m: usize) -> usize {
         if n <= 2 * MOST { m } else { 0 }
     }
@@ -71,7 +72,7 @@ impl KnotForm for Driven {
         n / 2
     }
 
-    /// Writes H without the squares, and U below it.
+    /// Writes H without the terms of U and G, and writes U below H.
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, _: &mut Curvature<'_>) {
         self.count = knot.nu() + knot.inverse_dynamics.slopes.len();
         at_narrow_level(Write { rows: &mut self.rows, stride: self.stride, work, knot, regularisation });
@@ -81,8 +82,8 @@ impl KnotForm for Driven {
         unreachable!("segments of a horizon take the form for all robots");
     }
 
-    /// Adds the squares and eliminates the unknowns. With U below H, the result is [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K], as
-    /// in [`Gains`](super::super::feedback::Gains).
+    /// Adds the terms of U and G to H, and eliminates the unknowns. With U below H, the result is [L ·; X Hₓₓ − X Xᵀ;
+    /// yᵀ ·; Y K], as in [`Gains`](super::super::feedback::Gains).
     fn eliminate(&mut self, work: &mut Workspace, knot: &LqKnot, _: &mut KnotFeedback) -> Result<usize, (usize, f64)> {
         let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         let shape = [m + n + 1 + m, m + n, m];
@@ -97,7 +98,7 @@ impl KnotForm for Driven {
     }
 }
 
-/// Loops of [`Driven::write`].
+/// Inner loops of [`Driven::write`], compiled for each SIMD level.
 struct Write<'a> {
     rows: &'a mut [f64],
     stride: usize,
@@ -131,7 +132,7 @@ impl Vectorized for Write<'_> {
         }
         transpose_block::<V>(&mut H[all + 1..], ld, View::new(&form.efforts.numbers, size), [all, nv]);
 
-        // √a″ x, and a′ / √a″ for the gradient
+        // each row is scaled to √a″ x, and its entry of the gradient to a′ / √a″
         let (efforts, costs) = (form.efforts.numbers.chunks_exact(size), form.costs.numbers.chunks_exact(size));
         for (k, (x, row)) in efforts.chain(costs).zip(rows.chunks_exact_mut(stride)).enumerate() {
             let [d, dd] =

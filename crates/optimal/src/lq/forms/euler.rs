@@ -17,7 +17,7 @@ use condyle_linalg::{
 #[derive(Debug, Clone)]
 pub(super) struct Euler {
     steps: Steps,
-    /// Part of NᵀF_q; its stride equals the stride of Nᵀ and Π.
+    /// Scratch for the upper triangle of NᵀF_q, with the stride of Nᵀ and Π.
     M: Vec<f64>,
     controls: Controls,
 }
@@ -34,7 +34,7 @@ impl KnotForm for Euler {
         n / 2
     }
 
-    /// Writes H. With [B A] = [G F_v F_q] on velocities:
+    /// Writes H. With the rows [G F_v F_q] of [B A] for velocities:
     ///
     /// ```text
     /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
@@ -68,7 +68,7 @@ impl KnotForm for Euler {
         add_to_diagonal(&mut work.H, ld, m, regularisation);
     }
 
-    /// Computes Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v.
+    /// Writes Θ B = Ψ G and Θ A = Ψ [F_q F_v] + [Θ_q T  0] below H, with Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
@@ -93,13 +93,13 @@ impl KnotForm for Euler {
     }
 }
 
-/// Value function of the next state as a function of velocities and positions; y is the next velocity. Matrices are
-/// column-major with padding rows and the stride nv + SLACK.
+/// Value function of the next state, in terms of the change y of the next velocity and the change of positions δq.
+/// Matrices are column-major with padding rows and the stride nv + SLACK.
 #[derive(Debug, Clone)]
 pub(super) struct Steps {
-    /// Nᵀ, followed by Π.
+    /// Matrices Nᵀ and Π, one after the other.
     both: Vec<f64>,
-    /// Δt Eᵀp_q + p_v.
+    /// Gradient with respect to y: Δt Eᵀp_q + p_v.
     pub(super) py: Vec<f64>,
     /// Columns of P E or P T that differ from the columns of P, with the stride of P.
     PB: Vec<f64>,
@@ -118,7 +118,7 @@ impl Steps {
         self.both.split_at(self.both.len() / 2)
     }
 
-    /// Writes Π, N and Δt Eᵀp_q + p_v, by which the value of the next state depends on its velocity.
+    /// Writes Π, N and Δt Eᵀp_q + p_v: the terms of the value function that contain the next velocity.
     pub(super) fn write(&mut self, work: &Workspace, knot: &LqKnot) {
         let (dt, blocks) = steps_of(knot);
         let n = knot.ndx();
@@ -126,7 +126,7 @@ impl Steps {
         at_narrow_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
     }
 
-    /// Adds H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
+    /// Adds TᵀP₁₁T to H_qq and Tᵀp_q to Qx_q.
     pub(super) fn add_positions(&mut self, work: &mut Workspace, knot: &LqKnot) {
         let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
         let (nv, ld) = (n / 2, work.stride(m));
@@ -170,7 +170,7 @@ fn steps_of(knot: &LqKnot) -> (f64, &[EulerBlock]) {
     knot.structure.euler().expect("the form is that of Euler steps")
 }
 
-/// Loops of [`Steps::write`].
+/// Inner loops of [`Steps::write`], compiled for each SIMD level.
 struct WriteSteps<'a> {
     steps: &'a mut Steps,
     P: &'a [f64],
@@ -185,8 +185,8 @@ impl Vectorized for WriteSteps<'_> {
         let Self { steps: Steps { both, py, PB }, P, p, dt, blocks } = self;
         let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
 
-        // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  T and E as left factors are first taken
-        // as 1
+        // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂.  The left factors Tᵀ and Eᵀ are omitted
+        // here.
         let by_velocity = |k: usize| View::new(&P[(nv + k) * ldp..], ldp);
         add_in_turn::<V, 1, 1>(both, ldn, ([0], [nv * ldn]), by_velocity(0), View::new(P, ldp), dt, [nv, nv]);
         for block in blocks {
@@ -199,7 +199,7 @@ impl Vectorized for WriteSteps<'_> {
         for ((y, q), v) in py.iter_mut().zip(p_q).zip(p_v) {
             *y = dt * q + v;
         }
-        // then the blocks of T and E as left factors are applied
+        // apply the omitted left factors Tᵀ and Eᵀ, block by block
         for block in blocks {
             let (T, E) = (beyond_identity(&block.T, 1.0), beyond_identity(&block.E, dt));
             for k in 0..nv {
@@ -216,7 +216,7 @@ impl Vectorized for WriteSteps<'_> {
     }
 }
 
-/// Loops of [`Steps::add_positions`]; `H` starts at the diagonal of δq.
+/// Inner loops of [`Steps::add_positions`], compiled for each SIMD level; `H` starts at the diagonal of δq.
 struct AddPositions<'a> {
     steps: &'a Steps,
     P: &'a [f64],
@@ -272,7 +272,7 @@ fn times_blocks(
     }
 }
 
-/// Returns a column of P B: a column of P, unless it belongs to a block.
+/// Returns a column of P B. It equals the column of P, unless the column belongs to a block.
 #[inline(always)]
 fn column<'a>(k: usize, blocks: &[EulerBlock], P: &'a [f64], PB: &'a [f64], ldp: usize) -> &'a [f64] {
     let in_block = blocks.iter().any(|block| block.range().contains(&k));
@@ -291,7 +291,7 @@ fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
     rows
 }
 
-/// Returns the rows of s (B − 1), for a block B.
+/// Returns the rows of s (B − 1), for a block B and a factor s.
 #[inline(always)]
 fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLOCK] {
     let mut rows = rows_of(B);
@@ -304,7 +304,7 @@ fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLO
     rows
 }
 
-/// Computes Bᵀx from the rows of B: eight numbers.
+/// Computes the eight numbers of Bᵀx from the rows of B.
 #[inline(always)]
 fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
     let mut sums = [V::splat(0.0); 4];

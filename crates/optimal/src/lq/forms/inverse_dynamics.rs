@@ -1,9 +1,9 @@
 //! Knots as equations of inverse dynamics: accelerations and forces replace the controls.
 //!
-//! Inverse dynamics is cheap, and sparse where forward dynamics is full. Unknowns w replace δu: as many entries of the
-//! changes of accelerations and contact forces. They are chosen so that all other entries follow from w and δx by the
-//! equations without controls (contacts stay, the base is not driven). With the velocity after the step, ŷ = v⁺ = v +
-//! Δt a, as the unknown,
+//! Inverse dynamics is cheap, and its matrices are sparse where the matrices of forward dynamics are full. Unknowns w
+//! replace δu. They are changes of accelerations and contact forces: as many entries as there are controls. All other
+//! entries follow from w and δx by the equations without controls (contacts stay, the base is not driven). Let y be the
+//! change of the velocity after the step, v⁺ = v + Δt a:
 //!
 //! ```text
 //! δu = U (w, δv, δq)
@@ -12,8 +12,9 @@
 //! δq⁺ = T δq + Δt E y,    δv⁺ = y:        ½ δx⁺ᵀ P δx⁺ = ½ yᵀ Π y + yᵀ N δq + ½ δqᵀ Tᵀ P₁₁ T δq
 //! ```
 //!
-//! where Π and N are the matrices of Euler steps ([`Sweep`](crate::Sweep)). The quadratic form of the knot is thus
-//! copies of Π and N plus few outer products: U with the cost of controls, and D with Z = (Π y + N δq)_d − ½ Π_dd D:
+//! where Π and N are the matrices of Euler steps ([`Sweep`](crate::Sweep)). The quadratic form of the knot thus
+//! consists of copies of Π and N, and of few outer products: U with the cost of controls, and D with Z = (Π y + N δq)_d
+//! − ½ Π_dd D:
 //!
 //! ```text
 //! H = [Π and N on w, δv, δq] + Uᵀ (R + ϱ 1) U + DᵀZ + ZᵀD + Gᵀ a″ G
@@ -21,7 +22,8 @@
 //!
 //! The rows of G are the gradients of residuals that depend on more than δq. All rows have zeros where the robot's
 //! kinematic tree implies them; these zeros are skipped in blocks. Then w is eliminated. The results P, p, K = U_x +
-//! U_w K_w and k = U_w k_w equal the explicit form's results, since for any δx the map from w to δu is invertible.
+//! U_w K_w and k = U_w k_w equal the results with controls as unknowns, because for any δx the map from w to δu is
+//! invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
 use super::super::feedback::{Gains, KnotFeedback};
@@ -35,21 +37,21 @@ use condyle_linalg::{
     eliminate, mask,
 };
 
-/// Inverse-dynamics form, with its scratch.
+/// Form of a knot as equations of inverse dynamics, with its scratch.
 #[derive(Debug, Clone)]
 pub(super) struct InverseDynamics {
     steps: Steps,
-    /// Outer products, with rows over (w, δv, δq).
+    /// Outer products, whose rows have columns for (w, δv, δq).
     products: OuterProducts,
-    /// ½ Π_dd. Shape: dependent × dependent, with padding rows.
+    /// Matrix ½ Π_dd. Shape: dependent × dependent, with padding rows.
     half: Vec<f64>,
-    /// Columns of dependent coordinates. Shape: n × dependent, with padding rows.
+    /// Columns of Ψ for dependent coordinates. Shape: n × dependent, with padding rows.
     below: Vec<f64>,
     gains: Gains,
 }
 
 impl InverseDynamics {
-    /// Returns the maximum requirements of some knots: numbers in rows, products, dependent coordinates.
+    /// Returns the largest sizes of scratch that the knots need: numbers in rows, products, dependent coordinates.
     pub(super) fn room(knots: &[LqKnot]) -> [usize; 3] {
         let rooms = knots.iter().map(|LqKnot { inverse_dynamics: form, .. }| {
             let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
@@ -58,8 +60,7 @@ impl InverseDynamics {
         rooms.fold([0; 3], |a, b| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])])
     }
 
-    /// Allocates the scratch for n states and at most m controls, with the requirements returned by
-    /// [`room`](Self::room).
+    /// Allocates the scratch for n states and at most m controls, with the sizes returned by [`room`](Self::room).
     pub(super) fn new([numbers, products, dependent]: [usize; 3], n: usize, m: usize) -> Self {
         Self {
             steps: Steps::new(n),
@@ -85,7 +86,7 @@ impl KnotForm for InverseDynamics {
         let Self { steps, products, half, .. } = self;
         at_narrow_level(WriteRows { steps, products, half, knot, regularisation, H: &mut work.H, ld });
 
-        // The last rows are D and (Π y + N δq)_d; the latter becomes Z.
+        // The last rows are D and (Π y + N δq)_d; the rows (Π y + N δq)_d become Z.
         let Z = products.count() - count;
         let D = Z - count;
         if count > 0 {
@@ -104,7 +105,7 @@ impl KnotForm for InverseDynamics {
         steps.add_positions(work, knot);
     }
 
-    /// Computes Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v.
+    /// Writes Ψ y + Θ_q T δq below H, with Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m, InverseDynamicsForm { own, dependent, steps: D, stride, .. }) =
             (knot.ndx(), knot.nu(), &knot.inverse_dynamics);
@@ -214,7 +215,7 @@ impl Vectorized for WriteRows<'_> {
         let first = products.add_rows(count);
         let (mut j, zero) = (0, V::splat(0.0));
         while j < count {
-            // rows of consecutive coordinates
+            // copies the rows of consecutive coordinates together
             let (d, together) = (imp.dependent[j], run(&imp.dependent[j..]));
             let rows = &mut products.rows[(first + j) * size..];
             let (own, others) = (View::new(&Pi[d * ldn..], ldn), View::new(&N[d * ldn..], ldn));
@@ -231,7 +232,7 @@ impl Vectorized for WriteRows<'_> {
                 while at < count {
                     let (by, length) = (imp.dependent[at], run(&imp.dependent[at..]));
                     let half = &mut half[(j + i) * (count + SLACK) + at..];
-                    copy_scaled::<V>(half, &Pi[(d + i) * ldn + by..][..length], 0.5); // uses the symmetry
+                    copy_scaled::<V>(half, &Pi[(d + i) * ldn + by..][..length], 0.5); // uses the symmetry of Π
                     at += length;
                 }
             }
@@ -242,7 +243,7 @@ impl Vectorized for WriteRows<'_> {
     }
 }
 
-/// Returns how many numbers at the beginning are consecutive, at least one.
+/// Returns the number of indices at the beginning that are consecutive; at least 1.
 #[inline(always)]
 fn run(numbers: &[usize]) -> usize {
     let mut length = 1;

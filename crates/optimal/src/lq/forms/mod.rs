@@ -1,7 +1,7 @@
-//! Forms in which the sweep receives a knot, and in which its unknowns are eliminated.
+//! Forms of a knot. A form determines how the sweep receives the knot, and which unknowns the sweep eliminates.
 //!
 //! Each knot is a quadratic form H in some unknowns and in the change of its state; the unknowns are eliminated. The
-//! forms differ in how A and B enter H, whether the unknowns are the controls, and the order of the states. Only
+//! forms differ in how A and B enter H, in whether the unknowns are the controls, and in the order of the states. Only
 //! [`Forms::of`] selects the form of a knot.
 #![allow(non_snake_case)] // the names of the literature
 
@@ -30,8 +30,8 @@ pub(super) trait KnotForm {
     /// Writes H, including ϱ, from the knot, from P, and from p at the predicted state.
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>);
 
-    /// After `write`: writes the product of Θ and the map from the unknowns and δx to δx⁺ below H. Θ has n rows (stride
-    /// n + SLACK).
+    /// Writes the product of Θ and the map from the unknowns and δx to δx⁺ below H, after `write` has been called. Θ
+    /// has n rows (stride n + SLACK).
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]);
 
     /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns.
@@ -57,18 +57,18 @@ pub(super) struct Sizes {
     pub(super) n: usize,
     /// Largest number of controls.
     pub(super) m: usize,
-    /// Requirements as returned by [`InverseDynamics::room`].
+    /// Sizes of scratch, as returned by [`InverseDynamics::room`].
     room: [usize; 3],
 }
 
 impl Sizes {
-    /// Returns the sizes for some knots.
+    /// Returns the sizes that a sweep over `knots` needs.
     pub(super) fn of(knots: &[LqKnot]) -> Self {
         let (n, m) = (knots.last().map_or(0, LqKnot::ndx), knots.iter().map(LqKnot::nu).max().unwrap_or(0));
         Self { n, m, room: InverseDynamics::room(knots) }
     }
 
-    /// Returns the maximum number of controls of knots whose gains may be deferred: 0 without such knots.
+    /// Returns the maximum number of controls of a knot whose gains may be deferred; 0 if no knot defers gains.
     pub(super) fn deferred_controls(self) -> usize {
         if self.room[0] > 0 { self.m } else { 0 }
     }
@@ -100,7 +100,7 @@ impl Forms {
         }
     }
 
-    /// Returns the form for a step at a knot.
+    /// Returns the form for a step at a knot, among all forms.
     pub(super) fn of_step(&mut self, knot: &LqKnot, regularisation: f64) -> &mut dyn KnotForm {
         match knot.structure.is_inverse_dynamics() && Driven::takes(knot, regularisation) {
             true => &mut self.driven,
@@ -120,7 +120,7 @@ impl Forms {
     }
 }
 
-/// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it did so.
+/// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it wrote them.
 pub(super) type CurvatureFn<'a> = dyn FnMut(usize, &[f64], &mut Hessian) -> bool + 'a;
 
 /// Request for the curvature of a knot's dynamics; see [`Sweep::run_with`](crate::Sweep::run_with).
@@ -129,7 +129,7 @@ pub(super) struct Curvature<'a> {
     pub(super) knot: usize,
     /// Function that computes the curvature; `None` if the dynamics count as linear.
     pub(super) ask: Option<&'a mut CurvatureFn<'a>>,
-    /// Storage for the curvature, one entry for each number of controls.
+    /// Storage for the curvature: one Hessian for each number of controls.
     pub(super) hessians: &'a mut [Hessian],
 }
 

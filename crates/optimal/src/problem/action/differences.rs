@@ -4,13 +4,13 @@ use super::ActionModel;
 use crate::lq::LqKnot;
 use nalgebra::DMatrix;
 
-/// Step of first differences, about ε^⅓, which balances truncation h² and rounding ε/h.
+/// Step h of first differences, about ε^⅓, which balances the truncation error h² and the rounding error ε/h.
 pub(crate) const FIRST: f64 = 6e-6;
 
-/// Step of second differences, about ε^¼, which balances truncation h² and rounding ε/h².
+/// Step h of second differences, about ε^¼, which balances the truncation error h² and the rounding error ε/h².
 pub(crate) const SECOND: f64 = 1.2e-4;
 
-/// Computes x⁺ and ℓ at (x ⊕ δx, u + δu) with z = (δx, δu).
+/// Computes the next state and the cost ℓ at (x ⊕ δx, u + δu), with z = (δx, δu).
 pub(crate) fn at<A: ActionModel + ?Sized>(
     action: &mut A,
     t: usize,
@@ -26,7 +26,7 @@ pub(crate) fn at<A: ActionModel + ?Sized>(
     action.calc(t, &moved, &u, next)
 }
 
-/// Computes [`calc_diff`](ActionModel::calc_diff) by differences of [`calc`](ActionModel::calc).
+/// Computes [`calc_diff`](ActionModel::calc_diff) by central differences of [`calc`](ActionModel::calc).
 pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
     let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
     // A terminal action does not write `next`: start from x, which is a valid state on any manifold.
@@ -70,8 +70,8 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
     }
 }
 
-/// Writes the second derivative with respect to entries i ≥ j of z = (δx, δu) to the block it belongs to: δx twice,
-/// both, or δu twice.
+/// Writes the second derivative with respect to entries i ≥ j of z = (δx, δu) to its block of the Hessian: xx if both
+/// entries belong to δx, xu if one of them does, else uu.
 pub(crate) fn write_curvature(
     [xx, xu, uu]: [&mut DMatrix<f64>; 3],
     ndx: usize,

@@ -11,11 +11,12 @@ use std::any::Any;
 ///
 /// Only the sizes and [`calc`](Self::calc) must be written; derivatives by hand are faster than the default ones. Each
 /// knot is given by its index t in the horizon. One model can therefore serve all knots that differ only in a reference
-/// (a foot's path, a tracked posture). An action that computes several knots in one call is a [`GroupModel`] as well.
+/// (a foot's path, a tracked posture). An action that computes several knots in one call also implements
+/// [`GroupModel`].
 ///
 /// # The terminal knot
-/// A terminal action has nu = 0 and only a cost. It is called like any other, but its outputs `next` and `A` are never
-/// read and need not be written.
+/// A terminal action has nu = 0 and only a cost. It is called like any other action, but its outputs `next` and `A` are
+/// never read and need not be written.
 ///
 /// # Rules for implementations
 /// - The result depends on the arguments only, not on earlier calls.
@@ -62,26 +63,26 @@ pub trait ActionModel: Any + Send + Sync {
         self.nx()
     }
 
-    /// Returns the number of entries of a control u; zero at a terminal knot and at a knot with only a jump (an
-    /// impact).
+    /// Returns the number of entries of a control u; zero at a terminal knot and at an impact, where the state only
+    /// jumps.
     fn nu(&self) -> usize;
 
     /// Returns whether the action has no next state, so that it may only serve the end of a horizon. By default false:
-    /// an action may serve both.
+    /// the action may serve any knot.
     fn is_terminal(&self) -> bool {
         false
     }
 
     /// Returns the smallest and largest allowed controls of knot t, nu numbers each, infinite for an unbounded control;
-    /// `None` if no control is bounded. They must not change during a solve.
+    /// `None` if no control is bounded. The bounds must not change during a solve.
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
         None
     }
 
-    /// Returns the wrapped action, if this action adds something to another one. Typed access to a robot's costs and
-    /// forces ([`Problem::cost_mut`](crate::Problem::cost_mut), [`Problem::motion`](crate::Problem::motion)) looks
-    /// inside it. `None` by default.
+    /// Returns the wrapped action, if this action wraps another one and adds something to it. Typed access to a robot's
+    /// costs and forces ([`Problem::cost_mut`](crate::Problem::cost_mut), [`Problem::motion`](crate::Problem::motion))
+    /// looks inside the wrapped action. `None` by default.
     fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
         None
     }
@@ -90,19 +91,20 @@ pub trait ActionModel: Any + Send + Sync {
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64;
 
     /// Computes the derivatives of dynamics and cost at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B =
-    /// ∂x⁺/∂u, q = ∂ℓ/∂x, r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The solver writes
-    /// the gap f.
+    /// ∂x⁺/∂u, q = ∂ℓ/∂x, r = ∂ℓ/∂u, and Q, S, R. These are the blocks of the Hessian of ℓ, or of its Gauss–Newton
+    /// approximation. The solver writes the gap f.
     ///
-    /// The default takes central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff) does: slow,
-    /// allocating, and accurate to about 1e-9 (the Hessian to 1e-7). [`AutoDiff`](crate::AutoDiff) computes exact
-    /// derivatives of functions that are written for any scalar.
+    /// The default takes central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff) does. Differences
+    /// are slow, allocate, and are accurate to about 1e-9 (the Hessian to 1e-7). [`AutoDiff`](crate::AutoDiff) computes
+    /// exact derivatives of functions that are written for any scalar.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         differences::calc_diff(self, t, x, u, knot);
     }
 
     /// Computes the second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for
-    /// `lambda` of length ndx. Returns whether it did so. If not, the dynamics count as linear around each iterate
-    /// (Gauss–Newton). Without [`second_order`](crate::Settings::second_order), they always count as linear.
+    /// `lambda` of length ndx. Returns whether it computed them. If not, the dynamics count as linear around each
+    /// iterate (Gauss–Newton). Without [`second_order`](crate::Settings::second_order), the dynamics always count as
+    /// linear.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let _ = (t, x, u, lambda, hessian);
         false
@@ -113,21 +115,21 @@ pub trait ActionModel: Any + Send + Sync {
         None
     }
 
-    /// Returns the group of knots of this crate that the action is.
+    /// Returns this action as a group of knots of this crate, if it is one.
     #[doc(hidden)]
     fn knot_group(&self) -> Option<&dyn KnotGroup> {
         None
     }
 
-    /// Returns the same group as [`knot_group`](Self::knot_group), for computing.
+    /// Returns the same group as [`knot_group`](Self::knot_group), mutable for computing.
     #[doc(hidden)]
     fn knot_group_mut(&mut self) -> Option<&mut dyn KnotGroup> {
         None
     }
 
     /// Returns the controls that hold the state x of knot t still, if the state can stand still: φ(x, u) = x, as nearly
-    /// as controls can reach. By default at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as in Crocoddyl; a robot's
-    /// controls follow from statics. Allocates.
+    /// as controls can reach. The default makes at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as Crocoddyl does.
+    /// The controls of a robot are computed by statics. Allocates.
     fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
         quasi_static::newton(self, t, x)
     }
@@ -136,31 +138,32 @@ pub trait ActionModel: Any + Send + Sync {
     /// to knot t − 1. Does nothing by default. Must not allocate.
     fn shift(&mut self) {}
 
-    /// Returns a copy that computes the same, for another thread or another problem; `None` by default. An action
-    /// without a copy is differentiated on one thread, whatever the setting [`threads`](crate::Settings::threads). A
-    /// problem with such an action cannot be copied ([`Problem::try_clone`](crate::Problem::try_clone)).
+    /// Returns a copy that computes the same results, for another thread or another problem; `None` by default. An
+    /// action without a copy is differentiated on one thread, whatever the setting
+    /// [`threads`](crate::Settings::threads). A problem with such an action cannot be copied
+    /// ([`Problem::try_clone`](crate::Problem::try_clone)).
     fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         None
     }
 
     /// Checks a state, for example the length of a quaternion. All states are valid by default. A problem checks its
-    /// initial state, a solver the states that it is given.
+    /// initial state, and a solver checks the states of its warm start.
     ///
     /// # Errors
-    /// The fault of an invalid state, with the numbers.
+    /// A text about the fault of an invalid state, with the numbers.
     fn check_state(&self, x: &[f64]) -> Result<(), String> {
         let _ = x;
         Ok(())
     }
 
-    /// Computes x ⊕ δx into `out` (nx), by default the sum of a vector space.
+    /// Computes x ⊕ δx into `out` (nx). The default is the sum x + δx, for states in a vector space.
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         for ((o, x), dx) in out.iter_mut().zip(x).zip(dx) {
             *o = x + dx;
         }
     }
 
-    /// Computes x₁ ⊖ x₀ into `out` (ndx): the δ with x₀ ⊕ δ = x₁, by default the difference of a vector space.
+    /// Computes x₁ ⊖ x₀ into `out` (ndx): the δ with x₀ ⊕ δ = x₁. The default is x₁ − x₀, for states in a vector space.
     fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
         for ((o, x0), x1) in out.iter_mut().zip(x0).zip(x1) {
             *o = x1 - x0;
