@@ -6,8 +6,8 @@ Warp.
                            [--partitions 1 0]
 
 Batch sizes are powers of two. "Resident" means that all arrays are on the device. "Copied" means that arguments are
-copied to the device, and results are copied back. `--partitions` gives numbers of threads that share a state; with 0 the
-kernel chooses this number by the number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp
+copied to the device, and results are copied back. `--partitions` gives numbers of threads that share a state; with 0
+the kernel chooses this number by the number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp
 compute `forward`, which is forward dynamics and kinematics, in single precision, for the same robot without shapes.
 They are skipped if they are not installed. The program needs a GPU, NVIDIA's run-time compiler, the packages condyle
 and example-robot-data-loaders, and mujoco for the peers. Without a device, the program prints NOT RUN.

@@ -7,10 +7,10 @@ The program needs the installed package `condyle`, and NVIDIA's wheels with the 
 --install installs these wheels into this Python. Without them the program prints NOT RUN. It fails if a kernel does not
 compile, or if an expected kernel is missing.
 
-With --partitions the program prints the table of docs/generated.md instead, for robots of example-robot-data. For kernels
-that are split among several threads, the table shows the instructions per state in the machine code, and the bytes that
-are spilled to and from a thread's memory. NVIDIA's disassembler shows both. The machine code has no branches, except
-for large angles and for quotients of tiny numbers; these branches are counted once.
+With --partitions the program prints the table of docs/generated.md instead, for robots of example-robot-data. For
+kernels that are split among several threads, the table shows the instructions per state in the machine code, and the
+bytes that are spilled to and from a thread's memory. NVIDIA's disassembler shows both. The machine code has no
+branches, except for large angles and for quotients of tiny numbers; these branches are counted once.
 """
 
 import argparse

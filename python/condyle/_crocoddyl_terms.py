@@ -162,7 +162,9 @@ class Terms:
         return not (self.end and name == "ResidualModelImpulseCoM")
 
     def _efforts(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
-        """Converts a residual of joint efforts: to a residual of the controls, or of the efforts of inverse dynamics."""
+        """Converts a residual of joint efforts: to a residual of the controls, or of the efforts of inverse
+        dynamics.
+        """
         if self.drives is None:
             return Residual.control(theirs.reference), (np.arange(theirs.nr), theirs.nr)
         if not self.drives.usual:

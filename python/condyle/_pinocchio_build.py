@@ -37,7 +37,9 @@ def buildSampleModelHumanoid() -> Model:
 
 
 def buildSampleModelHumanoidRandom() -> Model:
-    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. Its numbers differ, since NumPy draws them."""
+    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. Its numbers differ, since NumPy draws
+    them.
+    """
     return Model(samples.random_humanoid())
 
 

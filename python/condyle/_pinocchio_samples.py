@@ -1,4 +1,6 @@
-"""The sample robots of Pinocchio: an arm with six joints, a humanoid whose limbs are such arms, and a random humanoid."""
+"""The sample robots of Pinocchio: an arm with six joints, a humanoid whose limbs are such arms, and a random
+humanoid.
+"""
 
 import numpy as np
 

@@ -11,7 +11,9 @@ if TYPE_CHECKING:
 else:
 
     def disjoint_base(cls: type) -> type:
-        """Marks a class for type checkers as a disjoint base, so that other disjoint bases cannot be combined with it."""
+        """Marks a class for type checkers as a disjoint base, so that other disjoint bases cannot be combined with
+        it.
+        """
         return cls
 
 
@@ -342,7 +344,9 @@ class Coupling(NamedTuple):
 
 
 class CentroidalMap(NamedTuple):
-    """The quantities of the centroidal momentum hg = Ag(q) v that depend on the position, along the axes of the world."""
+    """The quantities of the centroidal momentum hg = Ag(q) v that depend on the position, along the axes of the
+    world.
+    """
 
     Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""

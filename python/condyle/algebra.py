@@ -75,7 +75,9 @@ class _Spatial:
 
     @classmethod
     def _of(cls: type[_S], vector: _Array) -> _S:
-        """Creates a motion or force from six numbers without a copy; the caller must not change the numbers afterwards."""
+        """Creates a motion or force from six numbers without a copy; the caller must not change the numbers
+        afterwards.
+        """
         x = _new(cls)
         x.vector = vector
         return x

@@ -188,8 +188,8 @@ def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
     First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. For a robot, the Hessian of the
     cost is the Gauss–Newton approximation w (∂r)ᵀ a″ ∂r, with residual r and activation a; for an `Lqr` and a
     `Unicycle` it is exact. The Hessian of the next state is exact for `Lqr` and `Unicycle`, and for `FreeDynamics` and
-    `FreeInverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are treated as linear in the
-    tangent space of the state. An approximate Hessian does not change the optimum, but an optimiser may need more
+    `FreeInverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are treated as linear in
+    the tangent space of the state. An approximate Hessian does not change the optimum, but an optimiser may need more
     iterations.
 
     >>> import condyle, condyle.casadi

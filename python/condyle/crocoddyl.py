@@ -189,7 +189,9 @@ class _Reader:
         return ContactDynamics(robot.model, contacts, dt, costs, theirs.JMinvJt_damping, **rest)
 
     def _limits(self, terms: Terms, theirs: Any, held: list[Any]) -> Any:
-        """Converts the constraints of a model, except its built-in constraints on efforts, contacts and contact forces."""
+        """Converts the constraints of a model, except its built-in constraints on efforts, contacts and contact
+        forces.
+        """
         own = {"tau"} | {f"{item.name}_{what}" for item in held for what in ("acc", "force")}
         manager = theirs.constraints
         if manager is None:

@@ -309,10 +309,10 @@ def compile(  # noqa: A001
     """Compiles a function of a robot to a kernel with NVIDIA's run-time compiler, or reads it from the cache.
 
     name: one of `condyle.codegen.functions`; frames, constraints, external_forces, inputs: as for these. dtype: the
-        kind of numbers in the computation. partitions: the number of threads per state, each of which computes some of the
-        results; at most one thread for each limb and one for the trunk. The default is one thread. If one thread would
-        need more registers than it has, and several threads for all states fit on the device at the same time, the
-        default is the fastest number. ptx: the result of the function `ptx` for the same model, name, dtype and
+        kind of numbers in the computation. partitions: the number of threads per state, each of which computes some of
+        the results; at most one thread for each limb and one for the trunk. The default is one thread. If one thread
+        would need more registers than it has, and several threads for all states fit on the device at the same time,
+        the default is the fastest number. ptx: the result of the function `ptx` for the same model, name, dtype and
         options; then the compiler is not needed. cache: a folder; by default the environment variable CONDYLE_CACHE,
         else `~/.cache/condyle`.
 

@@ -218,7 +218,9 @@ def computeJointJacobian(model: Model, data: Data, q: ArrayLike, joint: int) -> 
 
 
 def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes the centroidal momentum matrix Ag, (6, nv), also stored as data.Ag. Also computes data.hg and data.com."""
+    """Computes the centroidal momentum matrix Ag, (6, nv), also stored as data.Ag. Also computes data.hg and
+    data.com.
+    """
     Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
     data.Ag = Ag
     data._leave(com, Force._of(Ag @ np.asarray(v, float)))

@@ -121,7 +121,9 @@ def _lines(axes: Any, time: Any, values: _Array, labels: list[str], name: str, s
 
 
 def _labels(model: Model, first: list[int], count: list[int]) -> list[str]:
-    """Returns a label for each coordinate: the name of its joint, with a number if the joint has several coordinates."""
+    """Returns a label for each coordinate: the name of its joint, with a number if the joint has several
+    coordinates.
+    """
     labels = [""] * sum(count)
     for name, at, n in zip(model.names, first, count, strict=True):
         for k in range(n):

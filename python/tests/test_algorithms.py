@@ -1,4 +1,6 @@
-"""Checks relations between functions that hold for every robot; tests/peers compares the numbers with other libraries."""
+"""Checks relations between functions that hold for every robot; tests/peers compares the numbers with other
+libraries.
+"""
 
 from collections.abc import Callable
 from typing import Any

@@ -90,7 +90,9 @@ SHAPES = hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=9)
 @quiet
 @given(SHAPES, st.sampled_from([np.float64, np.int32, np.complex128, "U3", "M8[s]", object]))
 def test_any_shape_is_read_or_refused(shape: tuple[int, ...], dtype: Any) -> None:
-    """The array is read as one or many states, or an error names the argument, the expected shape and the found shape."""
+    """The array is read as one or many states, or an error names the argument, the expected shape and the found
+    shape.
+    """
     q, zero = np.zeros(shape, dtype), np.zeros(7)
     if shape == (7,) or (len(shape) == 2 and shape[1] == 7 and shape[0] > 0):
         wanted: tuple[type[Exception], ...] = () if np.dtype(dtype).kind in "fi" else (TypeError,)

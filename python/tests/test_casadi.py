@@ -107,7 +107,9 @@ def state(name: str, robot: str, seed: int = 0) -> Arrays:
 
 
 def stretched(name: str, robot: str) -> Arrays:
-    """Returns the same arguments, but with quaternions of another length than 1, as in the iterates of an optimisation."""
+    """Returns the same arguments, but with quaternions of another length than 1, as in the iterates of an
+    optimisation.
+    """
     q, *others = state(name, robot)
     return [q * 1.1, *others]
 

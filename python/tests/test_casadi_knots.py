@@ -108,7 +108,9 @@ def sizes(name: str) -> tuple[int, int]:
 
 
 def arguments(name: str, stretch: float = 1.0) -> list[np.ndarray]:
-    """Returns a random state and controls. The lengths of quaternions and pairs (cos, sin) are multiplied by `stretch`."""
+    """Returns a random state and controls. The lengths of quaternions and pairs (cos, sin) are multiplied by
+    `stretch`.
+    """
     (nx, nu), robot, rng = sizes(name), KNOTS[name][1], np.random.default_rng(7)
     x, u = rng.standard_normal(nx), rng.standard_normal(nu)
     if robot is not None:

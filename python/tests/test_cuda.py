@@ -70,7 +70,9 @@ def test_single_precision(gpu: Gpu) -> None:
 
 
 def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -> None:
-    """Several threads share a state if all threads fit on the device at the same time, in eight blocks of 256 threads."""
+    """Several threads share a state if all threads fit on the device at the same time, in eight blocks of 256
+    threads.
+    """
     kernel = condyle.cuda.compile(quadruped.model, "rnea_derivatives")
     assert kernel.partitions > 2
     assert condyle.cuda.compile(ARM, "rnea_derivatives").partitions == 1

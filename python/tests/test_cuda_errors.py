@@ -74,7 +74,9 @@ capsule = found.__dlpack__()
 
 
 def run(program: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """Runs a program with its own cache, because files of the replacement compiler are valid only within one process."""
+    """Runs a program with its own cache, because files of the replacement compiler are valid only within one
+    process.
+    """
     with TemporaryDirectory() as cache:
         changed = os.environ | {"CONDYLE_CACHE": cache} | environment
         return subprocess.run([sys.executable, "-c", program], env=changed, capture_output=True, text=True, check=False)

@@ -238,7 +238,9 @@ def test_strict(tmp_path: Path) -> None:
 
 
 def test_singular() -> None:
-    """If M is singular, functions that need M⁻¹ raise an error, and all other functions work. A rotor makes M regular."""
+    """If M is singular, functions that need M⁻¹ raise an error, and all other functions work. A rotor makes M
+    regular.
+    """
     model = condyle.Model.from_urdf_str(PENDULUM)
     data, zero = condyle.Data(model), np.zeros(2)
     message = "^joint `slide` moves nothing that has inertia along it: the inertia matrix is singular$"

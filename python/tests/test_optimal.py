@@ -218,7 +218,9 @@ def test_what_no_file_can_hold() -> None:
 
 
 def test_costs_of_a_knot_move_with_it() -> None:
-    """A horizon that was shifted and got new targets at its end equals a horizon that has these targets from the start."""
+    """A horizon that was shifted and got new targets at its end equals a horizon that has these targets from the
+    start.
+    """
     horizon = 12
 
     def follow(time: int) -> list[Cost]:

@@ -1,4 +1,6 @@
-"""Tests of problems and solvers: an action for each knot, evaluation, callbacks, progress output, pickles of results."""
+"""Tests of problems and solvers: an action for each knot, evaluation, callbacks, progress output, pickles of
+results.
+"""
 
 import pickle
 import sys

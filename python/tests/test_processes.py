@@ -280,7 +280,9 @@ def test_control_c(name: str) -> None:
 
 
 def test_signals_on_another_thread() -> None:
-    """Only the main thread receives signals: a solve on another thread continues, and does not block the interpreter."""
+    """Only the main thread receives signals: a solve on another thread continues, and does not block the
+    interpreter.
+    """
     check(
         LONG["simulation"].replace("2**63", "200_000")
         + """

@@ -1,4 +1,6 @@
-"""Tests of pictures: the pattern of zeros of the tree, plots, shapes, and the contents of the page that shows a motion."""
+"""Tests of pictures: the pattern of zeros of the tree, plots, shapes, and the contents of the page that shows a
+motion.
+"""
 
 import subprocess
 import sys

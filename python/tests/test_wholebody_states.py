@@ -59,7 +59,9 @@ def test_a_quaternion_has_length_1(factor: float) -> None:
 
 
 def test_references_are_positions_and_poses() -> None:
-    """References that are set are checked at once; references that are changed in place are checked in the next step."""
+    """References that are set are checked at once; references that are changed in place are checked in the next
+    step.
+    """
     controller = new()
     good = controller.hold(STANDING)
     mirror = np.diag([1.0, 1.0, -1.0, 1.0])
