@@ -480,7 +480,9 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
-    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")  # its other names equal names of Condyle
+    # `_spelling` is not in `others`: its other classes (`SE3`, `Model` and others) have the same names as classes of
+    # Condyle.
+    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
 """{inspect.getdoc(module)}"""

@@ -14,16 +14,16 @@
 //! declared after `data`, with its type. The call borrows its scratch memory before it inspects any other argument, so
 //! that nested use of the same memory is an error. It reads all inputs before it writes to `out`, so `out` may be one
 //! of the inputs. Positions, tangent vectors and forces may be given for many states, with one more axis. The results
-//! then have this axis, too; see `batch.rs`. A line
+//! then have this axis, too; see `batch.rs`. An example of a line `batch` is
 //!
 //! ```text
 //! batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
 //! ```
 //!
-//! defines the computation for many states. It contains the check that the robot must pass, the arguments, the kind of
-//! result, and the call of the library's `Batch`. Arguments that all states share follow after a semicolon. `batch b,
-//! constraints` instead of `batch b` adds a set of constraints. A function without `Data` has a line that begins with
-//! `each` instead, with the shape of its result; it is called state by state.
+//! This line defines the computation for many states. Its parts are a check of the robot (`any`), the arguments, the
+//! kind of result (`One`), and the call of the library's `Batch`. Arguments that all states share follow after a
+//! semicolon. `batch b, constraints` instead of `batch b` adds a set of constraints. A function without `Data` is
+//! called state by state. Instead of `batch`, its line begins with `each` and gives the shape of the result.
 //!
 //! Each part of a declaration has its macro: `function!` the signature, `many!` a line `batch`, `each!` a line `each`,
 //! and `one!` the body. What does not depend on the declaration is in functions.

@@ -66,9 +66,10 @@ pub struct Settings {
     pub armature_is_input: bool,
     /// Whether the gravitational acceleration is an argument `gravity_vector` of three numbers instead of a constant.
     pub gravity_is_input: bool,
-    /// Number of threads that share every state in CUDA kernels: at most one for each limb and one for the trunk. By
-    /// default, functions for which it is worthwhile ([`Function::partitions`]) can be computed in partitions, and a
-    /// launch uses the partitions if there are few states. Other languages ignore this setting.
+    /// Number of threads of a CUDA kernel that compute one state together: at most one for each limb and one for the
+    /// trunk. The part of the function that one of these threads computes is a partition. By default, only functions
+    /// that gain from partitions have partitions ([`Function::partitions`]). A launch uses the partitions only for few
+    /// states. Other languages ignore this setting.
     pub partitions: Option<NonZero<usize>>,
 }
 

@@ -230,8 +230,8 @@ fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     }
 }
 
-/// Computes C ← A Bᵀ, where the sums for a block of columns of C start with the term of the block's first column. With
-/// LOWER, computes only the rows from the diagonal on.
+/// Computes C ← A Bᵀ. For a block of columns of C that begins with column j, the sums over k begin with k = j. With
+/// LOWER, computes only the rows from j on.
 #[inline(always)]
 fn from_diagonal<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],

@@ -254,9 +254,9 @@ const UNDER_WAY: usize = 8;
 
 /// Implements [`minus_products`] in vector registers.
 ///
-/// The entries of four columns of X stay in registers while their sums accumulate, as many as fit. The last group of
-/// rows ends at the last row and overlaps the group before it, so some entries are computed twice. Each entry is the
-/// same sum in the same order as in `neg_product`.
+/// The sums of a group of rows in up to four columns of X accumulate in registers. `run` selects the number of rows in
+/// a group. The last group ends at the last row and may overlap the group before it; the entries in both groups are
+/// computed twice. Each entry is the same sum in the same order as in `neg_product`.
 struct InRegisters<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],

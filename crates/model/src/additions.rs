@@ -256,7 +256,7 @@ impl Additions {
                 let body = &model.bodies[index(b)];
                 let (nq, nv) = (body.joint.nq(), body.joint.nv());
                 if body.mimic.is_some() {
-                    continue; // its coordinate belongs to its leader
+                    continue; // a follower's coordinate belongs to the leader
                 }
                 if joint_q.len() != nq || joint_v.len() != nv {
                     let (q, v) = (joint_q.len(), joint_v.len());

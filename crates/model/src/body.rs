@@ -44,7 +44,7 @@ pub struct Frame {
     pub placement: Se3<f64>,
 }
 
-/// Item in the description of a robot from which a frame comes.
+/// Source of a frame: a link or joint of the robot's file, the user, or a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]

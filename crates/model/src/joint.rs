@@ -235,7 +235,7 @@ impl Joint {
     #[inline(always)]
     pub(crate) fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
-            Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // its offset is part of X_T
+            Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // the offset of `mimic` is part of X_T
             _ => q[k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
         }
     }

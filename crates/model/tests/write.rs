@@ -319,7 +319,7 @@ fn inertias_of_an_mjcf_come_back() {
         m.with_inertias(|i, I| if keeps(i) { I } else { I + other(i) }).unwrap()
     };
     let new = written("fingers", HAND, more).unwrap();
-    // an inertia from geoms becomes an <inertial>, and the fixed body keeps its own
+    // an inertia from geoms becomes an <inertial>, and the fixed body keeps its <inertial>
     assert!(new.contains("<body name='palm'>\n      <inertial pos=\""), "{new}");
     assert!(new.contains("mass='0.25' diaginertia='0.01 0.02 0.025' euler='0 45 0'"), "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();

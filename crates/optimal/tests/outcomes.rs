@@ -385,7 +385,8 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         let mut problem = Problem::new(HANGING.to_vec(), vec![Box::new(noting)], vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap();
-        // expected groups per line search: one length alone, and after a rejection as many groups as the search needed
+        // Each line search first tries a group of one step length. If that step is rejected, the search tries further
+        // groups until a step is accepted.
         let (mut expected, mut last) = (vec![], 0.0);
         for iteration in &solution.trace {
             expected.push(1);

@@ -74,7 +74,8 @@ fn a_replaced_knot_is_that_of_a_new_problem() {
         let (xs, us) = (x0().repeat(KNOTS + 1), changed.quasi_static(&x0().repeat(KNOTS + 1)).unwrap());
         let mut solver_of_changed = solver(&changed, threads);
         solver_of_changed.solve(&mut changed, &xs, &us).unwrap();
-        // a contact is made earlier, and the targets of two knots differ
+        // Knot 3 gets four feet on the ground and another target, and is replaced twice. Knot 6 gets another target.
+        // Knot 7 gets another target and only two feet on the ground.
         for (t, target, feet) in [(3, 20, &ALL[..]), (6, 9, &ALL), (3, 5, &ALL), (7, 1, &TWO)] {
             changed.set_knot(t, model(target, feet, DT)).unwrap();
         }

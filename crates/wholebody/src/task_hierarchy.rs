@@ -118,7 +118,7 @@ impl TaskHierarchy {
         self.given[0].write(program, known, objective);
     }
 
-    /// Returns the last program of the first priority's solver.
+    /// Returns the program that was last written for the solver of the first priority.
     pub(crate) fn program(&self) -> &ConeProgram {
         self.given[0].program()
     }

@@ -334,7 +334,8 @@ def normal_force(r, nu):
         ("line", pin.LOCAL, normal_force),
         ("line", pin.LOCAL_WORLD_ALIGNED, normal_force),
         ("line", pin.LOCAL_WORLD_ALIGNED, acceleration),
-        ("plane", pin.LOCAL, friction),  # Crocoddyl's residual of a force does not support a plane
+        # friction, not normal_force: Crocoddyl's `ResidualModelContactForce` does not support contacts of kind "plane"
+        ("plane", pin.LOCAL, friction),
         ("plane", pin.LOCAL, acceleration),
     ],
 )

@@ -318,7 +318,7 @@ def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
         "actuator_ctrllimited",
     ]:
         effect[field] = getattr(m, field).copy()
-    effect["eq_data"][:, 10] = 0.0  # the torque scale is for compliant welds
+    effect["eq_data"][:, 10] = 0.0  # the torque scale only matters for compliant welds, so the comparison ignores it
     effect["actuator_biasprm"][m.actuator_biastype == 0] = 0.0
     effect["actuator_dynprm"][m.actuator_dyntype == 0] = 0.0
     for name in ("tendon_range", "actuator_forcerange", "actuator_ctrlrange"):

@@ -257,8 +257,8 @@ def test_languages(name: str, language: str, folder: Path) -> None:
 
 
 def external(pair: Pair, code: Library) -> None:
-    """Checks that CasADi receives each function's results from the code, and computes its Jacobian by the generated
-    derivatives."""
+    """Checks that calls through CasADi give the same results as the generated code. CasADi's Jacobian of a function
+    must consist of the generated derivatives."""
     state = pair.states(1)[0]
     numbers = {"q": state.q, "v": state.v, "restitution": np.array([RESTITUTION]), "lambda": state.v[::-1].copy()}
     for function, (inputs, outputs) in code.functions.items():

@@ -72,7 +72,7 @@ def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
 
 
 def random_case(state: State, seed: int, loops: bool) -> Case:
-    """Chooses constraints from a dozen random ones, as many as the robot can satisfy with unique forces."""
+    """Chooses constraints from a dozen random ones. The robot can satisfy all chosen constraints with unique forces."""
     rng, pair = np.random.default_rng(seed), state.pair
     frames = [i for i, _ in common_frames(pair)]
     chosen: list[condyle.ContactConstraint] = []

@@ -34,7 +34,7 @@ const LOST: f64 = 1e-3;
 /// Rounding error of a solve with M, in units of ε κ(M).
 const ROUNDINGS: f64 = 100.0;
 
-/// Reasons for the bounds, as shown in the table.
+/// Reasons for the bounds, as shown in the report of `condyle check`.
 const SAME: &str = "same operations";
 const SUMS: &str = "sums of some hundreds of terms";
 const PATHS: &str = "two computations of the same sums";

@@ -290,7 +290,7 @@ impl<S: Block> Group<S> {
                 states += 1;
             }
             let (strides, shape) = match SYMMETRIC.contains(&kind) {
-                true => ([n * n, 1], [1, n * n]), // its columns are its rows
+                true => ([n * n, 1], [1, n * n]), // the columns of a symmetric matrix are its rows
                 false => ([1, n], [n, n]),
             };
             scatter_matrix(&Strided { vectors, strides, shape, negative: false }, &mut each[..states], n);

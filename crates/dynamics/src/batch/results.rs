@@ -84,8 +84,8 @@ pub(super) struct Taken<'b, T: Real> {
 
 /// Type of results.
 pub(super) trait Take<'b, T: Real> {
-    /// Shapes of the results, for types that define shapes. For other types, the entry of the function in the table
-    /// defines the shapes.
+    /// Shapes of the results, if the type determines them. Otherwise, the function's entry in `table.rs` gives the
+    /// shapes.
     const SHAPES: &'static [&'static [usize]] = &[];
 
     fn take(from: &mut Taken<'b, T>) -> Self;

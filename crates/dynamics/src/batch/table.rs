@@ -31,7 +31,7 @@ pub(super) const BODIES: usize = usize::MAX - 1;
 pub(super) const PARAMETERS: usize = usize::MAX - 2;
 /// Number of constraint rows.
 pub(super) const ROWS: usize = usize::MAX - 3;
-/// Number of columns given by an entry of the table.
+/// Number of columns that an entry of `batched!` gives.
 pub(super) const COLUMNS: usize = usize::MAX - 4;
 
 /// Argument of a call, for all states.
@@ -174,7 +174,7 @@ macro_rules! batched {
 
             /// Computes all states. If `written` is `None`, the results stay in the batch; otherwise they go to the
             /// caller's memory `written`.
-            #[allow(clippy::too_many_arguments)] // as many as the function has
+            #[allow(clippy::too_many_arguments)] // the arguments are those that the entry lists
             #[track_caller]
             pub(super) fn compute<T: condyle_spatial::block::Real>(
                 batch: &mut $crate::batch::Batch<T>,

@@ -1,6 +1,6 @@
 //! Table of every function that a control loop calls. Tests use it for properties that all functions must have.
 //!
-//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not in the table, because rayon allocates when threads
+//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not in this table, because rayon allocates when threads
 //! synchronise.
 
 use super::{State, lift, lift_forces};
@@ -21,7 +21,7 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 
-/// Arguments with which the functions of the table are called.
+/// Arguments with which the functions of this file's table are called.
 #[derive(Clone, Debug)]
 pub(crate) struct Input<S> {
     pub(crate) q: Vec<S>,
@@ -52,7 +52,7 @@ impl<S: Scalar> Input<S> {
     }
 }
 
-/// Results of the functions in the table, and scratch that is not part of a `Data`.
+/// Results of the functions in this file's table, and scratch that is not part of a `Data`.
 pub(crate) struct Output<S: Scalar> {
     pub(crate) numbers: Vec<S>,
     q: Vec<S>,

@@ -21,10 +21,11 @@ const HERE: &str = "tests/suite/panics.rs";
 /// Functions without an argument that could have a wrong length.
 const WITHOUT_LENGTHS: &[&str] = &["log-Cholesky parameters"];
 
-/// Arguments (function, name) that the table copies to a matrix of nalgebra. For wrong lengths, nalgebra itself panics.
+/// Arguments (function, name) that `common/table.rs` copies to a matrix of nalgebra. For wrong lengths, nalgebra itself
+/// panics.
 const COPIED: &[(&str, &str)] = &[("transport", "x")];
 
-/// Calls every function of the table with one number too few in each argument.
+/// Calls every function of `common/table.rs` with one number too few in each argument.
 fn wrong_lengths<S: Scalar>() {
     for model in [robots::arm7(), robots::quadruped()] {
         let right = Input::<S>::random(&model, &mut rng(1));

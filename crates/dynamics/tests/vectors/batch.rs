@@ -369,7 +369,7 @@ fn copies_compute_alone() {
     assert_eq!((count, with.rnea(model, &s.q, &s.v, &s.x, &s.f_ext)), (0, &rnea[..]));
 }
 
-/// Creates the constraints of the table.
+/// Creates the constraints with which the rows of `table.rs` are called.
 fn held(model: &Model, batch: &Batch) -> condyle_dynamics::BatchConstraints {
     let (held, proximal) = constraints(model);
     batch.constraints(model, &held, proximal).unwrap()

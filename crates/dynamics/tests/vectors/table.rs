@@ -128,7 +128,7 @@ fn count<T: Real>(m: &Model, b: &Batch<T>, s: &States<T>) -> usize {
 type Many<T> = fn(&Model, &mut Batch<T>, &mut BatchConstraints<T>, &States<T>, &mut Found<T>);
 type One<T> = fn(&Model, &mut Data<T>, &mut ConstraintSet<T>, &Input<T>, &mut Found<T>);
 
-/// Row of the table: a function for all states by a batch, and the same function for one state.
+/// Row of this file's table: a function for all states by a batch, and the same function for one state.
 pub(crate) struct Row<T: Real> {
     pub(crate) name: &'static str,
     pub(crate) many: Many<T>,

@@ -24,7 +24,7 @@ use std::collections::HashMap;
 /// child whose content is not checked at all.
 pub(crate) struct Known {
     types: HashMap<&'static str, Type>,
-    /// Prefixes of names that occur in the table.
+    /// XML prefixes (before `:`) of the attributes and children in `types`.
     prefixes: Vec<&'static str>,
 }
 

@@ -56,7 +56,7 @@ fn inertias_of_shapes() {
         let worst = found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-11, "{shape}: {found:?}");
     }
-    // names in the collision are checked if its shape gives the link mass
+    // the names of the elements in <collision> are checked if the link's mass is computed from the shape
     for (inside, near) in [
         ("<posse>1 1 1 0 0 0</posse><density>5</density>", "<posse> in <collision>; nearest is `pose`"),
         ("<densitty>5</densitty>", "<densitty> in <collision>; nearest is `density`"),

@@ -145,7 +145,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Replaces the model of knot t, as an MPC does when a contact is made earlier than planned. The solver needs no
+    /// Replaces the model of knot t, as an MPC does when a contact begins earlier than planned. The solver needs no
     /// other changes, and its next iterations do not allocate. This function allocates. A model that an earlier call
     /// gave to knot t is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
     ///

@@ -201,7 +201,7 @@ macro_rules! register_kernel {
                     Work::<_, Narrow>(($($arg,)*), ::core::marker::PhantomData).run();
                 }
                 if level() >= Level::Avx512 {
-                    // SAFETY: the processor has the level in use.
+                    // SAFETY: `level` returns only levels that the processor supports.
                     unsafe { wide($($arg),*) }
                 } else {
                     assert_supported(NARROW);

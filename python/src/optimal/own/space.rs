@@ -119,8 +119,8 @@ impl Space {
         }
     }
 
-    /// Returns x ⊕ δ at several knots, with derivatives with respect to δ. The entries of δ are the first directions.
-    /// `xs` contains the states of the knots one after the other.
+    /// Returns x ⊕ δ at several knots, with derivatives with respect to δ. In `d`, the first directions of
+    /// differentiation are the entries of δ. `xs` contains the states of the knots one after the other.
     pub(super) fn expand<'py>(&self, py: Python<'py>, d: Directions, xs: &[f64]) -> PyResult<Bound<'py, PyAny>> {
         let (nx, ndx) = (self.nx(), self.ndx());
         let each = |i: usize| xs.iter().skip(i).step_by(nx).copied();

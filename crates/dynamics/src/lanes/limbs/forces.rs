@@ -32,9 +32,9 @@ pub(crate) struct Left<'a> {
 impl<'a> Left<'a> {
     #[inline(always)]
     pub(crate) fn new(plan: &'a Plan, model: &Model, w: &'a World<Four>, d: &'a aba::Workspace<Four>) -> Self {
-        // SAFETY: poses, motions and forces consist of vectors.
+        // SAFETY: poses, motions and forces of `Four` are structs of vector registers only.
         let [oX, S, U, v, c] = unsafe { [numbers(&w.oX), numbers(&w.S), numbers(&d.U), numbers(&d.v), numbers(&d.c)] };
-        // SAFETY: the elements of both arrays are vectors.
+        // SAFETY: the elements of both arrays are vector registers.
         let [D_inv, u] = unsafe { [numbers(&d.D_inv), numbers(&d.u)] };
         Self { plan, oX, S, U, D_inv, u, v, c, world: (-*model.gravity()).to_array() }
     }

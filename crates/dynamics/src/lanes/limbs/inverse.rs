@@ -113,7 +113,8 @@ impl Scratch {
         }
     }
 
-    /// Computes several rows of M⁻¹ (as many as the constant parameter M), up to the diagonal and slightly beyond.
+    /// Computes several rows of M⁻¹, up to the diagonal and slightly beyond. The constant parameter M is the number of
+    /// these rows.
     #[inline(always)]
     fn multiply<V: Block<Number = f64>, const M: usize>(&mut self, block: &ColumnBlock) {
         let (mut start, end) = (0, block.first + M);

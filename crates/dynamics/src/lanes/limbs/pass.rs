@@ -19,7 +19,8 @@ use condyle_spatial::{Array, Force, Inertia, Scalar};
 /// Scratch and results of passes in lanes.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Arguments in lanes. Shape: positions, coordinates, coordinates, and steps of the plan. Written by: `load`.
+    /// Arguments q, v, x and f_ext in lanes. Shapes: q has one vector for each position of the plan, v and x have one
+    /// vector for each coordinate, and f_ext has one force for each step. Written by: `load`.
     pub q: Array<Four>,
     pub v: Array<Four>,
     pub x: Array<Four>,

@@ -268,8 +268,8 @@ impl Line {
         lines.iter().all(|(line, _)| line.dof == first.dof).then_some(sum)
     }
 
-    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of this length l. If l̇ = k q̇, the damping has
-    /// the effort −k d(k q̇) k q̇.
+    /// Adds damping and Coulomb friction that act along this length l. The damping force is −d(l̇) l̇ with
+    /// d(l̇) = d₀ + d₁|l̇| + d₂l̇². If l̇ = k q̇, the effort of the damping at the joint is −k d(k q̇) k q̇.
     pub(super) fn resist(self, model: &mut Model, [d0, d1, d2]: [f64; 3], friction: f64) {
         let k = self.slope.abs();
         model.damping[self.dof] += d0 * k * k;

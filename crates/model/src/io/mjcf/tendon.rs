@@ -42,7 +42,7 @@ pub(super) struct Tendons<'a> {
 impl<'a> Tendons<'a> {
     pub(super) fn read(root: &'a Element, sources: &'a [Source<'a>], joints: &Joints) -> Result<Self, Error> {
         let mut tendons = Self::default();
-        // Other elements are reported by the table of known elements.
+        // Other elements are reported by the check against the known elements (`elements.txt`).
         let elements = root.all("tendon").flat_map(|section| &section.children);
         let elements: Vec<_> = elements.filter(|e| matches!(&*e.tag, "fixed" | "spatial")).collect();
         super::names(elements.iter().copied())?;

@@ -131,7 +131,7 @@ impl<'a> Reader<'a> {
                 if align.unwrap_or(self.compiler(w.element).align_free) && parts.bodies.is_empty() {
                     jXl = axes.inverse(); // the principal axes become the body's frame
                 }
-                Se3::identity() // its q is the body's pose in the world
+                Se3::identity() // the joint's q is the body's pose in the world
             } else {
                 bXl * lXj
             };

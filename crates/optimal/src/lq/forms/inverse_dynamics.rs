@@ -1,9 +1,9 @@
 //! Knots as equations of inverse dynamics: accelerations and forces replace the controls.
 //!
 //! Inverse dynamics is cheap, and its matrices are sparse where the matrices of forward dynamics are full. Unknowns w
-//! replace δu. They are changes of accelerations and contact forces: as many entries as there are controls. All other
-//! entries follow from w and δx by the equations without controls (contacts stay, the base is not driven). Let y be the
-//! change of the velocity after the step, v⁺ = v + Δt a:
+//! replace δu. They are changes of accelerations and contact forces, and w has the same length as δu. All other changes
+//! follow from w and δx by the equations without controls (contacts stay, the base is not driven). Let y be the change
+//! of the velocity after the step, v⁺ = v + Δt a:
 //!
 //! ```text
 //! δu = U (w, δv, δq)
