@@ -11,10 +11,10 @@ use crate::problem::Problem;
 use crate::time::Instant;
 use nalgebra::DVector;
 
-/// Augmented Lagrangian solver around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and
-/// robots with [`Limit`](crate::robot::Limit)s. It uses the bound-constrained Lagrangian method (Conn, Gould, Toint,
-/// 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP does (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard,
-/// Carpentier, 2023).
+/// Augmented Lagrangian solver around [`Fddp`](crate::Fddp), for problems with [`Constrained`](crate::Constrained)
+/// actions and robots with [`Limit`](crate::robot::Limit)s. It uses the bound-constrained Lagrangian method (Conn,
+/// Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP does (Jallet, Bambade, Arlaud, El-Kazdadi,
+/// Mansard, Carpentier, 2023).
 ///
 /// ```text
 /// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω
@@ -23,9 +23,9 @@ use nalgebra::DVector;
 /// until    the constraints and the gradient of the Lagrangian ℓ + yᵀg, along the dynamics, vanish to the tolerances
 /// ```
 ///
-/// Bounds on the actions' controls are enforced as in [`Fddp`], in addition to the constraints. For a receding horizon,
-/// call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the last solution, its
-/// multipliers and its penalty.
+/// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
+/// receding horizon, call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the
+/// last solution, its multipliers and its penalty.
 ///
 /// # Examples
 /// ```
@@ -135,7 +135,7 @@ impl AugmentedLagrangian {
     /// holds x̂₀ still: see [`ConstraintSettings::restart`].
     ///
     /// # Errors
-    /// [`Error`] as for [`Fddp::solve`], or if no value satisfies the bounds of a constraint.
+    /// [`Error`] as for [`Fddp::solve`](crate::Fddp::solve), or if no value satisfies the bounds of a constraint.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut |_: &Iteration| {})
     }
@@ -176,8 +176,8 @@ impl AugmentedLagrangian {
     }
 
     /// Turns the solution and its multipliers into a warm start for a problem that has since been
-    /// [shifted](Problem::shift) by one knot, as [`Fddp::shift`] does. The new last knot gets the multipliers of the
-    /// knot before it, if both knots have the same number of constraints.
+    /// [shifted](Problem::shift) by one knot, as [`Fddp::shift`](crate::Fddp::shift) does. The new last knot gets the
+    /// multipliers of the knot before it, if both knots have the same number of constraints.
     ///
     /// # Errors
     /// [`Error`] if the numbers of knots, states and controls differ from the numbers of the last problem, shifted
