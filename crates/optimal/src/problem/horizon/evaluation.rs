@@ -1,0 +1,194 @@
+//! Evaluation of a problem along a trajectory: rollouts, costs, derivatives and outputs of its knots.
+
+use super::Problem;
+use crate::error::{Error, assert_length};
+use crate::lq::{Gains, KnotFeedback, LqKnot};
+use crate::problem::action::ActionModel;
+use crate::problem::group::{Evaluation, Results, evaluate, innermost};
+use crate::problem::shape::Shape;
+use crate::problem::threads::Knots;
+use std::ops::{ControlFlow, Range};
+
+impl Problem {
+    /// Returns the states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates
+    /// the states.
+    ///
+    /// # Errors
+    /// [`Error`] if `us` has a wrong length or an entry that is not finite, or if a state becomes infinite.
+    pub fn rollout(&mut self, us: &[f64]) -> Result<Vec<f64>, Error> {
+        self.rollout_while(us, || ControlFlow::Continue(()))
+    }
+
+    /// Computes as [`rollout`](Self::rollout) does. At each knot, calls `go_on`, which returns whether to continue. The
+    /// states of knots that were not reached are zeros.
+    ///
+    /// # Errors
+    /// As [`rollout`](Self::rollout).
+    #[doc(hidden)]
+    pub fn rollout_while(&mut self, us: &[f64], mut go_on: impl FnMut() -> ControlFlow<()>) -> Result<Vec<f64>, Error> {
+        Error::check("us", us, self.shape.offsets[self.horizon()])?;
+        let mut xs = vec![0.0; (self.horizon() + 1) * self.nx()];
+        xs[..self.shape.nx].copy_from_slice(&self.x0);
+        for t in 0..self.horizon() {
+            if go_on().is_break() {
+                break;
+            }
+            let (done, ahead) = xs.split_at_mut((t + 1) * self.shape.nx);
+            let u = &us[self.shape.u(t)];
+            self.models.of_mut(self.knot_models[t]).calc(t, &done[self.shape.x(t)], u, &mut ahead[..self.shape.nx]);
+        }
+        Error::check("xs", &xs, xs.len())?;
+        Ok(xs)
+    }
+
+    /// Computes the next states φₜ(xₜ, uₜ) into `next` (N·nx) and the costs ℓₜ(xₜ, uₜ) into `costs` (N + 1, the
+    /// terminal one last), for all knots of a trajectory. Allocates nothing.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    #[track_caller]
+    pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
+        self.calc_with_motions(xs, us, next, costs, &mut []);
+    }
+
+    /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`. This consists of N
+    /// equal parts, which are empty or have [`motion_size`](Self::motion_size) numbers each.
+    #[track_caller]
+    pub(crate) fn calc_with_motions(
+        &mut self,
+        xs: &[f64],
+        us: &[f64],
+        next: &mut [f64],
+        costs: &mut [f64],
+        motions: &mut [f64],
+    ) {
+        let (nx, horizon) = (self.nx(), self.horizon());
+        let size = motions.len() / horizon;
+        self.assert_trajectory(xs, us);
+        assert_length("next", next.len(), horizon * nx);
+        assert_length("costs", costs.len(), horizon + 1);
+        for (action, knots) in &self.runs {
+            let (x, u) = self.places(knots);
+            let motions = &mut motions[knots.start * size..knots.end * size];
+            let mut results = Results::values(&mut next[x.clone()], &mut costs[knots.clone()], motions);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], Evaluation::Values, &mut results);
+        }
+        let mut results = Results::values(&mut self.unread, &mut costs[horizon..], &mut []);
+        let x = &xs[self.shape.x(horizon)];
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Values, &mut results);
+    }
+
+    /// Computes the derivatives at all knots of a trajectory into `lq_knots` (N + 1, the terminal one last). Allocates
+    /// nothing.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    #[track_caller]
+    pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        self.calc_diff_as(Evaluation::Derivatives, xs, us, lq_knots);
+    }
+
+    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics where knots
+    /// support them.
+    #[track_caller]
+    pub(crate) fn calc_diff_as(&mut self, what: Evaluation<'_>, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        let horizon = self.horizon();
+        self.begin_derivatives(xs, us, lq_knots);
+        for (action, knots) in &self.runs {
+            let (x, u) = self.places(knots);
+            let mut results = Results::derivatives(&mut lq_knots[knots.clone()]);
+            let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
+            evaluate(action, t, &xs[x], &us[u], what.part(knots.clone(), horizon), &mut results);
+        }
+        let (x, mut results) = (&xs[self.shape.x(horizon)], Results::derivatives(&mut lq_knots[horizon..]));
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Derivatives, &mut results);
+    }
+
+    /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool in which it is called,
+    /// or else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
+    /// group (model, first index, knots, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
+    /// are written afterwards. Models that cannot be [copied](ActionModel::try_clone) are evaluated on the calling
+    /// thread.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    #[track_caller]
+    pub(crate) fn calc_diff_on(
+        &mut self,
+        what: Evaluation<'_>,
+        [xs, us]: [&[f64]; 2],
+        lq_knots: &mut [LqKnot],
+        found: &mut [KnotFeedback],
+        gains: &mut [Gains],
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqKnot], &mut [KnotFeedback]) + Send,
+    ) {
+        self.begin_derivatives(xs, us, lq_knots);
+        let Self { models, runs, copies, knots, shape, terminal, .. } = self;
+        let t = shape.horizon();
+        let ((lq_knots, end), (found, found_there)) = (lq_knots.split_at_mut(t), found.split_at_mut(t));
+        let mut results = Results::derivatives(&mut *end);
+        evaluate(&mut **terminal, &knots[t..], &xs[shape.x(t)], &[], Evaluation::Derivatives, &mut results);
+        sweep(&**terminal, t, end, found_there);
+        let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets, what };
+        copies.calc_diff(models, runs, all, lq_knots, found, gains, sweep);
+    }
+
+    /// Copies the multipliers of the models into the copies of the models that other threads use.
+    pub(crate) fn share_multipliers(&mut self) {
+        self.copies.share_multipliers(&mut self.models.actions, &self.runs);
+    }
+
+    /// Checks the lengths, and resets the structures of A and B, which the actions set again.
+    #[track_caller]
+    fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
+        self.assert_trajectory(xs, us);
+        assert_length("lq_knots", lq_knots.len(), self.horizon() + 1);
+        for knot in lq_knots {
+            knot.structure.set_dense();
+            knot.rows.clear();
+        }
+    }
+
+    /// Returns for each knot the controls that hold its state still, as far as that is possible: see
+    /// [`quasi_static`](ActionModel::quasi_static). Each knot is treated alone. Allocates.
+    ///
+    /// # Errors
+    /// [`Error`] if the length of `xs` is not (N + 1)·nx, or an entry is not finite.
+    pub fn quasi_static(&mut self, xs: &[f64]) -> Result<Vec<f64>, Error> {
+        Error::check("xs", xs, (self.horizon() + 1) * self.nx())?;
+        let mut us = Vec::with_capacity(self.shape.offsets[self.horizon()]);
+        for t in 0..self.horizon() {
+            us.extend(self.models.of_mut(self.knot_models[t]).quasi_static(t, &xs[self.shape.x(t)]));
+        }
+        Ok(us)
+    }
+
+    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute at (x, u) besides the next
+    /// state. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of each
+    /// contact. The force of a contact is expressed in the axes of the contact's rows; at an impact it is an impulse.
+    /// User-defined accelerations have `acceleration`; other actions have no such vectors.
+    ///
+    /// # Panics
+    /// If t > N or a length is wrong.
+    #[track_caller]
+    pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        assert_length("x", x.len(), self.nx());
+        assert_length("u", u.len(), self.nu(t));
+        if let Some(group) = innermost(self.action_mut(t)) {
+            group.show_outputs(t, x, u, show);
+        }
+    }
+
+    /// Returns the ranges of the states and controls of a run of knots in flat trajectories.
+    fn places(&self, knots: &Range<usize>) -> (Range<usize>, Range<usize>) {
+        let Shape { nx, offsets, .. } = &self.shape;
+        (knots.start * nx..knots.end * nx, offsets[knots.start]..offsets[knots.end])
+    }
+
+    #[track_caller]
+    fn assert_trajectory(&self, xs: &[f64], us: &[f64]) {
+        assert_length("xs", xs.len(), (self.horizon() + 1) * self.nx());
+        assert_length("us", us.len(), self.shape.offsets[self.horizon()]);
+    }
+}
