@@ -34,8 +34,8 @@ fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     }
 }
 
-/// Returns a limit for each kind of residual. Of the entries of a limit, some must be zero, some have bounds, and some
-/// are free.
+/// Returns a limit for each kind of residual. Some entries of a limit must be zero, some have bounds, and some are
+/// free.
 fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
     let contacts = feet(model, ReferenceFrame::LocalWorldAligned);
     let rows = contacts[1].constraint.kind.rows();

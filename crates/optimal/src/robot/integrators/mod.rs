@@ -174,6 +174,12 @@ impl<M: ContinuousModel> Integrated<M> {
         !matches!(self.method, Method::RungeKutta(_)) && self.controls.is_constant()
     }
 
+    /// Returns the controls from which a step is computed: all nodes of the polynomial for the stages of a Runge–Kutta
+    /// method, and otherwise u(0).
+    fn controls_of_step<'u>(&self, u: &'u [f64]) -> &'u [f64] {
+        if matches!(self.method, Method::RungeKutta(_)) { u } else { &u[..self.inner.nu()] }
+    }
+
     /// Writes the next state of one knot of the last solved group. Returns the cost.
     fn step(&mut self, lane: usize, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
         let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
@@ -241,7 +247,7 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         }
         let motion = KnotGroup::inverse_dynamics(self).map_or(0, |(size, _)| size);
         let what = if motion == 0 && what != Evaluation::Values { Evaluation::Derivatives } else { what };
-        let (lanes, room) = (GroupModel::lanes(self), results.motions.len() / count);
+        let (lanes, room) = (GroupModel::lanes(self), results.motions.len() / count.max(1));
         for from in (0..count).step_by(lanes) {
             let to = (from + lanes).min(count);
             let (knots, xs) = (&knots[from..to], &xs[from * nx..to * nx]);
@@ -252,8 +258,7 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
             }
             for i in from..to {
                 let lane = i - from;
-                let u = &us[i * nu..][..nu];
-                let u = if matches!(self.method, Method::RungeKutta(_)) { u } else { &u[..inner_nu] }; // u(0)
+                let u = self.controls_of_step(&us[i * nu..][..nu]);
                 let input = KnotInput { t: knots[lane], x: &xs[lane * nx..][..nx], u };
                 if what != Evaluation::Values {
                     self.differentiate(lane, input, group, &mut results.lq_knots[i]);
@@ -387,9 +392,8 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         if self.method != Method::Terminal {
             assert_length("next", next.len(), self.nx());
         }
-        let stages = matches!(self.method, Method::RungeKutta(_));
-        let input = KnotInput { t, x, u: if stages { u } else { &u[..self.inner.nu()] } }; // u(0)
-        if !stages {
+        let input = KnotInput { t, x, u: self.controls_of_step(u) };
+        if !matches!(self.method, Method::RungeKutta(_)) {
             solve(&mut self.inner, Group::one(&input, Evaluation::Values, true));
         }
         self.step(0, input, next)
