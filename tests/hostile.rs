@@ -1,7 +1,7 @@
 //! A mutated input gives an error or a usable result, never a panic. This test runs the fuzz targets in `fuzz/` for a
 //! fixed number of reproducible inputs.
 
-#[path = "../fuzz/src/hostile.rs"]
+#[path = "../fuzz/src/hostile/mod.rs"]
 #[allow(unreachable_pub)] // the fuzz targets use this module as a module of a library
 mod hostile;
 
