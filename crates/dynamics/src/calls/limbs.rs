@@ -141,7 +141,7 @@ fn call<'a, S: Scalar, R: Constant<S>>(
     arguments: Arguments<'a, S>,
 ) -> Option<(Call<'a>, Arguments<'a>)> {
     let plan = ready(model, data)?;
-    // SAFETY: S and R are f64.
+    // SAFETY: `ready` returns a plan only if S and R are f64.
     let (model, data, arguments): (&Model, &mut Data<f64>, _) = unsafe { (same(model), same(data), arguments.fused()) };
     let Data { limbs, world, rnea, aba, crba, minv, rnea_derivatives, .. } = data;
     let call = Call { model, plan, s: limbs.as_deref_mut()?, world, rnea, aba, crba, minv, rnea_derivatives };
@@ -159,14 +159,20 @@ fn call_without_mimic<'a, S: Scalar, R: Constant<S>>(
 }
 
 impl Call<'_> {
-    /// Loads the arguments of forward dynamics and computes the placements.
+    /// Loads the arguments and computes the placements of all steps.
+    fn place(&mut self, arguments: Arguments<'_>) {
+        load_steps(self.plan, self.s, arguments);
+        self.place_loaded();
+    }
+
+    /// Loads the arguments of forward dynamics and computes the placements of all steps.
     fn place_free(&mut self, arguments: Arguments<'_>) {
         load_free(self.model, self.plan, self.s, self.aba, arguments);
-        self.place();
+        self.place_loaded();
     }
 
     /// Computes the placements of all steps, for arguments that are loaded.
-    fn place(&mut self) {
+    fn place_loaded(&mut self) {
         place_steps(self.model, self.plan, self.s);
         self.world.placed = PlacementCache::Limbs(self.model.geometry_hash());
     }
@@ -204,10 +210,8 @@ pub(crate) fn aba<S: Scalar, R: Constant<S>>(
 /// Computes [`crba`](crate::crba()).
 #[inline]
 pub(crate) fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> bool {
-    let arguments = Arguments { q, v: &[], x: &[], f_ext: &[] };
-    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
-    load_steps(c.plan, c.s, arguments);
-    c.place();
+    let Some((mut c, arguments)) = call_without_mimic(model, data, Arguments::position(q)) else { return false };
+    c.place(arguments);
     crba_by_steps(c.model, c.plan, c.s, FusedF64::of_mut(c.crba.M.as_mut_slice()));
     true
 }
@@ -215,10 +219,8 @@ pub(crate) fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<
 /// Computes [`minv`](crate::minv()).
 #[inline]
 pub(crate) fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> bool {
-    let arguments = Arguments { q, v: &[], x: &[], f_ext: &[] };
-    let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
-    load_steps(c.plan, c.s, arguments);
-    c.place();
+    let Some((mut c, arguments)) = call_without_mimic(model, data, Arguments::position(q)) else { return false };
+    c.place(arguments);
     factorize_by_steps(c.model, c.plan, c.s);
     inverse_by_steps(c.model, c.plan, c.s, FusedF64::of_mut(c.minv.Minv.as_mut_slice()));
     true
@@ -232,8 +234,7 @@ pub(crate) fn rnea_derivatives<S: Scalar, R: Constant<S>>(
     arguments: Arguments<'_, S>,
 ) -> bool {
     let Some((mut c, arguments)) = call_without_mimic(model, data, arguments) else { return false };
-    load_steps(c.plan, c.s, arguments);
-    c.place();
+    c.place(arguments);
     let Arguments { v, x: an, f_ext, .. } = arguments;
     let matrices = c.rnea_derivatives.parts().1.map(FusedF64::of_mut);
     rnea_derivatives_by_steps(c.model, c.plan, c.s, false, v, !f_ext.is_empty(), matrices);

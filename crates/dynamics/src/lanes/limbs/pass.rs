@@ -82,6 +82,11 @@ pub(crate) struct Arguments<'a, S = FusedF64> {
 }
 
 impl<'a, S> Arguments<'a, S> {
+    /// Returns the arguments of an algorithm that depends only on the position.
+    pub(crate) fn position(q: &'a [S]) -> Self {
+        Self { q, v: &[], x: &[], f_ext: &[] }
+    }
+
     /// Returns the same numbers with the type `FusedF64`.
     ///
     /// # Safety
