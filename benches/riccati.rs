@@ -4,9 +4,9 @@
 //! The figures are µs per knot on a Xeon at 2.5 GHz, default build, smallest of many sweeps of 50 knots, for (ndx, nu)
 //! = (76, 32) / (36, 12) / (18, 9) / (14, 7). AVX-512 takes 46 / 8.4 / 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7
 //! / 1.6 for dense matrices. AVX2 takes 63 / 9.1 / 2.7 / 1.7, dense 106 / 11 / 2.9 / 1.8. The baseline takes 133 / 15 /
-//! 3.7 / 2.3, dense 222 / 22 / 4.9 / 2.7. The structure is used from 16 states on. Of the 46 µs, 36 % are the three
-//! products (at 57 GFLOP/s), 24 % are factor and gains, 10 % are waiting for 200 KB per knot, and the rest are copies
-//! and transposes.
+//! 3.7 / 2.3, dense 222 / 22 / 4.9 / 2.7. The structure is used from 16 states on. The 46 µs consist of the three
+//! products (36 %, at 57 GFLOP/s), factor and gains (24 %), waiting for 200 KB per knot (10 %), and copies and
+//! transposes.
 //!
 //! In segments, on one thread, other kinds of knots take longer than these knots of 46 / 8.1 / 1.6 µs. If the
 //! continuation of a knot after its segment is unknown, the knot takes 1.4 / 1.3 / 1.0 times as long. A link takes 1.9

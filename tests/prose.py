@@ -46,6 +46,7 @@ PATTERNS = [
     (r"\b(?:[Bb]ut for|[Bb]eside)\b", "write `except`, `besides` or `next to`"),
     (r"\bare had\b|\bis had\b", "write `are available` or `are computed`"),
     (r"\bit is no\b|\bthere is no one\b", "write `does not …`"),
+    (r"[.:] (?:Of|What|Who)\b(?![^.]*\?)", "begin with the noun or the verb"),
 ]
 """Patterns of the worst sentences, each with advice on what to write instead."""
 DOC_START = re.compile(r"(?:What|Of|Who|Whose|How)\b")

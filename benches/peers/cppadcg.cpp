@@ -95,8 +95,7 @@ static void measure(const Task &task, const char *name, int outputs, bool takes_
   std::fflush(stdout);
 }
 
-// Writes three square matrices one after the other. Of the last matrix, which is symmetric, only the upper triangle is
-// given.
+// Writes three square matrices one after the other. The last matrix is symmetric, and only its upper triangle is given.
 static void put(Vector &y, const Matrix &dq, const Matrix &dv, Matrix &last) {
   last.template triangularView<Eigen::StrictlyLower>() = last.transpose();
   y << dq.reshaped(), dv.reshaped(), last.reshaped();

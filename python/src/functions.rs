@@ -26,7 +26,7 @@
 //! called state by state. Instead of `batch`, its line begins with `each` and gives the shape of the result.
 //!
 //! Each part of a declaration has its macro: `function!` the signature, `many!` a line `batch`, `each!` a line `each`,
-//! and `one!` the body. What does not depend on the declaration is in functions.
+//! and `one!` the body. The code that does not depend on the declaration is in functions.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};

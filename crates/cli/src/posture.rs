@@ -14,8 +14,8 @@ const DAMPING: f64 = 0.02;
 const REACHED: f64 = 1e-4;
 
 /// Returns a posture within the limits whose frame is at the target, and the distance of its frame from the target (m).
-/// Of several postures that reach the target, the nearest one to `q0` is returned. If no posture reaches it, the
-/// posture with the smallest distance is returned.
+/// If several postures reach the target, the function returns the nearest one to `q0`. If no posture reaches it, the
+/// function returns the posture with the smallest distance.
 ///
 /// The method is damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), with coordinates clamped to their limits
 /// (Nakamura and Hanafusa 1986).

@@ -173,8 +173,8 @@ impl<S: Scalar> Ltdl<S> {
         self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
     }
 
-    /// Factorizes M = Lᵀ D L, in O(n d²). Of two symmetric entries, the one below the diagonal in the
-    /// [`order`](Self::order) of positions is read.
+    /// Factorizes M = Lᵀ D L, in O(n d²). Reads only the diagonal and the entries below it, in
+    /// the [`order`](Self::order) of positions.
     ///
     /// M: nv × nv, symmetric, positive definite (as `crba` returns it). If M is not positive definite, at least one
     /// entry of D is not positive. Allocates nothing. Source: Featherstone (2005).

@@ -269,8 +269,8 @@ impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
     #[inline(always)]
     fn run(mut self) {
         let n = self.nonzero_rows.len();
-        // Selects the number of vectors of a column that stay in registers: the number with the fewest operations. Of
-        // equally good numbers, the largest one is selected.
+        // Selects the number of vectors of a column that stay in registers: the number with the fewest operations. If
+        // several numbers are equally good, selects the largest one.
         let (mut best, mut least) = (1, usize::MAX);
         for many in 1..=3 {
             let cost = n.div_ceil(many * V::LANES) * UNDER_WAY.max(many * SIDE);

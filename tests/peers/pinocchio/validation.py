@@ -49,16 +49,17 @@ Rows that begin with `mimic` are of robots whose joints follow others: Pinocchio
 joints, and the result is projected (`test_mimic.py`), as few of its functions know such joints.
 
 Its universal, spherical ZYX and composite joints are one joint each, ours are chains of joints with bodies without mass
-between them; q and v are laid out alike. Of these it takes the axes for fixed in the body, so that its rates and
-derivatives are not those of its own rnea (`test_joints.py` holds both against differences): such robots are compared
-twice, in everything with the joints as chains in Pinocchio too, and in all but rates and derivatives with its own.
+between them; q and v are laid out alike. Pinocchio takes the axes of these joints for
+fixed in the body, so its rates and derivatives differ from its own rnea (`test_joints.py` compares both with
+differences). Such robots are compared twice: in all quantities with chains of joints in Pinocchio, too, and in all
+quantities except rates and derivatives with Pinocchio's own joints.
 
 `DivideConquer` cuts a robot into pieces that may be worse conditioned than the whole, and has {cuts:.0f} times the room
 where Pinocchio's distance from itself counts.
 
 ## Differences
 
-Of each quantity the state that comes nearest to its bound.
+For each quantity, the table shows the state that comes nearest to the bound.
 
 | Quantity | Bound | Relative difference | Robot | Robots |
 | --- | ---: | ---: | --- | ---: |

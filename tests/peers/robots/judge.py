@@ -110,7 +110,7 @@ class Trial:
         roots: tuple[str | None, ...] = (None,),
         nv: Callable[[Any], int] | None = None,
     ) -> None:
-        """Compares with one peer. Of several root joints, takes the first one that gives the peer's nv."""
+        """Compares with one peer. If several root joints are given, takes the first one with the peer's nv."""
         try:
             theirs = read()
         except RefusedError as error:

@@ -20,9 +20,9 @@ use core::ops::Range;
 ///
 /// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with the last solution as λ'.
 /// Each iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
-/// Of all forces that give the same motion, the smallest are found. With μ = 0 one iteration is exact, and rows that
-/// depend on earlier rows get no force. The number of iterations is fixed, so that all lanes and dual numbers run the
-/// same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic
+/// If several forces give the same motion, the smallest forces are found. With μ = 0 one iteration is exact, and rows
+/// that depend on earlier rows get no force. The number of iterations is fixed, so that all lanes and dual numbers run
+/// the same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic
 /// equations* (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProximalSettings {

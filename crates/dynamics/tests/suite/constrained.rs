@@ -292,8 +292,8 @@ fn energy_of_impacts() {
     }
 }
 
-/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0. Of all
-/// accelerations that the constraints allow, q̈ is nearest to the free acceleration, so no allowed change brings it
+/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0. The
+/// acceleration q̈ is the allowed acceleration that is nearest to the free acceleration, so no allowed change brings it
 /// nearer (Gauss).
 #[test]
 fn gauss_principle() {

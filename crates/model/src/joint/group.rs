@@ -70,7 +70,7 @@ impl Joint {
             _ => {
                 let (R, p) = self.pose(q);
                 let (dR, dp) = lie::exp6(self.twist(v));
-                // Of the quaternions r and −r, which are the same rotation, uses the one that is nearer to q.
+                // The quaternions r and −r are the same rotation. Uses the one that is nearer to q.
                 let sign = S::select(dR.scalar.lt(S::zero()), -S::one(), S::one());
                 let dR = Quaternion { vector: dR.vector.scale(sign), scalar: dR.scalar * sign };
                 self.set_pose((R * dR).normalize(), p + R.to_rotation() * dp, out);
