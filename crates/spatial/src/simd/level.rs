@@ -4,7 +4,7 @@
 //! processor has. The environment variable `CONDYLE_LEVEL` (`baseline`, `simd128`, `neon`, `avx2`, `avx512`) or [`pin`]
 //! chooses a lower level.
 //!
-//! A level decides where products and sums are fused. With the same level, different machines of one architecture give
+//! The level decides which products and sums are fused. At the same level, different machines of one architecture give
 //! the same results to the last bit. (On Arm, products are fused at every level, also at the baseline, if an algorithm
 //! asks for it.)
 //!
