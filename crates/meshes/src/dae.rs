@@ -9,8 +9,9 @@ use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
 
-/// Maximum depth of nested nodes, and maximum number of visited nodes.
+/// Maximum depth of nested nodes.
 const DEEPEST: usize = 64;
+/// Maximum number of visited nodes.
 const MOST_NODES: usize = 100_000;
 
 /// Reads the triangles of a DAE: one part for each material of each geometry that the scene shows.

@@ -206,7 +206,8 @@ mod tests {
         let mut random = numbers();
         for case in 0..60 {
             let count = 4 + case * 5;
-            // In every third case, the points are on a coarse lattice, so many points are collinear, coplanar or equal.
+            // In every third case, the points are on a coarse lattice. Then many points are collinear, coplanar or
+            // equal.
             let mut number = || {
                 let x = random.next().unwrap();
                 if case % 3 == 0 { (4.0 * x).round() } else { x }

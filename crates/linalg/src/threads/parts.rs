@@ -72,7 +72,7 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Returns whether a phase of a part has not begun: the part waits for this phase, or an earlier phase is not
+    /// Returns whether a phase of a part is still to begin: the part waits for this phase, or an earlier phase is not
     /// finished.
     pub fn awaits(&self, part: usize, phase: u8) -> bool {
         self.states[part].load(Ordering::Relaxed) <= 2 * phase
