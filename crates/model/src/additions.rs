@@ -172,7 +172,8 @@ impl ModelBuilder {
                 if let Transmission::Tendon { joints, .. } = &old.transmission {
                     let held = joints.iter().filter(|(i, _)| locked.contains(i));
                     let length: f64 = held.map(|&(i, coefficient)| coefficient * model.joint_position(i, q)).sum();
-                    actuator.bias -= actuator.kp * actuator.gear[0] * length; // adds the constant part of −kp l that the locked joint contributes
+                    // The part of −kp l that depends on the locked joint is now constant.
+                    actuator.bias -= actuator.kp * actuator.gear[0] * length;
                 }
                 self.actuator(actuator);
                 kept.push(k);

@@ -88,7 +88,8 @@ impl ModelBuilder {
     ) -> Vec<(BodyId, Se3<f64>)> {
         let mut place = vec![(parent, placement)];
         self.merge(parent, placement, model.bodies[0].inertia);
-        let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero()); // bXz, from the frame z with the joint axis along z to the body's frame b
+        // Returns bXz: the pose, in body i, of the frame whose z axis is the joint's axis.
+        let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero());
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             let (on, pXp) = place[body.parent];
             if locked.contains(&i) {
@@ -100,7 +101,7 @@ impl ModelBuilder {
             }
             let options = match body.mimic {
                 None => model.joint_options(body.idx_q, body.idx_v),
-                Some(_) => JointOptions::default(), // the options of the leader already include the options of the follower
+                Some(_) => JointOptions::default(), // included in the options of the leader
             };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);

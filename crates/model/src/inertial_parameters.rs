@@ -120,7 +120,7 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
         return Err(NotPhysical::Mass { mass });
     }
     let t = I.mass_com.scale(1.0 / mass);
-    let s = second_moments(I.rotational) - Sym3::outer(t).scale(mass); // about the centre of mass
+    let s = second_moments(I.rotational) - Sym3::outer(t).scale(mass); // moments about the centre of mass
     let z = positive(s.zz)?;
     let (yz, xz) = (s.yz / z, s.xz / z);
     let y = positive(s.yy - yz * yz)?;

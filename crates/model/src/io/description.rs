@@ -137,7 +137,8 @@ impl Description {
             let options = Default::default();
             ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
         }
-        builder.check_size()?; // checked before the search for leaders, which takes time proportional to the number of bodies
+        // Limits the number of bodies before the leaders are searched among them.
+        builder.check_size()?;
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let Some(mimic) = body.mimic else { continue };
             let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;

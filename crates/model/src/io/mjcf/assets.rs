@@ -131,7 +131,8 @@ impl Solids {
         let [w, x, y, z] = a.array("refquat").map_err(said)?.unwrap_or([1.0, 0.0, 0.0, 0.0]);
         let R = Quaternion::new(x, y, z, w).normalize().to_rotation();
         let placed = |p: &[f64; 3]| {
-            let p = R.transpose_mul(Vec3::from(p.map(|x| f64::from(x as f32))) - origin); // MuJoCo reads coordinates in single precision
+            // MuJoCo reads the coordinates in single precision.
+            let p = R.transpose_mul(Vec3::from(p.map(|x| f64::from(x as f32))) - origin);
             Vec3::new(p.x * scale.x, p.y * scale.y, p.z * scale.z)
         };
         let points: Vec<_> = points.iter().map(placed).collect();

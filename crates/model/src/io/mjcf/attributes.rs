@@ -47,7 +47,8 @@ impl<'a> Defaults<'a> {
         for kind in element.children.iter().filter(|c| c.tag != "default") {
             let inherited = class.entry(&kind.tag).or_default();
             if ORIENTATIONS.iter().any(|name| kind.attribute(name).is_some()) {
-                inherited.retain(|name, _| !ORIENTATIONS.contains(name)); // a new orientation replaces all inherited orientations
+                // A new orientation replaces all inherited orientations.
+                inherited.retain(|name, _| !ORIENTATIONS.contains(name));
             }
             for (name, value) in &kind.attributes {
                 let count = value.split_whitespace().count();

@@ -254,7 +254,8 @@ fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
         }
         _ => {
             let [x, y, z] = [a, size[1], size[2]];
-            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area); // area of the two faces perpendicular to each axis
+            // Areas of both faces that are normal to each axis.
+            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area);
             let total: f64 = areas.iter().sum();
             let [across_x, across_y, across_z] = areas.map(|area| area / total);
             // With the half length x, the mean of the squared coordinate is x² over the two faces perpendicular to the

@@ -328,12 +328,12 @@ pub(super) struct Inputs {
     pub(super) own: usize,
     /// Number of activations, if it is known.
     pub(super) activations: Option<usize>,
-    /// Whether the control in the model is the activation in the keyframe.
+    /// Whether the actuator integrates its control. The control in the model is then the activation in the keyframe.
     pub(super) is_integrator: bool,
 }
 
 impl Law<'_> {
-    /// Returns the numbers of controls and activations that an actuator with this law has in a keyframe.
+    /// Returns the numbers of controls and activations that an actuator with this force law has in a keyframe.
     fn inputs(&self, e: &Element) -> Result<Inputs, Error> {
         let (default, own) = if self.gain == "pid" { ("pos vel", "pos") } else { ("voltage", "voltage") };
         let several = matches!(self.gain, "pid" | "dcmotor");
@@ -358,7 +358,8 @@ impl Law<'_> {
         matches!(self.affine(), Ok([gain, _, kp, kv]) if gain == kp && kv < 0.0)
     }
 
-    /// Returns the effect that is lost because a model has no activations and only one control for each actuator.
+    /// Returns the effect of this force law that a model cannot represent. A model has no activations, and only one
+    /// control for each actuator.
     fn left_out(&self) -> &'static str {
         let inputs = self.input.unwrap_or(if self.gain == "pid" { "pos vel" } else { "voltage" });
         match self.dynamics {
@@ -397,7 +398,7 @@ fn target<'a>(e: &'a Element, joints: &Joints, tendons: &Tendons) -> Result<Targ
     })
 }
 
-/// Returns the range of the control, which is inherited from the range of the driven joint or tendon.
+/// Returns the control range that an actuator inherits from the range of its joint or tendon.
 fn inherited(e: &Element, law: &Law, target: &Target, joints: &Joints, tendons: &Tendons) -> Result<[f64; 2], Error> {
     let [lower, upper] = match *target {
         Target::Joint(j) if joints.all[j].joint.nv() == 1 => joints.all[j].range,
