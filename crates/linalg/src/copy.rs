@@ -186,8 +186,8 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
             unsafe { move_transposed::<V, false>(out, at, ldo, x, from, stride) };
             for k in 0..V::N {
                 // Copies the column from the diagonal down, because the transposed block is valid only above the
-                // diagonal. Numbers after the last row are padding, or are written again later. SAFETY: both matrices
-                // have `size` columns, each with `size` rows and N − 1 padding rows.
+                // diagonal. Numbers after the last row are padding, or are written again later.
+                // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
                 unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
             let mut i = next_block::<V>(j, size);

@@ -144,8 +144,8 @@ impl EliminationTree {
     }
 }
 
-/// Returns the rows in an order of minimum degree. The last row is the one coupled with the fewest other rows. The row
-/// before it is the one coupled with the fewest of the remaining rows, and so on. Source: Tinney and Walker, *Direct
+/// Returns the rows in an order of minimum degree. The last row is the row that is coupled with the fewest other rows.
+/// The row before it is coupled with the fewest of the remaining rows, and so on. Source: Tinney and Walker, *Direct
 /// solutions of sparse network equations by optimally ordered triangular factorization* (1967).
 ///
 /// Among rows with the same number of couplings, the row with the fewest initial couplings comes last. So a row that

@@ -167,7 +167,7 @@ pub fn at_narrow_level(work: impl Vectorized) {
     }
 }
 
-/// Adapter that runs a [`Vectorized`] value on registers of type V as a [`Kernel`].
+/// Adapter that runs a `Vectorized` value on registers of type V as a [`Kernel`].
 struct On<W, V>(W, PhantomData<V>);
 
 impl<W: Vectorized, V: Vector> Kernel for On<W, V> {

@@ -13,8 +13,8 @@ narrow! {
     /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ, where xₖ are the
     /// columns of X.
     ///
-    /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. After these
-    /// numbers, each column of X has zeros that end four registers after the last row of H. H has padding rows.
+    /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. In each column
+    /// of X, zeros follow these numbers, up to four registers after the last row of H. H has padding rows.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.

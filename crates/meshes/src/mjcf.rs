@@ -29,8 +29,9 @@ type Attributes<'a> = HashMap<(&'a str, &'a str), &'a str>;
 
 struct File<'a> {
     classes: HashMap<&'a str, Attributes<'a>>,
-    /// File and scale of each mesh, by name. `materials` contains the colour of each material, by name.
+    /// File and scale of each mesh, by name of the mesh.
     meshes: HashMap<String, (String, [f64; 3])>,
+    /// Colour of each material, by name of the material.
     materials: HashMap<&'a str, [f64; 4]>,
     degrees: bool,
     order: &'a str,

@@ -39,7 +39,7 @@ struct Draft {
     mimic: Option<(usize, Mimic)>,
 }
 
-/// Builder of a [`Model`], body by body, parents first.
+/// Builder of a [`Model`]. Bodies are added one by one, each after its parent.
 ///
 /// ```
 /// use condyle_model::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD};

@@ -206,7 +206,7 @@ impl Model {
     }
 
     /// Returns the same robot with one joint that follows another joint and has no coordinate of its own. Each joint is
-    /// given by the index of its body. Limits and losses of the follower act on the leader, as described at
+    /// given by the index of its body. Limits, damping and friction of the follower act on the leader, as described at
     /// [`ModelBuilder::mimic`].
     ///
     /// ```

@@ -26,7 +26,7 @@ pub const LANES: usize = 4;
 #[derive(Clone, Debug)]
 pub struct Plan {
     schedule: Schedule,
-    /// Steps of a pass: the bodies of each step, in the form that passes need.
+    /// Steps of a pass: the bodies of each step, with the data that the pass reads.
     pub steps: Vec<Step>,
     /// Indices of all steps except the world. The last step comes first.
     pub closed: Vec<usize>,

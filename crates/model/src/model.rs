@@ -55,7 +55,7 @@ pub struct Model<R = f64> {
     /// First coordinate of each free joint that has armature along its linear coordinates. Written by: `validate`.
     pub(crate) free_armature: Vec<usize>,
     pub(crate) gravity: Vec3<R>,
-    /// Tree of the robot, in the form that passes need.
+    /// Tree of the robot with turned joint frames, which the passes of algorithms use.
     pub(crate) tree: Tree<R>,
     /// Plan with which a call for one state computes several bodies at once; `None` if the call computes the bodies one
     /// after another.
@@ -207,7 +207,7 @@ impl<R> Model<R> {
 /// Methods with which passes of algorithms read the model.
 #[doc(hidden)]
 impl<R> Model<R> {
-    /// Returns the bodies in the form that passes need.
+    /// Returns the bodies with turned joint frames, which the passes of algorithms use.
     #[inline(always)]
     pub fn nodes(&self) -> &[Node<R>] {
         &self.tree.nodes

@@ -1,4 +1,4 @@
-//! Tree of bodies in the form that passes need. Each joint's frame is turned such that the joint's axis is z. The tree
+//! Tree of bodies for the passes of algorithms. Each joint's frame is turned such that the joint's axis is z. The tree
 //! also lists columns and ancestors.
 //!
 //! A *column* is a degree of freedom of a joint; a *coordinate* is an entry of v. A joint that mimics another joint
@@ -13,7 +13,7 @@ use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use core::iter::successors;
 use core::ops::Range;
 
-/// Body in the form that passes need: the axis of its joint is turned to z, and all data that a pass needs are stored
+/// Body for the passes of algorithms: the axis of its joint is turned to z, and all data that a pass needs are stored
 /// together.
 #[derive(Clone, Debug)]
 pub struct Node<R> {
@@ -71,7 +71,7 @@ pub(crate) struct Space {
     pub v: Range<usize>,
 }
 
-/// Bodies and joints of a robot, in the form that passes need.
+/// Bodies and joints of a robot, with turned joint frames, for the passes of algorithms.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree<R> {
     pub nq: usize,
@@ -94,7 +94,7 @@ pub(crate) struct Tree<R> {
     pub hash: u64,
 }
 
-/// Returns a hash of numbers. The method is FNV-1a (Fowler, Noll, Vo 1991), with words instead of bytes.
+/// Returns a hash of numbers. The method is FNV-1a (Fowler, Noll, Vo 1991), applied to 64-bit words instead of bytes.
 pub(crate) fn hash(words: impl Iterator<Item = u64>) -> u64 {
     words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
         let hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);

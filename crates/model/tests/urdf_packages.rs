@@ -1,5 +1,5 @@
-//! Tests of robots with `package://` addresses. They are searched in given folders and in folders of the environment. A
-//! package that no folder contains is an error.
+//! Tests of robots with `package://` addresses. Packages are searched in given folders and in folders of environment
+//! variables. A package that no folder contains is an error.
 
 use condyle_model::{Error, Model, UrdfOptions, robots};
 use std::path::{Path, PathBuf};

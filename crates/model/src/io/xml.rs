@@ -104,7 +104,8 @@ impl Amount {
         Ok(())
     }
 
-    /// Counts the bytes, tags and equals signs of a text. The error names the limit that is exceeded.
+    /// Adds the bytes, tags and equals signs of a text to the amount that has been read. The error names the limit that
+    /// is exceeded.
     fn add(&mut self, text: &str) -> Result<(), String> {
         let (bytes, count) = (text.as_bytes(), |byte| count(text.as_bytes(), byte));
         (self.bytes, self.tags, self.equals) =

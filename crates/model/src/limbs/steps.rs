@@ -22,9 +22,9 @@ pub struct Step {
     pub joint: Joint,
     /// Indices of the bodies; 0 means an empty lane.
     pub bodies: [usize; LANES],
-    /// Index of the first coordinate of the joints' positions, in arrays of lanes.
+    /// Index, in arrays of lanes, at which the positions of the step's joints begin.
     pub idx_q: usize,
-    /// Index of the first component of the joints' velocities, in arrays of lanes.
+    /// Index, in arrays of lanes, at which the velocities of the step's joints begin.
     pub idx_v: usize,
     /// Steps and lanes of the parents of the bodies.
     pub parents: Parents,

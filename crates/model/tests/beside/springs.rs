@@ -148,7 +148,7 @@ fn weight_is_compensated() {
         compensation.carried(model.bodies()[1].inertia)
     };
     assert_eq!(carried(&found).mass, 5.0);
-    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 · (0.1, 0, 0) + 0.5 · 2 · (0.1, 0, 1)
+    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 kg at (0.1, 0, 0), 0.5 · 2 kg at (0.1, 0, 1)
     let scaled = read(&text.replace("<worldbody>", "<compiler settotalmass='12'/><worldbody>")).unwrap();
     close(&[carried(&scaled).mass], &[10.0]);
     // as in MuJoCo, a negative `gravcomp` acts only if another `gravcomp` is positive

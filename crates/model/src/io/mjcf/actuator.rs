@@ -10,8 +10,8 @@ use std::rc::Rc;
 /// Interval of all real numbers.
 pub(super) const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// Range, and a flag whether the range is a limit. Without a flag, the range is a limit if its lower bound is below its
-/// upper bound.
+/// Range, with a flag that says whether the range is a limit. Without a flag, the range is a limit if its lower bound
+/// is below its upper bound.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Range {
     pub(super) numbers: [f64; 2],

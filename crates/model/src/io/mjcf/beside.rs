@@ -1,6 +1,6 @@
-//! Sections of a file other than the tree of bodies. They are read in the order of their dependencies. Tendons and
-//! actuators add armature, so they come before springs, which may depend on inertia. Limits of effort come last, as
-//! sums over actuators.
+//! Sections of a file other than the tree of bodies. These sections are read in the order of their dependencies.
+//! Tendons and actuators add armature, so they come before springs, which may depend on inertia. Limits of effort come
+//! last, as sums over actuators.
 
 use super::Source;
 use super::keyframe;

@@ -116,7 +116,7 @@ pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Erro
 }
 
 /// Returns the inertia of a geom that has mass, in the frame in which the pose of the geom is given. `mesh` is the mesh
-/// of the geom. `field` contains half the side lengths of the box that stands for the geom's height field.
+/// of the geom. `field` contains half the side lengths of the box that replaces the geom's height field.
 pub(super) fn geom(
     compiler: &Compiler,
     a: &Attributes,

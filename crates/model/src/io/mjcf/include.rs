@@ -60,7 +60,8 @@ impl Files {
         Ok(index)
     }
 
-    /// Reads a text, as [`read`](Self::read) reads a file. Without a folder, the text cannot refer to files.
+    /// Reads a text in the same way as [`read`](Self::read) reads a file. If `folder` is `None`, the text cannot refer
+    /// to files.
     pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
         let root = Element::parse(text, file, &mut self.amount)?;
         self.add(root, folder)

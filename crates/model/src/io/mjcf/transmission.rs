@@ -1,5 +1,5 @@
-//! Transmissions of MJCF's actuators. They determine the actuators of a model, and the effort limits, armature and
-//! damping of the model's joints.
+//! Transmissions of MJCF's actuators. Transmissions determine the actuators of a model, and the effort limits, armature
+//! and damping of its joints.
 
 use super::Source;
 use super::actuator::{ALL, Classes, Mechanics, clipped, scaled};

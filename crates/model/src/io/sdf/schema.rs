@@ -1,5 +1,5 @@
-//! Known elements and attributes of SDF 1.2 to 1.12, after older versions have been converted, and features that a
-//! model cannot represent.
+//! Known elements and attributes of SDF 1.2 to 1.12, and features that a model cannot represent. Files of older
+//! versions are converted before they are checked.
 
 use crate::io::known::LeftOut;
 

@@ -42,7 +42,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
                 .map(|n| format!("has a reduction of {n} and no rotor inertia: M has no inertia of the rotor")),
             Some((element, inertia)) => {
                 if element.tag == ROTOR[0] {
-                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // Drake ignores other reductions
+                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // Drake reads only its own ratio
                 }
                 let why = match (ratio, name) {
                     _ if inertia < 0.0 => Some("which is below 0"),

@@ -11,7 +11,7 @@ use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// MJCF format, with the path relative to which files are included, and the options of the reader.
+/// MJCF format: the path of the file, relative to which other files are included, and the options of the reader.
 pub(super) struct Mjcf<'a> {
     pub(super) path: &'a Path,
     pub(super) options: MjcfOptions,

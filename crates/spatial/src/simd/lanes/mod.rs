@@ -1,4 +1,4 @@
-//! SIMD lanes: several numbers side by side in vector registers.
+//! SIMD lanes: several numbers in one or two vector registers.
 //!
 //! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 with FMA, NEON, or SIMD128. With NEON and SIMD128, each
 //! vector uses two registers. `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`FusedF64`](super::FusedF64) is a
