@@ -76,8 +76,8 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
     }
 }
 
-/// Returns the number of columns in a block, which is one bit of a [`mask`], for rows of `stride` numbers. The number
-/// is a power of two.
+/// Returns the number of columns in a block, for rows of `stride` numbers. Each block has one bit in a [`mask`]. The
+/// number of columns is a power of two.
 #[inline(always)]
 pub fn block(stride: usize) -> usize {
     4 * stride.div_ceil(4 * 64).next_power_of_two()

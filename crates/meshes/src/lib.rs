@@ -1,8 +1,8 @@
 //! Meshes for the web pages that show robots. Mesh files are found, read, simplified and written into the page.
 //!
-//! A page has at most 60 000 triangles, for any size of the mesh files. If there are more, the largest parts are
-//! simplified first. The coordinates of a point are 16-bit numbers relative to the bounding box of its part. Meshes
-//! that cannot be found or read are left out with a note, because a page is useful without them.
+//! A page has at most 60 000 triangles, for any size of the mesh files. If the files contain more triangles, the
+//! largest parts are simplified first. The coordinates of a point are 16-bit numbers relative to the bounding box of
+//! its part. Meshes that cannot be found or read are left out with a note, because a page is useful without them.
 //!
 //! Without the feature `page`, the crate only reads triangles (STL, OBJ) and computes convex hulls.
 //!

@@ -88,7 +88,8 @@ pub(crate) struct Tree<R> {
     /// Nonzero rows of each column of M: the coordinate itself, its ancestors and its descendants in the tree. Length:
     /// nv.
     pub nonzero_rows: Vec<NonzeroRows>,
-    /// Spaces of all coordinates, in order. Consecutive vector spaces are merged.
+    /// Ranges of the coordinates of all joints, in order. The ranges of consecutive joints whose positions are vectors
+    /// are merged.
     pub spaces: Vec<Space>,
     /// Hash of the parents, joints and coordinates. Different trees have different hashes.
     pub hash: u64,

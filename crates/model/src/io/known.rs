@@ -48,8 +48,8 @@ const FREE: &str = "**";
 /// Prefixes of attributes that XML itself uses.
 const XML: [&str; 2] = ["xml", "xsi"];
 
-/// Features of a format that a model cannot represent: the type of an element, its attribute or child, and the effect
-/// of the missing feature.
+/// Features of a format that a model cannot represent: the type of an element, its attribute or child, and the
+/// consequence of the omission.
 pub(crate) type LeftOut = [(&'static str, &'static str, &'static str)];
 
 impl Known {

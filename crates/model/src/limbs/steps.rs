@@ -60,7 +60,7 @@ pub struct Source {
     pub offset: [f64; LANES],
 }
 
-/// Indices from which the lanes of positions and velocities are read, and to which lanes are written.
+/// Indices from which positions and velocities are read into lanes, and to which results in lanes are written.
 #[derive(Clone, Debug)]
 pub struct StateMap {
     /// Sources of the positions of all steps.

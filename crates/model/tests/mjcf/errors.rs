@@ -57,7 +57,7 @@ fn arm_has_what_its_classes_say() {
     let names: Vec<&str> = arm.bodies().iter().skip(1).map(|b| b.joint_name.as_str()).collect();
     assert_eq!(names, ["pan", "lift", "elbow", "body4_joint", "wrist"]);
     assert_eq!(arm.bodies()[1].name, "shoulder#1");
-    assert_eq!(arm.limits().effort()[0], 1.0); // the motor limits it to ±1, the joint to ±40
+    assert_eq!(arm.limits().effort()[0], 1.0); // the limit of the motor is ±1, of the joint ±40
     assert_eq!(arm.friction(), [0.05; 7]);
     assert_eq!(*arm.gravity(), Vec3::new(0.3, -0.2, -9.7));
     assert_eq!(arm.frames()[arm.frame("bracket").unwrap()].body, 4);

@@ -129,7 +129,7 @@ fn loops() {
         else {
             panic!("no frames");
         };
-        // at q = 0, each body is at its joint, so placements can be multiplied
+        // at q = 0, the pose of a body is the product of the placements of the joints that carry it
         frames.map(|f| {
             let frame = &m.frames()[f];
             (frame.body, m.bodies()[frame.body].placement * frame.placement)

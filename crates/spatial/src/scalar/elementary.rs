@@ -3,7 +3,7 @@
 
 use crate::scalar::Scalar;
 
-/// Bound on |x|. Above it, tanh x is ±1 to the last bit of an `f64`.
+/// Bound on |x| above which tanh x is ±1 to the last bit of an `f64`.
 const SATURATED: f64 = 20.0;
 /// Number of times that an argument is halved before its series is summed.
 const HALVINGS: u32 = 6;

@@ -344,8 +344,8 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 }
 
 /// Unsafe marker trait. Vector types have a parameter of this trait, so code without such a type cannot name them. A
-/// processor may lack the instructions of vector operations, and the operations do not check this. [`Scalar::enter`]
-/// does: it calls code that is generic over its scalar.
+/// processor may lack the instructions of vector operations, and the operations do not check this. [`Scalar::enter`],
+/// which calls code that is generic over the scalar, checks this.
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};

@@ -21,7 +21,7 @@ pub(super) struct Solid {
     pub(super) moments: [f64; 3],
     /// Minimum and maximum coordinates of the points along the principal axes (m).
     pub(super) bounds: [[f64; 3]; 2],
-    /// Number of corners of the mesh if the mesh is its convex hull, otherwise `None`.
+    /// Number of corners of the convex hull, if the inertia is computed from the hull; otherwise `None`.
     pub(super) corners: Option<usize>,
     /// Number of faces in the mesh's file of which triangles are left out.
     pub(super) lost: usize,

@@ -17,8 +17,8 @@ const SINGLE: &str = " pose static gravity kinematic self_collide enable_wind in
 /// Maximum number of characters of a number, if other text follows the number.
 const MAX_NUMBER: usize = 32;
 
-/// Adds warnings about repeated elements, of which only the first counts, and about gravity in the physics of a world.
-/// If other text follows the number in an element, removes this text and adds a warning.
+/// Adds warnings about repeated elements, of which only the first has an effect, and about gravity in the `<physics>`
+/// of a world. If other text follows the number in an element, removes this text and adds a warning.
 pub(super) fn tidy(element: &mut Element, warnings: &mut Vec<Warning>) {
     let is_in = |tag: &str, tags: &str| tags.contains(&format!(" {tag} "));
     let mut seen: Vec<String> = Vec::new();
