@@ -10,7 +10,8 @@ pub fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// Computes Σ xₖ yₖ as four independent partial sums, so that additions need not wait for each other.
+/// Computes Σ xₖ yₖ as four independent partial sums, so that the four additions of a step are independent of each
+/// other.
 #[inline(always)]
 pub fn dot<S: Scalar>(x: &[S], y: &[S]) -> S {
     let n = x.len();

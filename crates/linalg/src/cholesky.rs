@@ -17,7 +17,7 @@ fn factorize<S: Scalar>(M: &mut [S], n: usize, mut go_on: impl FnMut() -> bool) 
         let column = &mut rest[j..n];
         for k in 0..j {
             let other = &left[k * n + j..(k + 1) * n];
-            axpy(-other[0], other, column); // M_ij − Σ L_ik L_jk
+            axpy(-other[0], other, column); // column j of M minus L_jk times column k of L
         }
         let r = column[0].sqrt().recip();
         for x in column {
@@ -80,7 +80,7 @@ pub struct Cholesky<S> {
 same_layout!(Cholesky { L });
 
 impl<S: Scalar> Cholesky<S> {
-    /// Maximum number of rows; the factor then takes 128 MiB in doubles.
+    /// Maximum number of rows n. With this many rows, a factor of `f64` numbers takes 128 MiB.
     pub const MOST_ROWS: usize = 4096;
 
     /// Allocates the factor of an n × n matrix.
@@ -180,7 +180,7 @@ impl<S: Scalar> Cholesky<S> {
             column.fill(S::zero());
             column[j] = S::one();
             forward(L, column, j);
-            backward(L, column, j); // the rows from j on; the others follow by symmetry
+            backward(L, column, j); // computes the rows from j on; the rows above follow by symmetry
         }
         for j in 0..n {
             for k in 0..j {

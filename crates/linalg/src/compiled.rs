@@ -1,7 +1,7 @@
 //! Macros for functions that this crate compiles for each SIMD level, and that other crates call.
 
 /// Defines functions that are generic over the register type V and over COLUMNS, the number of columns of a tile. The
-/// [gate](condyle_spatial::gate) turns each of them into a function without generic parameters.
+/// [gate](condyle_spatial::gate) turns each such function into a function without generic parameters.
 macro_rules! compiled {
     ($($functions:tt)*) => { $crate::compiled::functions! { [Wide, 8] $($functions)* } };
 }

@@ -19,8 +19,8 @@ narrow! {
         turned::<V>(out, ldo, a, [size - turn, turn]);
     }
 
-    /// Copies A to OUT on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries
-    /// may count two or three times. This sum is exact enough to detect divergence.
+    /// Copies A to OUT on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², in which some entries
+    /// may be counted two or three times. Callers use this sum only to detect divergence.
     pub fn copy_with_squares<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) -> f64 {
         match out.is_empty() {
             true => squares::<V, false>(out, 0, a, shape),
@@ -60,7 +60,7 @@ compiled! {
     }
 }
 
-/// Copies A to OUT, without a function call; A has `rows` rows and `columns` columns.
+/// Copies A to OUT; A has `rows` rows and `columns` columns. This function is inlined and calls no function.
 #[inline(always)]
 pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
     let [rows, columns] = shape;
@@ -74,8 +74,8 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
         }
         return;
     }
-    // Copies two registers of rows in all columns, then the next two. The last registers may overlap the registers
-    // before them.
+    // Copies the rows of two registers in all columns, then the rows of the next two registers. The last registers may
+    // overlap the registers before them.
     let (last, mut i) = (rows - V::N, 0);
     loop {
         let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
@@ -101,7 +101,7 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
 #[inline(always)]
 unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: usize) {
     debug_assert!(at + V::N <= to.len() && from + V::N <= x.len());
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
 }
 
@@ -123,7 +123,7 @@ unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     for k in 0..V::N {
         let from = from + k * ldx;
         debug_assert!(from + V::N <= x.len());
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         let x = V::load(unsafe { x.get_unchecked(from..from + V::N) });
         block[k] = if NEGATED { x.mul(V::splat(-1.0)) } else { x };
     }
@@ -131,7 +131,7 @@ unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     for k in 0..V::N {
         let at = at + k * ldo;
         debug_assert!(at + V::N <= to.len());
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         block[k].store(unsafe { to.get_unchecked_mut(at..at + V::N) });
     }
 }
@@ -150,10 +150,10 @@ fn next_block<V: Vector>(i: usize, size: usize) -> usize {
 #[inline(always)]
 unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[f64], from: usize, ldx: usize) {
     for k in 0..V::N {
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         unsafe { move_register::<V>(to, at[0] + k * ldo, x, from + k * ldx) };
     }
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     unsafe { move_transposed::<V, false>(to, at[1], ldo, x, from, ldx) };
 }
 
@@ -187,13 +187,13 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
             for k in 0..V::N {
                 // Copies the column from the diagonal down, because the transposed block is valid only above the
                 // diagonal. Numbers after the last row are padding, or are written again later.
-                // SAFETY: as above.
+                // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
                 unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
             let mut i = next_block::<V>(j, size);
             while i < size {
                 let (low, high, from) = (to + j * ldo + i, to + i * ldo + j, from - j + i);
-                // SAFETY: as above.
+                // SAFETY: all offsets are in columns with `size` rows and N − 1 padding rows.
                 unsafe { move_both::<V>(out, [low, high], ldo, x, from, stride) };
                 i = next_block::<V>(i, size);
             }
@@ -205,8 +205,8 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         let mut i = 0;
         while i < turn {
             let (from, places) = (j * stride + split + i, [(turn + j) * ldo + i, i * ldo + turn + j]);
-            // SAFETY: as above.
-            unsafe { move_both::<V>(out, places, ldo, x, from, stride) }; // QV and VQ
+            // SAFETY: all offsets are in columns with `size` rows and N − 1 padding rows.
+            unsafe { move_both::<V>(out, places, ldo, x, from, stride) }; // writes the blocks QV and VQ
             i = next_block::<V>(i, turn);
         }
         j = next_block::<V>(j, split);
@@ -263,13 +263,13 @@ fn lower<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
     assert!(inside, "a matrix ends before the last of its entries");
     for j in 0..size {
         let (at, from, rows) = (j * ldo + j, j * a.stride + j, size - j);
-        // SAFETY: both slices hold column j from the diagonal on. It was found to be in bounds.
+        // SAFETY: both slices are column j from the diagonal on, and this column was found to be in bounds.
         let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
         copy::<V>(to, x);
     }
 }
 
-/// Computes OUT = Aᵀ without a function call; A has `rows` rows and `columns` columns.
+/// Computes OUT = Aᵀ; A has `rows` rows and `columns` columns. This function is inlined.
 #[inline(always)]
 pub fn transpose_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
     transposed::<V, false>(out, ldo, a, shape);

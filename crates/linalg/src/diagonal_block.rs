@@ -31,9 +31,9 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         block
     }
 
-    /// Factorizes the block of H that begins in row j0 of `columns`, after subtracting a bᵀ. This product is a sum over
-    /// the j0 columns before the block. S registers hold the COLUMNS rows of a column. The entries above the diagonal
-    /// are overwritten.
+    /// Factorizes the block of H that begins in row j0 of `columns`, after subtracting a bᵀ. The product a bᵀ is a sum
+    /// over the j0 columns before the block. S registers hold the COLUMNS rows of a column. The entries above the
+    /// diagonal are overwritten.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.

@@ -54,12 +54,13 @@ pub struct EliminationTree {
     pub swaps: Vec<(usize, usize)>,
     /// Parent of each position on the path to the root, or [`NONE`]. Length: n.
     pub parent: Vec<usize>,
-    /// Number of steps from each position to the root of its tree. Length: n.
+    /// Depth of each position: the number of steps to the root of its tree. Length: n.
     pub depth: Vec<usize>,
-    /// First position of a run of consecutive positions on the path to the root that ends with this position. Length:
-    /// n.
+    /// First position of the run that ends with each position. A run consists of consecutive positions on a path to the
+    /// root. Length: n.
     pub run: Vec<usize>,
-    /// Start of each row in `Ltdl::rows`, a multiple of the step. The last entry is the total length. Length: n + 1.
+    /// Offset of each row in `Ltdl::rows`, a multiple of the step to which rows are padded. The last entry is the total
+    /// length of the rows. Length: n + 1.
     pub first: Vec<usize>,
 }
 
@@ -90,7 +91,7 @@ impl EliminationTree {
         for (k, &row) in order.iter().enumerate() {
             place[row] = k;
         }
-        // Finds the parents by the algorithm of Liu (1990), from the last position to the first.
+        // Computes the parents by the algorithm of Liu (1990), from the last position to the first.
         let mut parent = vec![NONE; n];
         for i in (0..n).rev() {
             for k in coupled[order[i]].iter().map(|&k| place[k]).filter(|&k| k > i) {
@@ -143,12 +144,12 @@ impl EliminationTree {
     }
 }
 
-/// Returns the rows in an order of minimum degree. The last row is the one coupled with the fewest other rows. The row
-/// before it is the one coupled with the fewest of the remaining rows, and so on. Source: Tinney and Walker, *Direct
+/// Returns the rows in an order of minimum degree. The last row is the row that is coupled with the fewest other rows.
+/// The row before it is coupled with the fewest of the remaining rows, and so on. Source: Tinney and Walker, *Direct
 /// solutions of sparse network equations by optimally ordered triangular factorization* (1967).
 ///
-/// Among rows with equally many couplings, the row with the fewest initial couplings comes last. So a row that branches
-/// share comes before the rows of one branch.
+/// Among rows with the same number of couplings, the row with the fewest initial couplings comes last. So a row that
+/// several branches share comes before a row of only one branch.
 fn minimum_degree(mut coupled: Vec<BTreeSet<usize>>) -> Vec<usize> {
     let at_first: Vec<usize> = coupled.iter().map(BTreeSet::len).collect();
     let mut left: BTreeSet<usize> = (0..coupled.len()).collect();

@@ -181,8 +181,8 @@ fn subtract_outer<V: Vector, const COLUMNS: usize>(
     column_block::<V, COLUMNS>(columns, stride, j..rows, 0, width, factor, b, length, Store::Subtract);
 }
 
-/// Computes y −= Σ X[i.., p] B[j, p] over the columns p, on `rows` rows, in whole registers. Padding must follow these
-/// rows.
+/// Computes y −= Σ X[i.., p] B[j, p] over the columns p, on `rows` rows, in whole registers. The rows must be followed
+/// by padding.
 #[inline(always)]
 fn subtract_multiples<V: Vector>(
     y: &mut [f64],

@@ -1,12 +1,12 @@
 //! Dense kernels and factorizations for small matrices, and for matrices whose zeros follow a tree. This crate does not
 //! depend on robot models.
 //!
-//! Matrices are column-major: entry (i, j) of a matrix with stride `ld` has index j · ld + i. Kernels work in whole
-//! registers and may read and write up to [`SLACK`] numbers after the last row of a matrix with padding. The content of
-//! this padding does not matter. No kernel allocates.
+//! Matrices are column-major: entry (i, j) of a matrix with stride `ld` has index j · ld + i. Kernels read and write
+//! whole registers. If a matrix has padding, they may read and write up to [`SLACK`] numbers after its last row. The
+//! content of this padding does not matter. No kernel allocates.
 //!
 //! Each dense kernel is compiled in this crate once for each [SIMD level](condyle_spatial::level). A call runs the
-//! version for the level in use. [`at_level`] compiles other work with vector loops for the level.
+//! version for the level in use. [`at_level`] runs a caller's own vector loops at the level in use.
 //!
 //! # Features
 //! The features `threads` and `std` are on by default. Without `std`, the crate needs `alloc` and the feature `libm`.
@@ -86,7 +86,7 @@ pub fn check_index(argument: &str, found: usize, count: usize, things: &str) {
     }
 }
 
-/// Panics on behalf of [`check_index`]. This function is not inlined.
+/// Panics with the message of [`check_index`]. This function is not inlined.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -94,8 +94,8 @@ fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
     panic!("{argument}: expected an index below {count}, the number of {things}, found {found}");
 }
 
-/// Panics on behalf of [`check`]. This function is not inlined, because hundreds of functions check several arguments
-/// each.
+/// Panics with the message of [`check`]. This function is not inlined, because hundreds of functions check several
+/// arguments each, and their code would grow.
 #[cold]
 #[inline(never)]
 #[track_caller]

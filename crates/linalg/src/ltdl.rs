@@ -12,8 +12,8 @@ use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
 use crate::{check, check_index};
 use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, same_layout};
 
-/// Returns the step: row lengths are rounded up to a multiple of it, so that the innermost loop has no remainder. The
-/// padding after a row's end has no meaning.
+/// Returns the step. Row lengths are rounded up to a multiple of the step, so that the innermost loop has no remainder.
+/// The content of the padding after a row has no meaning.
 const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { 4 } else { 1 }
 }
@@ -61,7 +61,7 @@ fn eliminate<S: Scalar, const N: usize>(
             update([-(row[p] * D_inv[k])], [row], &mut before[at(e)..at(e + 1)]); // H_e −= (H_ke / D_k) H_k
         }
     }
-    let mut own = [&block[..0]; N]; // not by `from_fn`, which would not be inlined
+    let mut own = [&block[..0]; N]; // `from_fn` would not be inlined here
     for i in 0..N {
         own[i] = &block[at(start + i)..at(start + i + 1)];
     }
@@ -105,8 +105,8 @@ fn eliminate<S: Scalar, const N: usize>(
 #[repr(C)]
 pub struct Ltdl<S> {
     tree: EliminationTree,
-    /// For each position, the row of L from the root on, and then the entry of D. Each row is padded to whole steps.
-    /// Length: padded rows together. Written by: `factorize`.
+    /// Rows of L, one for each position, from the root on; each row ends with the entry of D. Each row is padded to a
+    /// multiple of the step. Length: the sum of the padded row lengths. Written by: `factorize`.
     rows: Array<S>,
     /// 1/D. Length: nv. Written by: `factorize`.
     D_inv: Array<S>,
@@ -115,7 +115,8 @@ pub struct Ltdl<S> {
 same_layout!(Ltdl { rows, D_inv } same { tree });
 
 impl<S: Scalar> Ltdl<S> {
-    /// Finds the zeros of a matrix, given its tree (for example a robot's model), and allocates the factor.
+    /// Creates the factor of a matrix whose zeros follow the given tree, for example a robot's model. Determines the
+    /// zeros and allocates all memory.
     pub fn new(tree: &(impl ColumnTree + ?Sized)) -> Self {
         let tree = EliminationTree::new(tree, step::<S>());
         let n = tree.order.len();
@@ -212,8 +213,8 @@ impl<S: Scalar> Ltdl<S> {
             if !go_on() {
                 return false;
             }
-            // Eliminates several positions of a run at once where possible. The rows above these positions are then
-            // loaded and stored once for all.
+            // Eliminates several positions of a run at once where possible. The rows of their ancestors are then loaded
+            // and stored only once for all these positions.
             end -= match end - run[end - 1] {
                 4.. => eliminate::<S, 4>(tree, rows, D_inv, end - 4),
                 2.. => eliminate::<S, 2>(tree, rows, D_inv, end - 2),
@@ -241,7 +242,7 @@ impl<S: Scalar> Ltdl<S> {
             let row = &self.rows[first[k]..];
             let (x, mut lo, mut hi) = (-b[k], run[k], k);
             loop {
-                axpy(x, &row[depth[lo]..], &mut b[lo..hi]); // b_e −= L_ke b_k for all positions e above
+                axpy(x, &row[depth[lo]..], &mut b[lo..hi]); // b_e −= L_ke b_k for all ancestors e of k
                 if parent[lo] == NONE {
                     break;
                 }
@@ -296,8 +297,8 @@ impl<S: Scalar> Ltdl<S> {
 
     /// Computes X = M⁻¹, the full symmetric matrix, in O(n² d).
     ///
-    /// The right-hand side of L X = D⁻¹ L⁻ᵀ is upper triangular. So row k of X follows from the rows above: X_kj = −Σ
-    /// L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
+    /// The right-hand side of L X = D⁻¹ L⁻ᵀ is upper triangular. So row k of X follows from the rows above it: X_kj =
+    /// −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
     ///
     /// # Panics
     /// If `X` is not nv × nv.

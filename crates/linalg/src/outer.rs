@@ -32,7 +32,8 @@ impl SparseRows {
     }
 }
 
-/// Returns the mask of a row's nonzero blocks: bit k stands for the [`block`] columns from column k·`block` on.
+/// Returns the mask of a row's nonzero blocks. Bit k is set if at least one number in block k is nonzero. Block k has
+/// [`block`] columns, from column k·`block` on.
 #[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
     let (fours, rest) = row.as_chunks::<4>();
@@ -68,21 +69,22 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
     for (i, y) in y.chunks_exact_mut(V::N).enumerate() {
         let mut sum = V::load(y);
         for k in 0..N {
-            // SAFETY: all rows have n numbers, and so does y.
+            // SAFETY: all rows and y have n numbers.
             sum = V::load(unsafe { x[k].get_unchecked(i * V::N..(i + 1) * V::N) }).mul_add(factors[k], sum);
         }
         sum.store(y);
     }
 }
 
-/// Returns the number of columns for which one bit of a [`mask`] stands, in rows of `stride` numbers. It is a power of
-/// two.
+/// Returns the number of columns in a block, for rows of `stride` numbers. Each block has one bit in a [`mask`]. The
+/// number of columns is a power of two.
 #[inline(always)]
 pub fn block(stride: usize) -> usize {
     4 * stride.div_ceil(4 * 64).next_power_of_two()
 }
 
-/// Run of outer products: left row k times right row k, for `count` consecutive left rows and right rows.
+/// Run of `count` outer products: left row k times right row k. The left rows are consecutive, and so are the right
+/// rows.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     /// Index of the first left row and of the first right row.
@@ -97,7 +99,7 @@ struct Run {
 struct Place {
     /// Offsets of the first left row and of the first right row.
     at: [usize; 2],
-    /// Length of all left rows of the run together.
+    /// Total length of the left rows of the run.
     length: usize,
     masks: [u64; 2],
 }
@@ -120,7 +122,7 @@ pub struct OuterProducts {
 }
 
 impl OuterProducts {
-    /// Allocates memory for `numbers` numbers in all rows together, and for `products` products.
+    /// Allocates memory for `products` products, and for rows with `numbers` numbers in total.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
         let places = Vec::with_capacity(products);
         Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), places, ..Self::default() }
@@ -239,7 +241,7 @@ compiled! {
     }
 }
 
-/// Returns the mask bits for `length` numbers from index `from` on. Each bit of a [`mask`] stands for 2ʷⁱᵈᵉ numbers.
+/// Returns the mask bits for `length` numbers from index `from` on. Each bit of a [`mask`] covers 2ʷⁱᵈᵉ numbers.
 #[inline(always)]
 fn bits(wide: u32, from: usize, length: usize) -> u64 {
     let (first, last) = (from >> wide, (from + length - 1) >> wide);

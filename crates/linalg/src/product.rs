@@ -98,7 +98,7 @@ compiled! {
                         tile[jj][0].store(&mut numbers);
                         for k in 0..V::N {
                             if k < rows {
-                                to[k] = numbers[k]; // one by one, to avoid a function call
+                                to[k] = numbers[k]; // copies one number at a time, to avoid a function call
                             }
                         }
                     }
@@ -123,8 +123,8 @@ compiled! {
     }
 }
 
-/// Computes X = A₁ + s B₁ and Y = A₂ + s (X + B₂) for A = [A₁; A₂] and B = [B₁; B₂], without a function call. `shape` =
-/// [rows of X, columns]. Copies of X are written to OUT at the offsets `of_x`, and copies of Y at the offsets `of_y`.
+/// Computes X = A₁ + s B₁ and Y = A₂ + s (X + B₂) for A = [A₁; A₂] and B = [B₁; B₂]. This function is inlined. `shape`
+/// = [rows of X, columns]. Copies of X are written to OUT at the offsets `of_x`, and copies of Y at the offsets `of_y`.
 #[inline(always)]
 pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
     out: &mut [f64],
@@ -178,7 +178,7 @@ pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
     }
 }
 
-/// Computes OUT = A + B without a function call, on `rows` rows and `columns` columns.
+/// Computes OUT = A + B on `rows` rows and `columns` columns. This function is inlined.
 #[inline(always)]
 pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'_>, shape: [usize; 2]) {
     let [rows, columns] = shape;
@@ -230,8 +230,8 @@ fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     }
 }
 
-/// Computes C ← A Bᵀ. For a block of columns of C that begins with column j, the sums over k begin with k = j. With
-/// LOWER, computes only the rows from j on.
+/// Computes C ← A Bᵀ, where the entry (i, j) is a sum over k. For a block of columns of C that begins with column j,
+/// the sums begin with k = j. With LOWER, computes only the rows from j on.
 #[inline(always)]
 fn from_diagonal<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],

@@ -6,12 +6,12 @@ use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// Register of [`Level::Avx512`]. On other processors, it is the same type as `Narrow`.
+/// Register of [`Level::Avx512`]. On other processors, `Wide` is the same type as `Narrow`.
 pub(crate) type Wide = <f64 as Real>::Wide<Gate>;
 /// Register of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
 pub(crate) type Narrow = <f64 as Real>::Narrow<Gate>;
 
-/// Token of this crate. With it, the crate may name register types.
+/// Token of this crate, with which the crate may name register types.
 pub(crate) struct Gate;
 
 // SAFETY: registers are used only in functions that are called at the level of the registers, and in kernels entered
@@ -122,10 +122,10 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Work with vector loops, generic over the register type. [`at_level`] runs it.
+/// Function with vector loops, generic over the register type; the value holds its arguments. [`at_level`] runs it.
 pub trait Vectorized: Sized {
-    /// Does the work. This function must be `#[inline(always)]`, and so must each function that it calls with
-    /// registers. Then all of them are compiled for the instructions of the function in which [`at_level`] calls `run`.
+    /// Runs the loops. `run` must be `#[inline(always)]`, and so must each function that `run` calls with registers.
+    /// Then all of this code is compiled for the instructions of the function in which [`at_level`] calls `run`.
     fn run<V: Vector>(self);
 }
 
@@ -158,7 +158,7 @@ pub fn at_level(work: impl Vectorized) {
     }
 }
 
-/// Runs work as [`at_level`] does, with registers of at most four numbers. Such registers suit work that mostly copies
+/// Runs `work` as [`at_level`] does, with registers of at most four numbers. Such registers suit loops that mostly copy
 /// rows, because many rows are shorter than eight numbers.
 pub fn at_narrow_level(work: impl Vectorized) {
     match level() {
@@ -167,7 +167,7 @@ pub fn at_narrow_level(work: impl Vectorized) {
     }
 }
 
-/// Adapter that makes a [`Kernel`] of work, to run on registers V.
+/// Adapter that runs a `Vectorized` value on registers of type V as a [`Kernel`].
 struct On<W, V>(W, PhantomData<V>);
 
 impl<W: Vectorized, V: Vector> Kernel for On<W, V> {

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 pub struct Runs {
     /// First source index, first target index, and length of each run.
     runs: Vec<[usize; 3]>,
-    /// Index after the last one of all runs, in the source row and in the target row.
+    /// End of all runs: the largest index plus 1, in the source row and in the target row.
     ends: [usize; 2],
 }
 

@@ -13,8 +13,8 @@ narrow! {
     /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ, where xₖ are the
     /// columns of X.
     ///
-    /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. After these
-    /// numbers, each column of X has zeros that end four registers after the last row of H. H has padding rows.
+    /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. In each column
+    /// of X, zeros follow these numbers, up to four registers after the last row of H. H has padding rows.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -38,7 +38,7 @@ narrow! {
             let mut i = j;
             let mut factor = 0.0;
             while i < rows {
-                // SAFETY: the assertions above.
+                // SAFETY: the assertions above check that H and X have the required padding.
                 unsafe {
                     match (rows - i).div_ceil(V::N) {
                         1 => eliminate_strip::<V, 1>(h, stride, [i, j], sum, &mut factor)?,
@@ -52,7 +52,7 @@ narrow! {
         }
         let mut j = m;
         while j < size {
-            // SAFETY: the assertions above.
+            // SAFETY: the assertions above check that H and X have the required padding.
             unsafe { add_tiles::<V>(h, stride, [rows, j], COLUMNS.min(size - j), sum, m) };
             j += COLUMNS;
         }
@@ -84,7 +84,7 @@ unsafe fn add_tiles<V: Vector>(
 ) {
     let mut i = j;
     while i < rows {
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         unsafe {
             match rows - i <= V::N {
                 true => add_tile::<V, 1>(h, stride, [i, j], columns, sum, m),
@@ -109,7 +109,7 @@ unsafe fn add_tile<V: Vector, const S: usize>(
     m: usize,
 ) {
     debug_assert!(has_strip::<V, S>(h, stride, j * stride + i, columns));
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     let rows = |x: &[f64], at: usize, count: usize| unsafe { core::slice::from_raw_parts(x.as_ptr().add(at), count) };
     let mut tile = [[V::splat(0.0); S]; COLUMNS];
     if i < sum.reach {
@@ -135,7 +135,7 @@ unsafe fn add_tile<V: Vector, const S: usize>(
     for jj in 0..COLUMNS {
         if jj < columns {
             let at = (j + jj) * stride + i;
-            // SAFETY: by the caller.
+            // SAFETY: guaranteed by the caller.
             let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
             for s in 0..S {
                 tile[jj][s].store(&mut column[s * V::N..]);
@@ -162,8 +162,8 @@ fn subtract_outer<V: Vector, const S: usize>(tile: &mut [[V; S]; COLUMNS], strip
 /// Returns the column and its pivot if the pivot is not positive or not finite.
 ///
 /// # Safety
-/// The columns 0 to j of H have S registers of numbers from row i on. The columns of X have them, too, if i <
-/// `sum.reach`.
+/// The columns 0 to j of H have S registers of numbers from row i on. If i < `sum.reach`, the columns of X also have S
+/// registers of numbers from row i on.
 #[inline(always)]
 unsafe fn eliminate_strip<V: Vector, const S: usize>(
     h: &mut [f64],
@@ -173,7 +173,7 @@ unsafe fn eliminate_strip<V: Vector, const S: usize>(
     factor: &mut f64,
 ) -> Result<(), (usize, f64)> {
     debug_assert!(has_strip::<V, S>(h, stride, j * stride + i, 1));
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     let rows = |x: &[f64], at: usize, count: usize| unsafe { core::slice::from_raw_parts(x.as_ptr().add(at), count) };
     let mut sums = [V::splat(0.0); S];
     if i < sum.reach {

@@ -1,4 +1,4 @@
-//! Solution of a small symmetric system, whose columns are registers.
+//! Solution of a small symmetric system of equations. A column of its matrix fits in one register.
 
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 
@@ -11,14 +11,14 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 /// x_k = z_k − Σ l_ik x_i  (i > k)
 /// ```
 ///
-/// Whole columns are computed, so that loops have no remainder; the entries above the diagonal are never read. M must
-/// be positive definite: there is no pivoting. Source: Golub and Van Loan, *Matrix Computations* (4th edition), section
+/// Whole columns are computed, so loops have no remainder. The entries above the diagonal are never read. M must be
+/// positive definite: there is no pivoting. Source: Golub and Van Loan, *Matrix Computations* (4th edition), section
 /// 4.1.
 #[inline(always)]
 pub fn small_solve<S: Scalar, const MOST: usize>(M: &DenseMatrix<S, impl Dense<S>>, b: &mut [S]) {
     let n = b.len();
     assert!(M.shape() == (n, n) && n <= MOST, "M: expected {n} × {n}, at most {MOST}, found {:?}", M.shape());
-    let mut A = [[S::zero(); MOST]; MOST]; // the columns of M, then of L
+    let mut A = [[S::zero(); MOST]; MOST]; // columns of M, which become the columns of L
     for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
         column[..n].copy_from_slice(from);
     }

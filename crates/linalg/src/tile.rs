@@ -1,10 +1,10 @@
-//! Tile on which all dense kernels are built: the product for a strip of rows and a few columns, summed in registers.
+//! Tile: the product of a strip of rows and a few columns, summed in registers. All dense kernels are built on tiles.
 #![allow(unsafe_code)]
 
 use crate::registers::Vector;
 
-/// Maximum number of rows by which a strip may exceed the last row, and of columns by which a tile may exceed the last
-/// column.
+/// Maximum number of rows by which a strip may extend beyond the last row. Also the maximum number of columns by which
+/// a tile may extend beyond the last column.
 pub const SLACK: usize = 8;
 
 /// Column-major matrix, or the part of a matrix that starts at one of its entries.
@@ -111,9 +111,9 @@ pub(crate) fn add_outer<V: Vector, const S: usize, const COLUMNS: usize>(
     }
 }
 
-/// Returns the number of registers in the next strip, given the number of `rows` that are left. With 32 vector
-/// registers, the result is three, unless only one register would be left for the strip after it; otherwise two. (With
-/// 16 registers, strips of three spilled in measurements.)
+/// Returns the number of registers in the next strip, given the number of `rows` that are left. On processors with 32
+/// vector registers, the result is three, or two if the strip after it would have only one register. On other
+/// processors, the result is two, because strips of three registers spilled in measurements.
 #[inline(always)]
 pub(crate) fn next_strip<V: Vector>(rows: usize) -> usize {
     match rows.div_ceil(V::N) {

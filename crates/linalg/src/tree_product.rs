@@ -16,7 +16,7 @@ use core::ops::Range;
 ///
 /// Four columns with the same rows, for example columns of one limb, are computed together. A group of their entries
 /// stays in registers while the sums accumulate. For other columns, terms of four columns of A are added at once, so
-/// that sums are loaded and stored a quarter as often.
+/// each sum is loaded and stored only once per four terms.
 #[inline(always)]
 pub fn neg_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
     minus_block_product(A, B, C, nonzero_rows, 0..nonzero_rows.len());
@@ -51,8 +51,8 @@ pub fn minus_block_product<S: Scalar>(
     }
 }
 
-/// Computes [`neg_product`] for two matrices B and one symmetric A. It is used for lanes, because their matrices are
-/// too large for the L1 cache.
+/// Computes [`neg_product`] for two matrices B and one symmetric A. This function is used for scalars with lanes,
+/// because their matrices are too large for the L1 cache.
 #[inline(always)]
 fn neg_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let (n, mut j) = (nonzero_rows.len(), 0);
@@ -63,7 +63,8 @@ fn neg_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], 
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
         let rows = Inside::new(rows, n);
-        // The counts are chosen so that sums and operands fill 32 registers of eight numbers, or 16 registers of four.
+        // M columns and N rows are chosen so that sums and operands fill the vector registers: 32 of eight numbers, or
+        // 16 of four numbers.
         match (many, size_of::<S>()) {
             (4, 64..) => twice::<S, 4, 2>(A, B, C, rows),
             (4, _) => twice::<S, 4, 1>(A, B, C, rows),
@@ -100,11 +101,11 @@ impl<'a> Inside<'a> {
 /// Returns entry k of a column of n numbers.
 ///
 /// # Safety
-/// k is one of the rows of an [`Inside`] whose n is this n.
+/// k is one of the rows of an [`Inside`] that was checked against the length of `column`.
 #[inline(always)]
 unsafe fn entry<T: Copy>(column: &[T], k: usize) -> T {
     debug_assert!(k < column.len());
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     unsafe { *column.get_unchecked(k) }
 }
 
@@ -171,8 +172,8 @@ pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize],
     }
 }
 
-/// Computes the sums of `subtract_column` for four columns. The order of the terms is the same, so the bits are the
-/// same.
+/// Computes the sums of `subtract_column` for four columns. The order of the terms is the same as in `subtract_column`,
+/// so the results have the same bits.
 #[inline(always)]
 fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], [n, start, end]: [usize; 3]) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
@@ -249,14 +250,15 @@ fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[N
 
 /// Number of columns of B that are computed together.
 const SIDE: usize = 4;
-/// Number of operations that the processor executes at the same time; computing fewer sums than this saves no time.
+/// Number of operations that the processor executes at the same time. A loop with fewer sums than this number takes the
+/// same time.
 const UNDER_WAY: usize = 8;
 
 /// Implements [`minus_products`] in vector registers.
 ///
 /// The sums of a group of rows in up to four columns of X accumulate in registers. `run` selects the number of rows in
-/// a group. The last group ends at the last row and may overlap the group before it; the entries in both groups are
-/// computed twice. Each entry is the same sum in the same order as in `neg_product`.
+/// a group. The last group ends at the last row and may overlap the group before it; entries in the overlap are
+/// computed twice. The terms of each entry are added in the same order as in `neg_product`.
 struct InRegisters<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
@@ -269,8 +271,8 @@ impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
     #[inline(always)]
     fn run(mut self) {
         let n = self.nonzero_rows.len();
-        // Selects the number of vectors of a column that stay in registers: the number with the fewest operations. If
-        // several numbers are equally good, selects the largest one.
+        // Selects the number of vectors of a column that stay in registers, such that the number of operations is
+        // smallest. In case of a tie, selects the largest number of vectors.
         let (mut best, mut least) = (1, usize::MAX);
         for many in 1..=3 {
             let cost = n.div_ceil(many * V::LANES) * UNDER_WAY.max(many * SIDE);
@@ -292,7 +294,8 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
         let mut j = 0;
         while j < self.nonzero_rows.len() {
             let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
-            // The columns j, …, j + same − 1 of the first matrix are followed by those columns of the second matrix.
+            // Index k counts the columns j, …, j + same − 1 of the first matrix, then the same columns of the second
+            // matrix.
             let (same, mut k) = (*same_pattern, 0);
             let rows = Inside::new(rows, self.nonzero_rows.len());
             while k < 2 * same {

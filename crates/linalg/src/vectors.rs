@@ -22,10 +22,11 @@ compiled! {
             }
             return;
         }
-        // SAFETY: the last register begins N rows before the end, and the other registers begin before it.
+        // SAFETY: the last register begins N rows before the end, and the other registers begin before the last
+        // register.
         let sum = |y: &[f64], i: usize| unsafe { scaled_rows::<V>(y, alpha, a, x, i) };
         let (last, mut i) = (rows - V::N, 0);
-        let end = sum(y, last); // computed before rows that it shares with another register are written
+        let end = sum(y, last); // computed first, because other registers overwrite shared rows
         while i < last {
             sum(y, i).store(&mut y[i..]);
             i += V::N;
@@ -42,10 +43,10 @@ compiled! {
 unsafe fn scaled_rows<V: Vector>(y: &[f64], alpha: f64, a: View<'_>, x: &[f64], i: usize) -> V {
     debug_assert!(i + V::N <= y.len() && (x.len() - 1) * a.stride + i + V::N <= a.data.len());
     let (alpha, mut at) = (V::splat(alpha), i);
-    // SAFETY: by the caller.
+    // SAFETY: guaranteed by the caller.
     let mut sum = V::load(unsafe { y.get_unchecked(i..i + V::N) });
     for x in x {
-        // SAFETY: by the caller.
+        // SAFETY: guaranteed by the caller.
         let column = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
         sum = sum.add(column.mul(alpha.mul(V::splat(*x)))); // rounds as if the terms were added one by one
         at += a.stride;
@@ -130,8 +131,8 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Returns ‖x‖∞; NaN if an entry is NaN. The absolute values are compared as integers with the same bits: the order is
-/// the same, and NaN is the largest.
+/// Returns ‖x‖∞; NaN if an entry is NaN. The absolute values are compared as integers with the same bits. These
+/// integers have the same order, and NaN is the largest.
 #[inline]
 pub fn max_abs(x: &[f64]) -> f64 {
     let abs = |x: f64| x.abs().to_bits() as i64;
@@ -146,12 +147,13 @@ pub fn max_abs(x: &[f64]) -> f64 {
     f64::from_bits(most.into_iter().fold(rest, i64::max) as u64)
 }
 
-/// Copies x to `to`, without the function call that the compiler would emit for a few numbers.
+/// Copies x to `to` with vector registers. For a few numbers, this avoids the function call that the compiler would
+/// emit.
 #[inline(always)]
 pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
     let length = x.len();
     let to = &mut to[..length];
-    // The last numbers may overlap numbers that were copied before.
+    // Copies the first and the last numbers; these two ranges may overlap.
     match length {
         0 => {}
         1 => to[0] = x[0],
@@ -178,7 +180,7 @@ fn copy_ends<const M: usize>(to: &mut [f64], x: &[f64]) {
     to[last..].copy_from_slice(&end);
 }
 
-/// Computes to = a x, without a function call.
+/// Computes to = a x. This function is inlined.
 #[inline(always)]
 pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
     let length = x.len();

@@ -5,8 +5,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Four threads compete for every phase of every part. Each phase of a part is executed once and in order, and each
-/// thread sees the data that the previous thread wrote.
+/// Checks four threads that compete for every phase of every part. Each phase of a part is executed once and in order,
+/// and each thread sees the data that the previous thread wrote.
 #[test]
 fn each_stage_of_each_part_is_done_once() {
     let (cuts, phases) = ([0, 3, 3, 4, 9, 16, 40], 5);

@@ -1,4 +1,4 @@
-//! Tests of factorizations and products that use the zeros of a tree, compared with dense ones.
+//! Tests of factorizations and products that use the zeros of a tree, compared with dense factorizations and products.
 #![allow(non_snake_case)]
 
 use condyle_linalg::sparsity::NonzeroRows;
@@ -42,7 +42,7 @@ impl ColumnTree for Shared {
     }
 }
 
-/// Returns a number between −1 and 1 for each i.
+/// Returns a pseudo-random number between −1 and 1 for each i.
 fn number(i: usize) -> f64 {
     (1.0 + 7.3 * i as f64).sin()
 }

@@ -1,16 +1,17 @@
-//! Reader of DAE (COLLADA 1.4 and 1.5). It reads the triangles of a scene, with the poses of its nodes and the diffuse
-//! colours of its materials.
+//! Reader of DAE files (COLLADA 1.4 and 1.5). The reader returns the triangles of a scene. It applies the poses of the
+//! scene's nodes and the diffuse colours of the materials.
 //!
-//! The unit of length of the file is applied, but its upward axis is not. RViz and Pinocchio do the same, and the files
-//! of robots are made for these programs.
+//! The unit of length of the file is applied, but the upward axis of the file is ignored. RViz and Pinocchio do the
+//! same, and mesh files of robots are made for these programs.
 
 use super::part::{Part, Triangle, Words, full};
 use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
 
-/// Maximum depth of nested nodes, and maximum number of visited nodes.
+/// Maximum depth of nested nodes.
 const DEEPEST: usize = 64;
+/// Maximum number of visited nodes.
 const MOST_NODES: usize = 100_000;
 
 /// Reads the triangles of a DAE: one part for each material of each geometry that the scene shows.
@@ -92,7 +93,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         let Some(mesh) = child(geometry, "mesh") else { return Ok(()) };
         for primitive in mesh.children() {
             if !matches!(primitive.tag_name().name(), "triangles" | "polylist" | "polygons") {
-                continue; // lines, not triangles
+                continue; // this element has lines, not triangles
             }
             let Some((points, triangles)) = self.primitive(primitive)? else { continue };
             let color = primitive.attribute("material").and_then(|symbol| self.color(instance, symbol));

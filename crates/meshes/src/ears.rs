@@ -14,7 +14,7 @@ const MAX_CORNERS: usize = 100;
 #[derive(Default)]
 pub(super) struct Ears {
     tests: usize,
-    /// Number of faces with triangles that are left out.
+    /// Number of faces of which triangles are left out.
     pub(super) lost: usize,
 }
 
@@ -54,7 +54,7 @@ impl Ears {
                 triangles.push(ear);
                 face.remove((first + 1) % n);
                 if tries > 0 {
-                    tries = n; // an ear at the last corner of all ends the search
+                    tries = n; // if the last possible corner gives an ear, the search ends
                 }
             } else {
                 first += 1;
@@ -118,8 +118,8 @@ mod tests {
     /// Corners of a face; each has coordinates along two axes and a height.
     type Corners = &'static [[f64; 3]];
 
-    /// Faces, and their triangles in `mesh_face` of MuJoCo 4.0.0. For MuJoCo, each face was closed to a solid by a
-    /// cone. Corners are counted from 0.
+    /// Faces, and the triangles that MuJoCo 4.0.0 has for them in `mesh_face`. In the input of MuJoCo, a cone closed
+    /// each face to a solid. Corners are counted from 0.
     const FACES: &[(Corners, &[[u32; 3]])] = &[
         (
             &[[3.0, 1.0, 0.0], [5.0, 1.0, 0.5], [6.0, 3.0, 0.0], [4.0, 5.0, 1.0], [2.0, 3.0, -0.5]],
@@ -133,7 +133,7 @@ mod tests {
             &[[0.0, 3.0, 1.0], [0.5, 5.0, 1.0], [0.0, 6.0, 3.0], [1.0, 4.0, 5.0], [-0.5, 2.0, 3.0]],
             &[[1, 2, 3], [1, 3, 4], [0, 1, 4]],
         ),
-        // concave
+        // a concave face
         (
             &[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.5], [2.0, 1.0, 0.0], [0.0, 0.0, 0.25], [-2.0, 1.0, -0.5]],
             &[[0, 1, 2], [0, 2, 3], [0, 3, 4]],
@@ -178,8 +178,8 @@ mod tests {
         (0..corners).map(corner).map(|(y, x)| [x, y, 0.0]).collect()
     }
 
-    /// For a face with 100 corners, MuJoCo 4.0.0 has 98 triangles in `mesh_face`; for a face with 101 corners, it has
-    /// no triangle.
+    /// Checks that a face with 100 corners gives 98 triangles, and that a face with 101 corners gives none. MuJoCo
+    /// 4.0.0 has the same number of triangles in `mesh_face`.
     #[test]
     fn faces_with_many_corners_are_left_out() {
         for (corners, triangles, lost) in [(100, 98, 0), (101, 0, 1)] {

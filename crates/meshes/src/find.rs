@@ -33,7 +33,7 @@ impl Places {
         folders.extend(folder.iter().flat_map(|folder| folder.ancestors()).map(Path::to_owned));
         for folder in folders {
             let itself = folder.file_name().is_some_and(|name| name == package).then(|| folder.join(path));
-            // An address without a package, such as `package:///meshes/a.stl`, is relative to the folder itself.
+            // If an address names no package, such as `package:///meshes/a.stl`, its path is relative to this folder.
             for file in [itself, Some(folder.join(package).join(path))].into_iter().flatten() {
                 if file.is_file() {
                     return Ok(file);

@@ -4,7 +4,8 @@
 
 use super::part::Triangle;
 
-/// Number of steps of the grid along the longest side of the box. It is chosen so that a determinant fits in an `i128`.
+/// Number of steps of the grid along the longest side of the box. With this number of steps, the determinants of the
+/// method fit in an `i128`.
 const STEPS: f64 = (1u64 << 40) as f64;
 
 /// Coordinates of a point on the grid.
@@ -49,7 +50,8 @@ pub fn hull(points: &[[f64; 3]]) -> Option<Vec<Triangle>> {
     Some(hull.faces.into_iter().filter(|face| face.is_part).map(|face| face.corners).collect())
 }
 
-/// Rounds points to the grid in their box. Returns `None` if all points coincide or if one of them is not finite.
+/// Rounds points to the grid of their bounding box. Returns `None` if all points coincide or if one of them is not
+/// finite.
 fn grid(points: &[[f64; 3]]) -> Option<Vec<Point>> {
     let bound = |f: fn(f64, f64) -> f64, k: usize| points.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
     let low = [0, 1, 2].map(|k| bound(f64::min, k));
@@ -120,8 +122,8 @@ impl Hull {
         dot(face.normal, minus(self.grid[p as usize], self.grid[face.corners[0] as usize]))
     }
 
-    /// Distributes points among the faces from index `first` on: each point is listed by the first face that has the
-    /// point outside. Points inside all faces are dropped.
+    /// Distributes points among the faces from index `first` on: each point is listed by the first face for which the
+    /// point is outside. Points inside all faces are dropped.
     fn share_out(&mut self, points: Vec<u32>, first: usize) {
         for p in points {
             if let Some(f) = (first..self.faces.len()).find(|&f| self.above(&self.faces[f], p) > 0) {
@@ -130,7 +132,8 @@ impl Hull {
         }
     }
 
-    /// Adds a point outside of a face. The faces that see the point are replaced by a cone from the point to their rim.
+    /// Adds a point outside of a face. All faces with the point on their outer side are replaced by a cone. The cone
+    /// goes from the point to the rim of the replaced faces.
     fn add(&mut self, p: u32, seen_by: u32) {
         let (mut visible, mut rim) = (vec![seen_by], Vec::new());
         self.faces[seen_by as usize].is_part = false;
@@ -141,7 +144,7 @@ impl Hull {
                 let next = self.faces[f as usize].across[e];
                 let face = &self.faces[next as usize];
                 if !face.is_part {
-                    continue; // this face sees the point, too
+                    continue; // the point is on the outer side of this face, too
                 }
                 if self.above(face, p) > 0 {
                     self.faces[next as usize].is_part = false;
@@ -152,8 +155,8 @@ impl Hull {
                 }
             }
         }
-        // The rim is a closed loop. Its edges are sorted by their first corner, so that the edge that begins at the end
-        // of another edge is found quickly.
+        // The rim is a closed loop. Its edges are sorted by their first corner, so that the successor of an edge is
+        // found quickly.
         let first = self.faces.len();
         rim.sort_unstable();
         let begins = |rim: &[(u32, u32, u32)], corner: u32| first + rim.partition_point(|edge| edge.0 < corner);
@@ -203,7 +206,8 @@ mod tests {
         let mut random = numbers();
         for case in 0..60 {
             let count = 4 + case * 5;
-            // Every third case is on a coarse lattice, where many points are collinear, coplanar or equal.
+            // In every third case, the points are on a coarse lattice. Then many points are collinear, coplanar or
+            // equal.
             let mut number = || {
                 let x = random.next().unwrap();
                 if case % 3 == 0 { (4.0 * x).round() } else { x }

@@ -1,8 +1,8 @@
 //! Meshes for the web pages that show robots. Mesh files are found, read, simplified and written into the page.
 //!
-//! A page has at most 60 000 triangles, whatever the files of its robot contain: edges of the largest parts collapse
-//! first. The coordinates of points have 16 bits along each side of the part's box. Meshes that cannot be found or read
-//! are left out with a note, because a page is useful without them.
+//! A page has at most 60 000 triangles, for any size of the mesh files. If the files contain more triangles, the
+//! largest parts are simplified first. The coordinates of a point are 16-bit numbers relative to the bounding box of
+//! its part. Meshes that cannot be found or read are left out with a note, because a page is useful without them.
 //!
 //! Without the feature `page`, the crate only reads triangles (STL, OBJ) and computes convex hulls.
 //!
@@ -64,7 +64,7 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
     cut_triangles(format, bytes).map(|(triangles, _)| triangles)
 }
 
-/// Does the same as [`triangles`], and also returns the number of OBJ faces with triangles that are left out.
+/// Returns the result of [`triangles`], and the number of OBJ faces of which triangles are left out.
 ///
 /// # Errors
 /// Returns the same errors as [`triangles`].

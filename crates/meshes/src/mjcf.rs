@@ -20,7 +20,7 @@ pub struct Visual {
     pub color: Option<[f64; 4]>,
 }
 
-/// First group of collision geometries. By convention, this group and all later groups are for collisions.
+/// First group of collision geometries. By convention, groups from this number on are for collisions.
 const COLLISION: u32 = 3;
 /// Maximum depth of nested bodies or classes.
 const DEEPEST: usize = 256;
@@ -29,8 +29,9 @@ type Attributes<'a> = HashMap<(&'a str, &'a str), &'a str>;
 
 struct File<'a> {
     classes: HashMap<&'a str, Attributes<'a>>,
-    /// File and scale of each mesh, by name. `materials` contains the colour of each material, by name.
+    /// File and scale of each mesh, by name of the mesh.
     meshes: HashMap<String, (String, [f64; 3])>,
+    /// Colour of each material, by name of the material.
     materials: HashMap<&'a str, [f64; 4]>,
     degrees: bool,
     order: &'a str,
@@ -136,7 +137,7 @@ impl<'a> File<'a> {
         let get = |key| self.attribute(geom, key, around);
         let Some((file, scale)) = get("mesh").and_then(|mesh| self.meshes.get(mesh)) else { return };
         let group = get("group").and_then(|group| group.trim().parse::<u32>().ok()).unwrap_or(0);
-        // A mesh whose type is a simple shape only defines the size of that shape.
+        // If an element with a mesh has the type of a simple shape, the mesh only defines the size of that shape.
         if group >= COLLISION || get("type").is_some_and(|kind| kind != "mesh") {
             return;
         }

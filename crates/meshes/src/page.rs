@@ -9,17 +9,20 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of triangles of a page, and of one of its parts. Corner indices of a part have 16 bits.
+/// Maximum number of triangles of a page.
 const MOST: usize = 60_000;
+/// Maximum number of triangles of a part, whose corner indices have 16 bits.
 const MOST_OF_PART: usize = 20_000;
-/// Smallest number of triangles to which a part is reduced, and maximum number of parts.
+/// Smallest number of triangles to which a part is reduced.
 const FEWEST: usize = 12;
+/// Maximum number of parts of a page.
 const MOST_PARTS: usize = MOST / FEWEST;
-/// Maximum size of one file, and of all files together (bytes).
+/// Maximum size of one file (bytes).
 const LARGEST: u64 = 64 << 20;
+/// Maximum size of all files together (bytes).
 const LARGEST_SUM: u64 = 512 << 20;
 
-/// Collection of meshes for a page.
+/// Collection of meshes for a web page.
 #[derive(Default)]
 pub struct Meshes {
     places: Places,
@@ -28,7 +31,7 @@ pub struct Meshes {
     files: HashMap<PathBuf, Range<usize>>,
     read: u64,
     wanted: usize,
-    /// First reason for which a mesh is left out, and number of meshes that are left out.
+    /// Reason why the first missing mesh is left out, and number of meshes that are left out.
     missing: Option<(String, usize)>,
 }
 
@@ -136,7 +139,7 @@ impl Meshes {
     }
 
     /// Returns all parts, simplified for a page. Points and triangles are 16-bit numbers in base64. A number n of a
-    /// point means the coordinate `low + side n / 65535`.
+    /// point encodes the coordinate `low + side n / 65535`.
     pub fn written(self) -> Vec<Value> {
         let most = triangles_kept(self.parts.iter().map(|part| part.triangles.len()).collect());
         let small = |part: Part| {
@@ -146,7 +149,7 @@ impl Meshes {
     }
 }
 
-/// Returns the maximum number of triangles per part. With this maximum, all parts together have at most [`MOST`]
+/// Returns the largest limit on the triangles of each part for which all parts together have at most [`MOST`]
 /// triangles.
 fn triangles_kept(mut counts: Vec<usize>) -> usize {
     counts.sort_unstable();

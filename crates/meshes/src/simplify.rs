@@ -1,18 +1,19 @@
-//! Simplification of meshes. Points that coincide are merged. Then edges collapse, first those whose collapse changes
-//! the shape least (Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997).
+//! Simplification of meshes. Points that coincide are merged. Then edges are collapsed. The edge whose collapse changes
+//! the surface least comes first (Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH
+//! 1997).
 
 use super::part::Part;
 use nalgebra::Vector3;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
-/// Number of grid cells along the longest side, and maximum number of triangles before edges collapse. If more
-/// triangles are left, the cells become coarser.
+/// Number of grid cells along the longest side of a part.
 const CELLS: f64 = 32768.0;
+/// Maximum number of triangles before edges collapse. If the grid leaves more triangles, its cells become coarser.
 const MOST: usize = 200_000;
 /// Weight of the planes through border edges of an open surface, relative to the planes of triangles.
 const BORDER: f64 = 10.0;
-/// Minimum cosine of the angle by which a triangle may turn when one of its corners moves.
+/// Minimum cosine of the angle between a triangle's normals before and after one of its corners moves.
 const TURN: f64 = 0.2;
 
 /// Returns a simplified part with at most `target` triangles. `target` must be at least 12.
@@ -26,7 +27,7 @@ pub(super) fn simplify(part: &Part, target: usize) -> Part {
     if welded.triangles.len() > target {
         welded = Surface::new(&welded).collapse(target);
     }
-    // Many small pieces without common points have no edges left to collapse. Coarser cells merge these pieces.
+    // Small pieces without common points have no edges that can collapse. Coarser cells merge such pieces.
     cells = cells.min(256.0);
     while welded.triangles.len() > target && cells > 1.0 {
         cells /= 2.0;
@@ -114,8 +115,8 @@ impl Quadric {
     }
 }
 
-/// Edge in the queue: the bits of its cost, its two ends, and how often each end had changed when the cost was
-/// computed.
+/// Edge in the queue: the bits of its cost, its two end points, and the change count of each end point when the cost
+/// was computed.
 type Edge = (u64, [u32; 2], [u32; 2]);
 
 /// Surface whose edges are collapsed, scaled to a box with longest side 1.
@@ -125,7 +126,8 @@ struct Surface {
     color: Option<[f64; 3]>,
     points: Vec<Vector3<f64>>,
     quadrics: Vec<Quadric>,
-    /// Number of changes of each point. A cost from before the last change is outdated.
+    /// Number of changes of each point. If an end point of an edge has changed since the edge's cost was computed, the
+    /// cost is outdated.
     changes: Vec<u32>,
     triangles: Vec<Option<[u32; 3]>>,
     /// Triangles at each point, including deleted ones.
@@ -167,7 +169,7 @@ impl Surface {
         }
         for (&[a, b], &(count, unit)) in &faces {
             if count == 1 {
-                // Adds a plane for a border edge: it contains the edge and is perpendicular to the edge's only
+                // Adds a plane for a border edge. The plane contains the edge and is perpendicular to the edge's only
                 // triangle.
                 let (from, to) = (surface.points[a as usize], surface.points[b as usize]);
                 let along = to - from;
@@ -193,7 +195,7 @@ impl Surface {
         let quadric = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         let middle = 0.5 * (p + q);
-        // If the surface is flat here, the optimum may not exist or may be far away.
+        // If the surface is flat at this edge, the optimal point may not exist or may be far away.
         let near = Some(quadric.least()).filter(|x| (x - middle).norm() <= (p - q).norm());
         let cost = |x: Vector3<f64>| (quadric.at(x), x);
         let ends = [middle, p, q]
@@ -211,7 +213,7 @@ impl Surface {
     }
 
     /// Returns whether the triangles around one end of an edge keep their orientation when this end moves. Triangles
-    /// that vanish with the edge do not count.
+    /// that contain the edge are not checked, because they vanish.
     fn keeps(&self, moved: u32, other: u32, to: Vector3<f64>) -> bool {
         self.around[moved as usize].iter().filter_map(|&t| self.triangles[t as usize]).all(|t| {
             if t.contains(&other) {
@@ -337,7 +339,7 @@ mod tests {
         assert!(simplify(&Part::default(), 12).triangles.is_empty());
         let point = Part { points: vec![[1.0; 3]; 3], triangles: vec![[0, 1, 2]], color: None };
         assert!(simplify(&point, 12).triangles.is_empty());
-        // The pieces have no common points. Coarser cells reduce their number.
+        // The pieces have no common points. Coarser cells reduce the number of triangles.
         let mut pieces = Part::default();
         for k in 0..5000u32 {
             let x = f64::from(k % 70);

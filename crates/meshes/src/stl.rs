@@ -2,15 +2,16 @@
 
 use super::part::{Part, Words, full};
 
-/// Number of bytes before the triangles of a binary file, and number of bytes of each triangle: a normal, three
-/// corners, and two bytes of attributes.
+/// Number of bytes before the triangles of a binary file.
 const HEAD: usize = 84;
+/// Number of bytes of a triangle in a binary file: a normal, three corners, and two bytes of attributes.
 const TRIANGLE: usize = 50;
 
 /// Reads the triangles of an STL.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Part>, String> {
     let mut part = Part::default();
-    // Binary files may also begin with `solid`; the length of the file distinguishes them.
+    // A binary file may also begin with `solid`. A file is binary if its length matches the number of triangles in its
+    // head.
     let count = bytes.get(80..HEAD).and_then(|n| <[u8; 4]>::try_from(n).ok()).map(u32::from_le_bytes);
     let length = count.and_then(|n| usize::try_from(n).ok()?.checked_mul(TRIANGLE)?.checked_add(HEAD));
     if let (Some(count), Some(length)) = (count, length)

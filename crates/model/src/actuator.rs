@@ -13,8 +13,8 @@ use alloc::vec::Vec;
 /// f = gain u + bias − kp l − kv l̇
 /// ```
 ///
-/// A motor has the gain 1, and its other numbers are 0. A position servo has the gain kp, a velocity servo has the gain
-/// kv. The effort at the joint is gear · f.
+/// A motor has the gain 1, and its bias, kp and kv are 0. The gain of a position servo is kp, and the gain of a
+/// velocity servo is kv. The effort at the joint is gear · f.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Actuator<B = usize> {
@@ -23,13 +23,13 @@ pub struct Actuator<B = usize> {
     /// Joint, tendon or frame that the actuator drives.
     pub transmission: Transmission<B>,
     /// Gear: the effort at the joint for each unit of force (1, m). Hinges, slides and tendons use only the first
-    /// number. A ball joint uses three numbers: an axis in the frame of its body. A frame uses six numbers, linear
-    /// first, along the frame's axes. A free joint uses six numbers, too: a force along the axes of the world and a
+    /// entry. A ball joint uses three entries: an axis in the frame of its body. A frame uses six entries, linear
+    /// first, along the frame's axes. A free joint also uses six entries: a force along the axes of the world, and a
     /// torque along the axes of the body.
     pub gear: [f64; 6],
     /// Gain: force for each unit of control.
     pub gain: f64,
-    /// Bias: force if the control, the length and the velocity are 0 (N, N m).
+    /// Bias: force if the control u, the length l and its rate l̇ are 0 (N, N m).
     pub bias: f64,
     /// Gain of position kp (N/m, N m/rad); 0 for a motor.
     pub kp: f64,
@@ -69,7 +69,7 @@ pub enum Transmission<B = usize> {
 }
 
 impl<B: Clone> Actuator<B> {
-    /// Maps bodies and frames to their new identifiers. Returns `None` if none of the driven bodies is left.
+    /// Maps bodies and frames to their new identifiers. Returns `None` if no driven body exists any more.
     pub(crate) fn renamed<C>(
         &self,
         body: impl Fn(&B) -> Option<C>,

@@ -1,5 +1,5 @@
 //! Additions to the tree of a model: springs, gravity compensation, actuators, keyframes and constraints. This module
-//! adds them to a builder, keeps them when a model is changed, and checks them.
+//! adds such items to a builder, keeps them when a model is changed, and checks them.
 
 use crate::actuator::{Actuator, Transmission};
 use crate::body::FrameKind;
@@ -25,7 +25,7 @@ type JointState = (BodyId, Vec<f64>, Vec<f64>);
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Additions {
     springs: Vec<(BodyId, [f64; 3], Vec<f64>)>,
-    /// Compensated ratio of the weight of each body, by the body's index in the builder.
+    /// Fraction of each body's weight that is compensated, by the body's index in the builder.
     compensation: BTreeMap<usize, f64>,
     compensated_parts: Vec<CompensatedPart>,
     actuators: Vec<Actuator<BodyId>>,
@@ -35,12 +35,12 @@ pub(crate) struct Additions {
     warnings: Vec<Warning>,
 }
 
-/// Part of a body, with another compensated ratio of its weight than the rest of the body.
+/// Part of a body whose compensated fraction of weight differs from the rest of the body.
 #[derive(Clone, Debug)]
 struct CompensatedPart {
     body: BodyId,
-    /// Compensated ratio of the part's weight. `None` if the body's inertia does not include the part; its weight is
-    /// then compensated entirely.
+    /// Fraction of the part's weight that is compensated. `None` if the body's inertia does not include the part; all
+    /// of the part's weight is then compensated.
     ratio: Option<f64>,
     /// Mass (kg).
     mass: f64,
@@ -48,7 +48,7 @@ struct CompensatedPart {
     mass_com: Vec3<f64>,
 }
 
-/// Constraint of a builder.
+/// Constraint that was added to a builder.
 #[derive(Clone, Debug)]
 enum Draft {
     Point([usize; 2]),
@@ -57,20 +57,21 @@ enum Draft {
 }
 
 impl ModelBuilder {
-    /// Adds a spring to the joint of a body: see [`Spring`]. `rest` has as many numbers as the joint has in q.
+    /// Adds a spring to the joint of a body: see [`Spring`]. `rest` is the position at rest, with the same number of
+    /// coordinates as the joint.
     pub fn spring(&mut self, body: BodyId, stiffness: [f64; 3], rest: &[f64]) {
         self.additions.springs.push((body, stiffness, rest.to_vec()));
     }
 
-    /// Compensates a ratio of a body's weight: see [`GravityCompensation`]. The weight includes everything that is
-    /// merged into the body, except parts for which [`compensate_gravity_of_part`](Self::compensate_gravity_of_part)
-    /// sets another ratio.
+    /// Compensates the fraction `ratio` of a body's weight: see [`GravityCompensation`]. The weight includes everything
+    /// that is merged into the body, except parts for which
+    /// [`compensate_gravity_of_part`](Self::compensate_gravity_of_part) sets another fraction.
     pub fn compensate_gravity(&mut self, body: BodyId, ratio: f64) {
         self.additions.compensation.insert(body.0, ratio);
     }
 
-    /// Compensates another ratio of the weight of one part of a body. `inertia` is the inertia of this part, in a frame
-    /// at `placement` in the body's frame. It must also be included in the inertia of the body.
+    /// Compensates another fraction of the weight for one part of a body. `inertia` is the inertia of this part, in a
+    /// frame at `placement` in the body's frame. The inertia of the body must include this inertia.
     pub fn compensate_gravity_of_part(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, ratio: f64) {
         self.add_compensated_part(body, placement, inertia, Some(ratio));
     }
@@ -89,14 +90,14 @@ impl ModelBuilder {
     }
 
     /// Adds a named state: the positions and velocities of the joints of some bodies. The other joints are at their
-    /// neutral position and at rest. `control` has one number for each actuator, in the order in which the actuators
-    /// are added. Missing numbers are 0.
+    /// neutral position and at rest. `control` has one entry for each actuator, in the order in which the actuators are
+    /// added. Missing entries are 0.
     pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>, control: Vec<f64>) {
         self.additions.keyframes.push((name.to_owned(), joints, control));
     }
 
     /// Adds a constraint that keeps a point of one body and a point of another body together. Each point is the origin
-    /// of a frame, which is given by its body and its placement there. The frames are named `name#1` and `name#2`.
+    /// of a frame, given by a body and a placement in the body's frame. The frames are named `name#1` and `name#2`.
     pub fn constraint_point(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
         let frames = self.constraint_frames(name, at);
         self.additions.constraints.push((name.to_owned(), Draft::Point(frames)));
@@ -130,8 +131,8 @@ impl ModelBuilder {
     }
 
     /// Adds the additions of a model to this builder. `place` maps each body of the model to a body of the builder and
-    /// a placement there. The model's frames begin at index `first_frame`. Additions of bodies that are locked at q are
-    /// left out, or act on the bodies that carry the locked ones.
+    /// a placement in the frame of this body. The model's frames begin at index `first_frame`. If a body is locked at
+    /// q, its additions are left out, or act on the body that carries it.
     pub(crate) fn append_additions(
         &mut self,
         model: &Model,
@@ -171,7 +172,8 @@ impl ModelBuilder {
                 if let Transmission::Tendon { joints, .. } = &old.transmission {
                     let held = joints.iter().filter(|(i, _)| locked.contains(i));
                     let length: f64 = held.map(|&(i, coefficient)| coefficient * model.joint_position(i, q)).sum();
-                    actuator.bias -= actuator.kp * actuator.gear[0] * length; // the share of −kp l of the locked joint
+                    // The part of −kp l that depends on the locked joint is now constant.
+                    actuator.bias -= actuator.kp * actuator.gear[0] * length;
                 }
                 self.actuator(actuator);
                 kept.push(k);
@@ -203,7 +205,7 @@ impl ModelBuilder {
                             held(id, c.iter().rev().fold(0.0, |sum, c| sum * at + c)) // Σ cᵢ qⁱ
                         }
                         (Some(id), leader) => Some(Draft::Coupling(id, leader.as_ref().and_then(body), *c)),
-                        // q_l = (q_f − c₀) / c₁
+                        // a locked follower holds the leader at q_l = (q_f − c₀) / c₁
                         (None, Some(i)) if c[1] != 0.0 && c[2..] == [0.0; 3] => {
                             body(i).and_then(|id| held(id, (model.joint_position(*follower, q) - c[0]) / c[1]))
                         }
@@ -227,7 +229,7 @@ impl ModelBuilder {
 }
 
 impl Additions {
-    /// Scales the masses of parts that have their own compensated ratio.
+    /// Scales the masses of parts with their own compensated fraction of weight.
     #[cfg(feature = "loaders")]
     pub(crate) fn scale_masses(&mut self, by: f64) {
         for part in &mut self.compensated_parts {
@@ -256,7 +258,7 @@ impl Additions {
                 let body = &model.bodies[index(b)];
                 let (nq, nv) = (body.joint.nq(), body.joint.nv());
                 if body.mimic.is_some() {
-                    continue; // a follower's coordinate belongs to the leader
+                    continue; // a follower uses the coordinate of its leader
                 }
                 if joint_q.len() != nq || joint_v.len() != nv {
                     let (q, v) = (joint_q.len(), joint_v.len());

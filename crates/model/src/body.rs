@@ -14,7 +14,7 @@ pub struct Body {
     pub joint_name: String,
     /// Name of the link.
     pub name: String,
-    /// Index of the body that carries the joint. It is smaller than the index of this body.
+    /// Index of the body that carries the joint. This index is smaller than the index of the body itself.
     pub parent: usize,
     /// Joint from the parent to this body.
     pub joint: Joint,
@@ -26,7 +26,7 @@ pub struct Body {
     pub idx_q: usize,
     /// Index in v of the joint's first degree of freedom.
     pub idx_v: usize,
-    /// Relation to the leading joint, if this joint follows another joint and has no coordinate of its own.
+    /// Relation to the leading joint, if the body's joint follows another joint and has no coordinate of its own.
     pub mimic: Option<Mimic>,
 }
 
@@ -60,7 +60,7 @@ pub enum FrameKind {
 }
 
 /// Body or frame to which [`Model::with_frame`](crate::Model::with_frame) attaches a new frame. A name can be converted
-/// to it (`"tool".into()`).
+/// to a `FrameParent` (`"tool".into()`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FrameParent<'a> {
@@ -68,8 +68,8 @@ pub enum FrameParent<'a> {
     Body(usize),
     /// Index of a frame.
     Frame(usize),
-    /// Name of a frame or body. It is searched among links, frames of the user, and joints, in this order, and then
-    /// among bodies.
+    /// Name of a frame or body. The name is searched among links, frames of the user, and joints, in this order, and
+    /// then among bodies.
     Named(&'a str),
 }
 
@@ -107,7 +107,7 @@ impl Limits {
     }
 }
 
-/// Limits, losses and rotor inertia of a joint. By default, limits are missing and all other values are 0.
+/// Limits, damping, friction and rotor inertia of a joint. By default, there are no limits, and all other values are 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointOptions {
     /// Lower and upper limit of position (rad, m), for joints with one coordinate.
@@ -123,7 +123,7 @@ pub struct JointOptions {
     pub damping_polynomial: [f64; 2],
     /// Coulomb friction (N m, N).
     pub friction: f64,
-    /// Inertia of the rotor as seen at the joint (kg m², kg). For a free joint, it also acts as an apparent mass
+    /// Inertia of the rotor, reflected to the joint (kg m², kg). For a free joint, this inertia also acts as a mass
     /// without weight, along the axes of the joint's parent: see [`Model::with_armature`](crate::Model::with_armature).
     pub armature: f64,
 }

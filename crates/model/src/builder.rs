@@ -20,26 +20,26 @@ use condyle_spatial::{Act, Inertia, Se3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyId(pub(crate) usize);
 
-/// World, which carries the first joints of a robot.
+/// World: the body that carries the first joint, or first joints, of a robot.
 pub const WORLD: BodyId = BodyId(0);
 
-/// Maximum number of degrees of freedom of a model; chosen because the algorithms use square matrices of this size.
+/// Maximum number of degrees of freedom of a model. The number limits the memory of the algorithms' square matrices.
 const MAX_DEGREES: usize = 4096;
-/// Maximum number of coordinates of a model in which joints follow others; chosen because the inertia matrix of such a
-/// model is factored as a dense matrix.
+/// Maximum number of coordinates of a model in which joints follow others. The number is small because the inertia
+/// matrix of such a model is factorized as a dense matrix.
 const MAX_SHARED: usize = 1024;
 
 #[derive(Clone, Debug)]
 struct Draft {
     body: Body,
     options: JointOptions,
-    /// Whether the body connects two joints of a chain, so that it has no mass on purpose.
+    /// Whether the body connects two joints of a chain, and therefore has no mass on purpose.
     between: bool,
     /// Index of the body with the leading joint, and the relation between the two joints.
     mimic: Option<(usize, Mimic)>,
 }
 
-/// Builder of a [`Model`], body by body, parents first.
+/// Builder of a [`Model`]. Bodies are added one by one, each after its parent.
 ///
 /// ```
 /// use condyle_model::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD};
@@ -86,8 +86,9 @@ impl ModelBuilder {
         }
     }
 
-    /// Adds a body and its joint, without limits. Both have the name `name`. The joint is at `placement` in the
-    /// parent's frame. `inertia` is in the body's frame, which is the joint's frame at position zero.
+    /// Adds a body and its joint, without limits. The body and the joint have the name `name`. The joint is at
+    /// `placement` in the parent's frame. `inertia` is in the body's frame, which is the joint's frame at position
+    /// zero.
     pub fn body(
         &mut self,
         name: &str,
@@ -158,10 +159,10 @@ impl ModelBuilder {
         self.drafts[body.0].between = true;
     }
 
-    /// Lets a joint follow another joint, so that it has no coordinate of its own; see [`Mimic`]. If the leader follows
-    /// a third joint, ratios and offsets are composed. Limits of position and velocity, damping, friction and armature
-    /// of the follower act on the leader's coordinate. Limits of effort of the follower have no effect. Limits that
-    /// would not let the leader move are ignored, with a warning.
+    /// Lets a joint follow another joint; see [`Mimic`]. The follower then has no coordinate of its own. If the leader
+    /// follows a third joint, ratios and offsets are composed. Limits of position and velocity, damping, friction and
+    /// armature of the follower act on the leader's coordinate. Limits of effort of the follower have no effect. Limits
+    /// that leave no range for the leader are ignored, with a warning.
     ///
     /// # Panics
     /// If the follower does not belong to this builder.
@@ -209,7 +210,7 @@ impl ModelBuilder {
         for frame in &mut self.frames {
             frame.body = number[frame.body];
         }
-        // Coordinates are assigned first to the joints that have their own, in order. Then each follower gets the
+        // Coordinates are first assigned to the joints without a leader, in order. Then each follower gets the
         // coordinate of its leader.
         let mut coordinates = Coordinates::default();
         let mut bodies: Vec<Body> = Vec::with_capacity(order.len());
@@ -319,7 +320,8 @@ impl ModelBuilder {
     /// Replaces each leader that is a follower itself by the leader of that follower: q_f = r₁ (r₂ q + o₂) + o₁.
     fn compose_mimics(&mut self) -> Result<(), Error> {
         for i in 1..self.drafts.len() {
-            // `way` lists the joints on the path to the last leader, whose mimics are not yet composed.
+            // `way` lists the followers on the path from joint i to its final leader, whose relations are not yet
+            // composed.
             let mut way = Vec::new();
             let mut at = i;
             while let Some((leader, _)) = self.drafts[at].mimic {
@@ -383,11 +385,11 @@ impl ModelBuilder {
     }
 }
 
-/// Relative rounding error of the limits of position of followers. A leader with a smaller range is treated as unable
-/// to move.
+/// Relative rounding error of the position limits of followers. If they leave the leader a range below this error, the
+/// leader counts as unable to move.
 const MIMIC_ROUNDING: f64 = 1e-9;
 
-/// Numbers that a model has for each coordinate.
+/// Lists of a model with one entry for each coordinate or degree of freedom.
 #[derive(Default)]
 struct Coordinates {
     nq: usize,
@@ -400,7 +402,7 @@ struct Coordinates {
 }
 
 impl Coordinates {
-    /// Adds the coordinates of a joint, with their limits and losses.
+    /// Adds the coordinates of a joint, with their limits, damping and friction.
     fn add(&mut self, joint: Joint, options: &JointOptions) {
         let (lower, upper) = match options.position {
             Some(limits) if joint.nq() == 1 => limits,
@@ -420,9 +422,9 @@ impl Coordinates {
         self.armature.resize(self.nv, options.armature);
     }
 
-    /// Adds the limits and losses of a joint that follows a leader. With x = ratio q + offset, the follower's limits of
-    /// position and velocity also limit the leader. The follower's limits of effort have no effect. Limits that would
-    /// not let the leader move are ignored; returns messages about these limits.
+    /// Adds the limits, damping and friction of a joint that follows a leader. With x = ratio q + offset, the
+    /// follower's limits of position and velocity also limit the leader. The follower's limits of effort have no
+    /// effect. Limits that leave no range for the leader are ignored. Returns messages about the ignored limits.
     fn follow(
         &mut self,
         leader: &Body,

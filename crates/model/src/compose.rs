@@ -11,11 +11,12 @@ use condyle_linalg::{check, check_index};
 use condyle_spatial::{Inertia, Se3, Vec3};
 
 impl ModelBuilder {
-    /// Adds a composite joint: a body after several joints, each at a placement in the frame of the joint before it.
+    /// Adds a composite joint: several joints in series, which carry one body. Each joint is at a placement in the
+    /// frame of the joint before it.
     ///
     /// The coordinates of the composite joint are the coordinates of the joints, in order. Bodies without mass connect
-    /// the joints; their names are the name of the last body with a number: `name#1`, `name#2`, …. Returns the last
-    /// body, which carries `inertia`.
+    /// the joints. Their names are the name of the last body followed by a number: `name#1`, `name#2`, …. Returns the
+    /// last body, which carries `inertia`.
     ///
     /// - universal joint about unit vectors a and b: `[(Revolute { a }, placement), (Revolute { b }, identity)]`;
     /// - ball joint with roll-pitch-yaw angles (z, y, x): [`spherical_zyx`](Self::spherical_zyx).
@@ -33,8 +34,8 @@ impl ModelBuilder {
         self.body(name, at, *last, *placement, inertia)
     }
 
-    /// Adds a body on a ball joint with three angles: it turns by q₀ about z, then by q₁ about the new y, then by q₂
-    /// about the new x. The velocity is v = q̇.
+    /// Adds a body on a ball joint with three angles. The body turns by q₀ about z, then by q₁ about the new y, then by
+    /// q₂ about the new x. The velocity is v = q̇.
     ///
     /// The inertia matrix is singular at q₁ = ±π/2. [`Joint::Spherical`] has no singularity.
     ///
@@ -74,7 +75,8 @@ impl ModelBuilder {
     }
 
     /// Adds a whole robot, as [`append`](Self::append) does, but with some bodies fixed at their poses at q. Returns,
-    /// for each body of the robot, a body of this builder to which the robot's body is fixed, and its placement there.
+    /// for each body of the robot, the body of this builder to which it is fixed, and its placement in the frame of
+    /// that body.
     fn append_locked(
         &mut self,
         parent: BodyId,
@@ -86,7 +88,8 @@ impl ModelBuilder {
     ) -> Vec<(BodyId, Se3<f64>)> {
         let mut place = vec![(parent, placement)];
         self.merge(parent, placement, model.bodies[0].inertia);
-        let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero()); // bXz
+        // Returns bXz: the pose, in body i, of the frame whose z axis is the joint's axis.
+        let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero());
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             let (on, pXp) = place[body.parent];
             if locked.contains(&i) {
@@ -98,7 +101,7 @@ impl ModelBuilder {
             }
             let options = match body.mimic {
                 None => model.joint_options(body.idx_q, body.idx_v),
-                Some(_) => JointOptions::default(), // the leader's options include the follower's
+                Some(_) => JointOptions::default(), // included in the options of the leader
             };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
@@ -121,7 +124,7 @@ impl ModelBuilder {
             let (on, pXb) = place[frame.body];
             self.frame_of_kind(&format!("{prefix}{}", frame.name), frame.kind, on, pXb * frame.placement);
         }
-        // The frame of a locked body stays. It is named after the body's joint, as after a fixed joint.
+        // Keeps a frame for each locked body, named after the body's joint. A reader does the same for a fixed joint.
         for &i in locked {
             let (name, (on, pXb)) = (format!("{prefix}{}", model.bodies[i].joint_name), place[i]);
             if !model.frames.iter().any(|f| f.kind == FrameKind::Joint && f.name == model.bodies[i].joint_name) {
@@ -136,10 +139,10 @@ impl ModelBuilder {
 impl Model {
     /// Returns the same robot with some joints locked at q. `bodies` are the bodies that these joints carry.
     ///
-    /// Each of these bodies is merged into the body that carries it, and stays as a frame. A joint that follows a
-    /// locked joint is locked, too. If a tendon moves with a locked joint, this joint's share of the tendon's length is
-    /// kept. A coupling of a locked joint holds the other joint; if this is not possible, the model has a warning.
-    /// Warnings about the robot's file are kept.
+    /// Each of these bodies is merged into the body that carries it, and a frame remains at its pose. A joint that
+    /// follows a locked joint is locked, too. If a tendon moves with a locked joint, the joint's contribution to the
+    /// tendon's length becomes a constant. A coupling between a locked joint and another joint fixes the position of
+    /// the other joint. If this is not possible, the model has a warning. Warnings about the robot's file are kept.
     ///
     /// ```
     /// use condyle_model::robots;
@@ -203,7 +206,7 @@ impl Model {
     }
 
     /// Returns the same robot with one joint that follows another joint and has no coordinate of its own. Each joint is
-    /// given by the index of its body. Limits and losses of the follower act on the leader, as described at
+    /// given by the index of its body. Limits, damping and friction of the follower act on the leader, as described at
     /// [`ModelBuilder::mimic`].
     ///
     /// ```
@@ -237,8 +240,8 @@ impl Model {
         check_index(name, i, self.bodies.len(), "bodies");
     }
 
-    /// Returns a builder of this robot. For each body, also returns the identifier of a body in the builder, and the
-    /// placement there.
+    /// Returns a builder of this robot. For each body of the robot, also returns the identifier of its body in the
+    /// builder, and its placement in that body's frame.
     fn to_builder(&self) -> (ModelBuilder, Vec<(BodyId, Se3<f64>)>) {
         let mut builder = ModelBuilder::new(&self.name);
         builder.gravity(self.gravity);

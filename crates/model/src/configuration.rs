@@ -46,7 +46,8 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
         let mut lower = bound(&model.limits.lower[iq.clone()], -UNLIMITED);
         let mut upper = bound(&model.limits.upper[iq.clone()], UNLIMITED);
         for (k, i) in iq.clone().enumerate() {
-            // If the only limit of a coordinate lies outside of ±3, the range is this limit.
+            // If a coordinate has only one limit and this limit lies outside ±3, both bounds of the range become this
+            // limit.
             lower[k] = if lower[k] > upper[k] && model.limits.upper[i] == upper[k] { upper[k] } else { lower[k] };
             upper[k] = upper[k].max(lower[k]);
         }
@@ -97,7 +98,7 @@ impl<S: Scalar, R> Kernel for Integrate<'_, S, R> {
     }
 }
 
-/// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁. For rotations, it is the shortest such vector.
+/// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁. For rotations, v is the shortest such vector.
 ///
 /// q0, q1: nq numbers; out: nv numbers. Does not allocate.
 ///
@@ -113,8 +114,7 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
     }
 }
 
-/// Computes q₀ ⊕ t (q₁ ⊖ q₀): the position at t on the path with constant velocity, which is at q₀ for t = 0 and at q₁
-/// for t = 1.
+/// Computes q₀ ⊕ t (q₁ ⊖ q₀): a position on the path with constant velocity from q₀ (t = 0) to q₁ (t = 1).
 ///
 /// q0, q1, out: nq numbers; tangent: scratch of nv numbers, which contains t (q₁ ⊖ q₀) after the call. Does not
 /// allocate.
@@ -204,7 +204,7 @@ pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
     for (joint, _, iv) in model.tree.coordinates() {
         let mut back = [S::zero(); 6];
         for (back, &v) in back.iter_mut().zip(&v[iv.clone()]) {
-            *back = -v; // (Ad exp(v)⁻¹)⁻¹ = Ad exp(−v)⁻¹
+            *back = -v; // uses (Ad exp(v)⁻¹)⁻¹ = Ad exp(−v)⁻¹
         }
         let Some(map) = joint.jacobian(GroupJacobian::Transport, &back[..iv.len()]) else { continue };
         for mut column in X.column_iter_mut() {

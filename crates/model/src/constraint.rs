@@ -3,8 +3,8 @@
 
 use alloc::string::String;
 
-/// Constraint in addition to the tree of a model. Algorithms for trees ignore it. Constrained dynamics closes loops if
-/// the caller asks for it, and does not enforce couplings.
+/// Constraint in addition to the tree of a model. Algorithms for trees ignore constraints. Constrained dynamics
+/// enforces the loops that the caller passes to it, but not couplings.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModelConstraint {
@@ -19,12 +19,12 @@ pub struct ModelConstraint {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum ModelConstraintKind {
-    /// The origins of two frames coincide: three rows.
+    /// The origins of two frames coincide: three rows of the constraint Jacobian.
     Point {
         /// Indices of the frames.
         frames: [usize; 2],
     },
-    /// Two frames coincide: six rows.
+    /// Two frames coincide: six rows of the constraint Jacobian.
     Rigid {
         /// Indices of the frames.
         frames: [usize; 2],
@@ -32,9 +32,9 @@ pub enum ModelConstraintKind {
     /// The position q_f of a joint is a polynomial in the position q_l of another joint, q_f = Σ cᵢ q_lⁱ. Without a
     /// leader, q_f is c₀.
     Coupling {
-        /// Index of the body whose joint follows.
+        /// Index of the body that the following joint carries.
         follower: usize,
-        /// Index of the body whose joint leads.
+        /// Index of the body that the leading joint carries.
         leader: Option<usize>,
         /// Coefficients c₀ to c₄.
         coefficients: [f64; 5],

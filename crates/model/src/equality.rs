@@ -2,9 +2,9 @@
 
 use crate::model::Model;
 
-/// Two models are equal if they describe the same robot with equal numbers: names, bodies, joints, frames, limits,
-/// losses, springs, armature, gravity, inertias, actuators, keyframes and constraints. All other fields are computed
-/// from these.
+/// Two models are equal if they describe the same robot with equal values. Compared are names, bodies, joints, frames,
+/// limits, damping, friction, springs, armature, gravity, inertias, actuators, keyframes and constraints. All other
+/// fields are computed from these values.
 ///
 /// A clone is equal to its model. A model that is written and read again is equal to its original, if the format keeps
 /// all digits. Warnings of the loader are not compared. The setting of [`with_limbs`](Model::with_limbs) is not

@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file could not be read, or it cannot be a robot's file: it is not a regular file, or it is too large.
+    /// The file could not be read, is not a regular file, or is too large.
     #[error("{file}: {what}")]
     File {
         /// Path as the caller gave it, or `<string>`.
@@ -40,7 +40,7 @@ pub enum Error {
     /// An element of a URDF, MJCF or SDF is invalid.
     #[error("{file}{}: {element}: {what}", colon(*.line))]
     Element {
-        /// Path of the file that contains the element, or `<string>`. It may be an included file.
+        /// Path of the file that contains the element, which may be an included file, or `<string>`.
         file: String,
         /// Number of the line on which the element, or the invalid part of it, begins, counted from 1; 0 if the text is
         /// not from a file.
@@ -164,7 +164,8 @@ pub enum Error {
     },
 }
 
-/// Returns the beginning of the message of [`Error::Strict`]: the file, unless the warning itself names the file.
+/// Returns the beginning of the message of [`Error::Strict`]: the file name, or an empty text if the warning itself
+/// names the file.
 fn file_of(file: &str, warning: &Warning) -> String {
     if warning.place().is_some() { String::new() } else { format!("{file}: ") }
 }

@@ -49,7 +49,7 @@ pub enum NotPhysical {
          a principal moment of inertia is not below the sum of the other two"
     )]
     Spread {
-        /// First pivot that is not positive of Σ about the centre of mass (kg m²).
+        /// First pivot of Σ, taken about the centre of mass, that is not positive (kg m²).
         moment: f64,
     },
 }
@@ -68,7 +68,7 @@ pub fn from_inertia<S: Scalar>(I: Inertia<S>) -> [S; 10] {
     [I.mass, h.x, h.y, h.z, J.xx, J.xy, J.yy, J.xz, J.yz, J.zz]
 }
 
-/// Returns the inertia with the ten parameters π. This is the inverse of [`from_inertia`].
+/// Returns the inertia with the ten parameters π. This function is the inverse of [`from_inertia`].
 pub fn to_inertia<S: Scalar>([m, hx, hy, hz, xx, xy, yy, xz, yz, zz]: [S; 10]) -> Inertia<S> {
     Inertia { mass: m, mass_com: Vec3::new(hx, hy, hz), rotational: Sym3 { xx, xy, yy, xz, yz, zz } }
 }
@@ -120,7 +120,7 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
         return Err(NotPhysical::Mass { mass });
     }
     let t = I.mass_com.scale(1.0 / mass);
-    let s = second_moments(I.rotational) - Sym3::outer(t).scale(mass); // about the centre of mass
+    let s = second_moments(I.rotational) - Sym3::outer(t).scale(mass); // moments about the centre of mass
     let z = positive(s.zz)?;
     let (yz, xz) = (s.yz / z, s.xz / z);
     let y = positive(s.yy - yz * yz)?;
@@ -135,7 +135,7 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
 /// Point masses, rods and plates have no volume. They are limit cases and are refused.
 ///
 /// # Errors
-/// Returns [`NotPhysical`] with the first number that is not positive.
+/// Returns [`NotPhysical`] with the mass, or with the first pivot that is not positive.
 ///
 /// ```
 /// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters::check};
@@ -151,8 +151,8 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
 /// Returns the log-Cholesky parameters θ of a physical inertia. Any ten numbers are valid, and different θ give
 /// different inertias.
 ///
-/// In θ, α is ½ ln m; dᵢ are logarithms of numbers in m; s has the unit m; t is the centre of mass (m). Source: Rucker
-/// and Wensing (2022).
+/// In θ, α is ½ ln m. Each dᵢ is the logarithm of a length in metres. Each s is a length (m), and t is the centre of
+/// mass (m). Source: Rucker and Wensing (2022).
 ///
 /// ```
 /// use condyle_model::{inertial_parameters::{from_log_cholesky, log_cholesky}, robots};
@@ -182,8 +182,8 @@ fn dot<S: Scalar>(a: [S; 4], b: [S; 4]) -> S {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul_add(b[2], a[3] * b[3])))
 }
 
-/// Returns the inertia with the log-Cholesky parameters θ. It is physical for all θ. This is the inverse of
-/// [`log_cholesky`].
+/// Returns the inertia with the log-Cholesky parameters θ. The inertia is physical for all θ. This function is the
+/// inverse of [`log_cholesky`].
 ///
 /// Ī = tr(Σ) 1 − Σ, where Σ is the upper left block of U Uᵀ. Source: Rucker and Wensing (2022). The result is valid for
 /// α within ±32 and dᵢ within ±64, up to a rounding error that grows with their magnitude.
@@ -212,8 +212,7 @@ pub fn log_cholesky_jacobian<S: Scalar>(theta: [S; 10]) -> SMatrix<S, 10, 10> {
     // e²ᵅ is a factor of all parameters, so ∂π/∂α = 2 π.
     let pi = from_inertia(from_log_cholesky(theta));
     J.set_column(0, &SVector::<S, 10>::from_fn(|k, _| pi[k] + pi[k]));
-    // Each other number of θ is the entry (row, column) of U / eᵅ, or the logarithm of this entry if it is on the
-    // diagonal.
+    // Each component of θ except α is an entry (row, column) of U / eᵅ, or the logarithm of a diagonal entry.
     const ENTRIES: [(usize, usize); 9] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
     for (k, &(row, column)) in ENTRIES.iter().enumerate() {
         let rate = if row == column { u[row][column] } else { S::one() } * mass;

@@ -1,9 +1,9 @@
 //! Joints. All code that depends on the kind of a joint is in this file and its folder. `joint/group.rs` contains the
-//! groups of positions. `joint/kinematics.rs` contains the kinematics that the passes of algorithms use.
+//! Lie groups of joint positions. `joint/kinematics.rs` contains the kinematics that the passes of algorithms use.
 //!
-//! A joint moves along some of the six unit motions of the body's frame. In that frame, these motions are the same for
-//! all positions: the motion subspace S is constant in the body. When a model is built, the axis of a revolute or
-//! prismatic joint is turned to z. So S is internally the same for all joints of a kind.
+//! A joint moves along some of the six unit motions of the body's frame. In the body's frame, these motions do not
+//! depend on the position, so the motion subspace S is constant there. When a model is built, the axis of a revolute or
+//! prismatic joint is turned to z. So inside the algorithms, S is the same for all joints of one kind.
 
 mod group;
 pub mod kinematics;
@@ -58,12 +58,12 @@ pub enum Joint {
 /// position of the leader.
 ///
 /// Both joints have one degree of freedom, and the leader has its own coordinate. A continuous leader has q = [cos θ,
-/// sin θ]. Its ratio must be an integer, and the follower turns by ratio · θ + offset. If the follower is continuous
-/// and the leader has one number, the follower turns by ratio · q + offset.
+/// sin θ]. For such a leader, the ratio must be an integer, and the follower turns by ratio · θ + offset. If the
+/// follower is continuous and the leader has one coordinate q, the follower turns by ratio · q + offset.
 ///
 /// As described at [`ModelBuilder::mimic`](crate::ModelBuilder::mimic), the follower's limits of position and velocity,
 /// damping, friction and armature act on the leader's coordinate. The armature is added as ratio² · armature. The
-/// follower's spring acts on this coordinate, too. Its limits of effort have no effect.
+/// follower's spring acts on the leader's coordinate, too. The follower's limits of effort have no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -142,7 +142,7 @@ impl Joint {
         if !norm.is_normal() {
             return Err(format!("axis ({}, {}, {}) is no direction", axis.x, axis.y, axis.z));
         }
-        let unit = (norm - 1.0).abs() < UNIT; // a vector that was normalized before is kept to the last bit
+        let unit = (norm - 1.0).abs() < UNIT; // keeps a unit vector unchanged
         let axis = if unit { axis } else { axis.scale(1.0 / norm) };
         match self {
             Self::Helical { pitch, .. } if !pitch.is_finite() => Err(format!("pitch {pitch} is not finite")),
@@ -153,11 +153,11 @@ impl Joint {
         }
     }
 
-    /// Returns the rotation bRz from the frame used in algorithms to the body's frame. Its third column is the joint's
-    /// axis.
+    /// Returns the rotation bRz from the frame used in algorithms, in which the joint's axis is z, to the body's frame.
+    /// The third column of bRz is the joint's axis.
     ///
-    /// If the axis is x, y or z, the result is a permutation of axes and hence exact. Otherwise, it is the shortest
-    /// rotation of z, or of −z, to the axis.
+    /// If the axis is x, y or z, the result is a permutation of axes and hence exact. Otherwise, the result is the
+    /// shortest rotation of z, or of −z, to the axis.
     #[doc(hidden)]
     pub fn axis_rotation(self) -> Mat3<f64> {
         let Some(a) = self.axis() else { return Mat3::identity() };
@@ -182,10 +182,10 @@ impl Joint {
         }
     }
 
-    /// Returns the kind of joint with which a follower is computed, or the reason why it cannot follow. The follower's
-    /// position has the same form as the leader's position: (cos, sin), or one number.
+    /// Returns the kind of joint with which a follower is computed, or the reason why the joint cannot follow. The
+    /// follower's position has the same form as the leader's position: (cos, sin), or one number.
     ///
-    /// The (cos, sin) of a leader determines the leader's angle up to whole turns. So it also determines integer
+    /// The (cos, sin) of a leader determines the leader's angle up to whole turns. So this pair also determines integer
     /// multiples of the angle up to whole turns. With any other ratio, the follower would jump whenever the leader
     /// completes a turn.
     pub(crate) fn as_follower(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
@@ -214,7 +214,7 @@ impl Joint {
         matches!(self, Self::Revolute { .. } | Self::Continuous { .. })
     }
 
-    /// Returns whether the group of positions is commutative. If it is, q ⊕ v has the Jacobian 1.
+    /// Returns whether the Lie group of positions is commutative. If so, the Jacobians of q ⊕ v are the identity.
     #[doc(hidden)]
     pub fn commutes(self) -> bool {
         !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer)
@@ -231,17 +231,17 @@ impl Joint {
         core::mem::discriminant(&self) == core::mem::discriminant(&other) && pitch(self) == pitch(other)
     }
 
-    /// Returns the k-th number of a follower's position. `q` begins with the leader's position.
+    /// Returns coordinate k of a follower's position. `q` begins with the leader's position.
     #[inline(always)]
     pub(crate) fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
-            Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // the offset of `mimic` is part of X_T
+            Self::Continuous { .. } => multiple([q[0], q[1]], mimic.ratio)[k], // X_T contains the offset
             _ => q[k].mul_add(S::splat(mimic.ratio), S::splat(mimic.offset)),
         }
     }
 
-    /// Returns the pose that represents a follower's offset, if the offset belongs to its placement. The pose is
-    /// applied to the turned frame of the joint.
+    /// Returns the pose that represents the offset of a continuous follower, otherwise the identity. The pose is
+    /// applied in the joint's frame whose z axis is the joint's axis.
     pub(crate) fn mimic_offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
             Self::Continuous { .. } => {

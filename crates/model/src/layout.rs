@@ -1,7 +1,7 @@
-//! Layouts: the views that the passes of algorithms have of a model and a state.
+//! Layouts: the interface through which passes of algorithms read a model and a state.
 //!
-//! Each algorithm is written once, for a [`Layout`]. It accesses a body's parent, sums over children, and coordinates
-//! only through the methods of the traits in this module. So the same source code runs on:
+//! Each algorithm is written once, for a [`Layout`]. Only the methods of the traits in this module access the parent of
+//! a body, sums over children, and coordinates. So the same source code runs on:
 //!
 //! - one state: the scalar is `f64` (or `f32`, or a dual number), and constants are `f64`;
 //! - several knots of a horizon in parallel lanes: the scalar holds one number for each knot, and constants are
@@ -12,7 +12,7 @@
 //! The first two cases use [`Single`]. A *column* is a degree of freedom of a joint, and a *coordinate* is an entry of
 //! v. Several joints may share a coordinate (mimic joints): v_joint = G v, with one nonzero entry in each row of G.
 //! [`joint_velocity`](Layout::joint_velocity) applies G, [`add_joint_effort`](Layout::add_joint_effort) applies Gᵀ, and
-//! methods like [`set_row`](Columns::set_row) apply Gᵀ · G. Algorithms need no other knowledge of shared coordinates.
+//! methods like [`set_row`](Columns::set_row) apply Gᵀ · G. Algorithms contain no other code for shared coordinates.
 
 use crate::joint::Joint;
 use crate::joint::revolute_angles::RevoluteAngles;
@@ -47,9 +47,9 @@ pub trait Layout {
     /// frames of the bodies.
     fn force(&self, f_ext: &[Force<Self::S>], i: usize) -> Option<Force<Self::S>>;
 
-    /// Returns the entry of the parent of body i in an array indexed by body.
+    /// Returns the entry for the parent of body i, from an array indexed by body.
     fn parent<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds x to the entry of the parent of body i in an array indexed by body.
+    /// Adds x to the entry for the parent of body i, in an array indexed by body.
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
     /// Returns the index of body i on the stack of a depth-first pass. The index is the number of bodies on the path
@@ -58,20 +58,21 @@ pub trait Layout {
     fn stack_index(&self, i: usize) -> usize;
     /// Returns the bodies whose subtrees end with body i, each before its parent.
     fn subtrees_ending_at(&self, i: usize) -> &[usize];
-    /// Returns the entry of the parent of body i on the stack.
+    /// Returns the stack entry of the parent of body i.
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds x to the entry of the parent of body i on the stack.
+    /// Adds x to the stack entry of the parent of body i.
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// Sums x over the lanes of body i, because each lane may hold a part of the sum over the body's children.
+    /// Replaces x by its sum over the lanes of body i. Each lane may contain a part of the sum over the body's
+    /// children.
     fn sum_lanes<T>(&self, i: usize, x: &mut T);
 
-    /// Returns the k-th number of the position of joint i.
+    /// Returns coordinate k of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// Returns the k-th number of the velocity (or acceleration) of joint i.
+    /// Returns component k of the velocity (or acceleration) of joint i.
     fn joint_velocity(&self, v: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// Adds the effort along degree of freedom k of joint i to the coordinate of this joint. This is the transpose of
-    /// `joint_velocity`.
+    /// Adds the effort along degree of freedom k of joint i to the coordinate of this joint. This function is the
+    /// transpose of `joint_velocity`.
     fn add_joint_effort(&self, tau: &mut [Self::S], i: usize, k: usize, effort: Self::S);
 
     /// Returns the index of the first column of joint i, for arrays indexed by column.
@@ -80,13 +81,14 @@ pub trait Layout {
     fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
 }
 
-/// Columns from the root to a joint, and matrix entries of these columns with the joint's own columns.
+/// Access to the columns from the root to a joint, and to the matrix entries of these columns with the joint's own
+/// columns.
 ///
 /// Matrices have a row and a column for each coordinate. They are stored column by column.
 pub trait Columns: Layout {
-    /// Identifier of a column among the columns from the root to a joint.
+    /// Identifier of a column in the support of a joint: the columns from the root to this joint.
     type Column: Copy;
-    /// Identifier of a column of a body's own joint.
+    /// Identifier of a column of a joint itself.
     type OwnColumn: Copy;
     /// Scalar type of matrices.
     type Number: Scalar;
@@ -95,15 +97,16 @@ pub trait Columns: Layout {
     fn support(&self, i: usize) -> &[Self::Column];
     /// Returns column k of joint i.
     fn own_column(&self, i: usize, k: usize) -> Self::OwnColumn;
-    /// Returns the entry of a column in an array indexed by column.
+    /// Returns the entry for a column, from an array indexed by column.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
-    /// Copies entries of an array indexed by column to the indices from which `at` reads them, if these indices differ.
+    /// Copies entries of an array indexed by column to the indices from which `at` reads. A layout in which the indices
+    /// are equal copies nothing.
     fn broadcast<T: Copy>(&self, of: &mut [T]);
     /// Prepares a matrix for `set_row` and `set_column`. Entries that are never set are 0.
     fn clear(&self, matrix: &mut [Self::Number]);
     /// Sets the entry in the row of a joint's own column and in column e of its support. If several columns share the
-    /// entry, adds to it. The function must be called once for each pair of columns. The pair of the first body's last
-    /// column with itself must be the last call.
+    /// entry, adds the value to the entry. The function must be called once for each pair of columns. The last call
+    /// must be for the last column of the first body, paired with itself.
     fn set_row(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
     /// Sets the entry in row e and in the column of a joint's own column, as `set_row` does.
     fn set_column(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
@@ -111,10 +114,10 @@ pub trait Columns: Layout {
     fn add_armature(&self, matrix: &mut [Self::Number]);
 }
 
-/// Matrix entries for any pair of columns.
+/// Access to the matrix entry of any pair of columns.
 pub trait Pairs: Columns<Number = <Self as Layout>::S> {
-    /// Sets the entry (row, column) of a matrix after `clear`. If several columns share the entry, adds to it. The
-    /// function must be called once for each pair of columns.
+    /// Sets the entry (row, column) of a matrix after `clear`. If several columns share the entry, adds the value to
+    /// the entry. The function must be called once for each pair of columns.
     fn set_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
     /// Adds to the entry (row, column) of a matrix.
     fn add_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
@@ -122,8 +125,8 @@ pub trait Pairs: Columns<Number = <Self as Layout>::S> {
 
 /// Layout that computes one body at a time, for one state or for several knots of a horizon in the lanes of the scalar.
 pub struct Single<'m, S, R> {
-    /// Data that passes need in each step. They are stored here so that they are not read from the model again after
-    /// every store.
+    /// Data of each body that passes need in every step. The layout holds these references so that the compiler does
+    /// not reload them from the model after every store.
     nodes: &'m [Node<R>],
     closed: &'m [usize],
     revolute_angles: &'m RevoluteAngles,

@@ -1,4 +1,5 @@
-//! Robot models: trees of bodies and joints, the files of robots, and the views that algorithms have of a model.
+//! Robot models: trees of bodies and joints, readers and writers of robot files, and the interface between models and
+//! algorithms.
 //!
 //! A [`Model`] is created by a [`ModelBuilder`], or by a reader of URDF, MJCF or SDF. A model is checked and then
 //! immutable:
@@ -13,18 +14,18 @@
 //!
 //! # Limits of files
 //!
-//! A file is refused if it is not a regular file (but a folder, a device or a pipe), or if it exceeds a limit. It is
-//! refused before memory or time is spent on it. The error contains the number and the limit. These maximum numbers are
-//! allowed:
+//! A file is refused if it is not a regular file (for example a folder, a device or a pipe), or if it exceeds a limit.
+//! The check comes before the file takes much memory or time. The error contains the number and the limit. These
+//! maximum numbers are allowed:
 //!
 //! - 67 108 864 bytes in all files of a robot, including the files that these files include;
 //! - 1 048 576 tags in these files, including end tags and comments;
 //! - 4 194 304 equals signs in these files;
-//! - a depth of 256 nested elements; the depth of an included file is added to the depth of its include;
+//! - a depth of 256 nested elements, counted across included files;
 //! - 256 attributes of an element;
 //! - 16 384 included files of an SDF;
 //! - 67 108 864 bytes in the full names of an SDF; a full name contains the names of all models around an item;
-//! - the same numbers of tags and equals signs in an MJCF, including the copies of `<replicate>` and `<attach>`;
+//! - 1 048 576 tags and 4 194 304 equals signs in an MJCF, including the copies of `<replicate>` and `<attach>`;
 //! - 256 `<attach>` elements in an MJCF and in the files that it attaches;
 //! - 536 870 912 bytes in the mesh files from which masses of an MJCF are computed;
 //! - 1 048 576 attributes in all default classes of an MJCF, including inherited ones;
@@ -36,18 +37,19 @@
 //! - 1024 coordinates in a model whose joints follow others.
 //!
 //! A `package://` address cannot leave its package, except through links in the package. The files that an MJCF or SDF
-//! includes may be anywhere. The search for the nearest name in an error compares the first 128 characters of names,
-//! and stops after a moment if there are many names.
+//! includes may be anywhere. For an error about an unknown name, the nearest name is searched. This search compares
+//! only the first 128 characters of names, and it stops early if there are many names.
 //!
-//! Some public modules, which are meant for the crates with algorithms, are hidden from the documentation: the view
-//! that passes have of a model (`layout`), the tree of turned frames and columns (`tree`), and the schedule of limbs
-//! (`limbs`).
+//! Some public modules are only for Condyle's crates with algorithms, and are hidden from the documentation. They are
+//! `layout` (the interface of passes to a model), `tree` (the tree of turned frames and columns) and `limbs` (the
+//! schedule of limbs).
 //!
 //! # Features
-//! All features except `urdf-rs` are on by default. `loaders` is for files of robots, and for [`robots`]. `meshes` is
-//! for masses and inertias of meshes in MJCF. `serde` is for serialization of models. `threads` uses the threads of
-//! rayon. `std` uses the standard library; all other features except `serde` need it. Without `std`, the crate needs
-//! `alloc` and, for floating-point functions, the feature `libm`. `urdf-rs` is for models from `urdf_rs::Robot`.
+//! All features except `urdf-rs` are on by default. `loaders` is for robot files and for the module [`robots`].
+//! `meshes` is for masses and inertias of meshes in MJCF. `serde` is for serialization of models. `threads` uses the
+//! threads of rayon. `std` uses the standard library; all other features except `serde` need it. Without `std`, the
+//! crate needs `alloc` and, for floating-point functions, the feature `libm`. `urdf-rs` is for models from
+//! `urdf_rs::Robot`.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]

@@ -1,12 +1,12 @@
-//! Limbs of one robot, which are branches of its tree, in parallel lanes. This module decides which bodies share a step
-//! of a pass, and in which lane each body is.
+//! Limbs of one robot in parallel lanes; a limb is a branch of the robot's tree. This module selects the bodies that
+//! share a step of a pass, and the lane of each body.
 //!
 //! Bodies of different legs, arms or fingers do not depend on each other. So one pass can process four such bodies at
-//! once, each in a lane of a vector register. All four must have the same kind of joint. Their axes may differ, because
-//! they are turned to z. [`schedule`] selects the bodies of each step, [`steps`] collects the data that a pass needs,
-//! and [`column_map`] contains the indices of matrix entries.
+//! once, each in a lane of a vector register. All four bodies must have the same kind of joint. The joint axes may
+//! differ, because every joint frame is turned such that its axis is z. [`schedule`] selects the bodies of each step,
+//! [`steps`] collects the data that a pass needs, and [`column_map`] contains the indices of matrix entries.
 //!
-//! For robots with fewer than about two bodies per step, such as chains, one body after the other is computed.
+//! If a robot has fewer than about two bodies per step, as a chain has, bodies are computed one after another instead.
 
 pub mod column_map;
 pub mod schedule;
@@ -22,11 +22,11 @@ use steps::{StateMap, Step};
 /// Number of bodies that are computed in parallel lanes.
 pub const LANES: usize = 4;
 
-/// Schedule of the steps, and the data that a pass needs. Step 0 is the world.
+/// Schedule of the steps of a pass, and the data that the steps need. Step 0 is the world.
 #[derive(Clone, Debug)]
 pub struct Plan {
     schedule: Schedule,
-    /// Steps of a pass: the bodies of each step, in the form that passes need.
+    /// Steps of a pass: the bodies of each step, with the data that the pass reads.
     pub steps: Vec<Step>,
     /// Indices of all steps except the world. The last step comes first.
     pub closed: Vec<usize>,
@@ -57,7 +57,7 @@ impl Plan {
         self.schedule.place[body]
     }
 
-    /// Returns whether a step has the same body in all lanes: the world, or the one body that carries all others.
+    /// Returns whether a step has the same body in all lanes: the world, or the body that carries all other bodies.
     #[inline(always)]
     pub fn in_all_lanes(&self, step: usize) -> bool {
         self.schedule.in_all_lanes(step)

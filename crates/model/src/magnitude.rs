@@ -7,8 +7,8 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
 
-/// Largest mass, length, inertia, gravity, armature, pitch or ratio in a model, in SI units. It is chosen so that the
-/// inertia about a point at this distance, which is its third power, can be squared.
+/// Largest mass, length, inertia, gravity, armature, pitch or ratio in a model, in SI units. With this maximum, the
+/// inertia of the largest mass at the largest distance is 1e90, so its square does not overflow.
 const LARGEST: f64 = 1e30;
 
 impl Model {
@@ -35,7 +35,7 @@ impl Model {
     }
 }
 
-/// Checks that a gravity is finite and not too large.
+/// Checks that an acceleration of gravity is finite and not too large.
 pub(crate) fn check_gravity(gravity: Vec3<f64>) -> Result<(), Error> {
     let gravity = gravity.to_array();
     if gravity.iter().any(|g| !g.is_finite()) {

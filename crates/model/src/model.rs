@@ -20,16 +20,16 @@ use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::{Se3, Vec3};
 use core::fmt;
 
-/// Robot with bodies, joints, frames, inertias and limits. It is checked when it is built, is then immutable, and can
-/// be shared between threads.
+/// Robot with bodies, joints, frames, inertias and limits. A model is checked when it is built. It is then immutable
+/// and can be shared between threads.
 ///
 /// Body 0 is the world. The other bodies are numbered depth first, parents first. Siblings of a URDF are sorted by the
 /// names of their joints, as in Pinocchio. Siblings of a builder keep the order in which they were added. `R` is the
 /// type of the constants: `f64`, or a dual number for derivatives with respect to inertias
 /// ([`with_inertias`](Self::with_inertias)).
 ///
-/// A model whose constants are `f64` can be written to a file and read from it (serde). A file may be edited: when it
-/// is read, the model is checked as in [`ModelBuilder::build`](crate::ModelBuilder::build).
+/// A model whose constants are `f64` can be written to a file and read from it (serde). A user may edit the file,
+/// because a model that is read is checked as in [`ModelBuilder::build`](crate::ModelBuilder::build).
 ///
 /// ```
 /// let arm = condyle_model::robots::arm7();
@@ -55,13 +55,14 @@ pub struct Model<R = f64> {
     /// First coordinate of each free joint that has armature along its linear coordinates. Written by: `validate`.
     pub(crate) free_armature: Vec<usize>,
     pub(crate) gravity: Vec3<R>,
-    /// Tree of the robot, in the form that passes need.
+    /// Tree of the robot with turned joint frames, which the passes of algorithms use.
     pub(crate) tree: Tree<R>,
-    /// Plan with which single calls compute several bodies at once; `None` if they compute one body after the other.
+    /// Plan with which a call for one state computes several bodies at once; `None` if the call computes the bodies one
+    /// after another.
     pub(crate) limbs: Option<Plan>,
     /// Hash of all data on which plans of constraints depend: see `geometry_hash`.
     pub(crate) geometry: u64,
-    /// For each body, whether it connects two joints of a chain and has no mass on purpose.
+    /// Whether each body connects two joints of a chain and therefore has no mass on purpose.
     pub(crate) between: Vec<bool>,
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
@@ -89,7 +90,7 @@ impl<R> Model<R> {
     pub fn nq(&self) -> usize {
         self.tree.nq
     }
-    /// Returns nv, the number of degrees of freedom. It is the number of entries of v, a, τ and of a tangent vector.
+    /// Returns nv, the number of degrees of freedom. This is the number of entries of v, a, τ and of a tangent vector.
     #[inline(always)]
     pub fn nv(&self) -> usize {
         self.tree.nv
@@ -109,24 +110,25 @@ impl<R> Model<R> {
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
-    /// Returns the viscous damping of each degree of freedom (N m s/rad, N s/m). It is stored, but not applied by
-    /// default.
+    /// Returns the viscous damping of each degree of freedom (N m s/rad, N s/m). The damping is stored, but not applied
+    /// by default.
     #[inline]
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }
-    /// Returns the Coulomb friction of each degree of freedom (N m, N). It is stored, but not applied by default.
+    /// Returns the Coulomb friction of each degree of freedom (N m, N). The friction is stored, but not applied by
+    /// default.
     #[inline]
     pub fn friction(&self) -> &[f64] {
         &self.friction
     }
     /// Returns the coefficients d₁ and d₂ of the damping of each degree of freedom. The damping is d(v) = d₀ + d₁|v| +
-    /// d₂v², where d₀ is [`damping`](Self::damping). It is stored, but not applied by default.
+    /// d₂v², where d₀ is [`damping`](Self::damping). The coefficients are stored, but not applied by default.
     #[inline]
     pub fn damping_polynomial(&self) -> &[[f64; 2]] {
         &self.damping_polynomial
     }
-    /// Returns the springs of joints. They are stored, but not applied by default.
+    /// Returns the springs of joints. The springs are stored, but not applied by default.
     #[inline]
     pub fn springs(&self) -> &[Spring] {
         &self.springs
@@ -148,12 +150,13 @@ impl<R> Model<R> {
         &self.keyframes
     }
     /// Returns the constraints that the robot has in addition to its tree: loops and coupled joints. Algorithms for
-    /// trees ignore them.
+    /// trees ignore these constraints.
     #[inline]
     pub fn constraints(&self) -> &[ModelConstraint] {
         &self.constraints
     }
-    /// Returns the inertia of the rotor as seen at each joint (kg m², kg), which is part of M in every algorithm.
+    /// Returns the armature: the inertia of the rotor, reflected to each joint (kg m², kg). It is part of M in every
+    /// algorithm.
     #[inline(always)]
     pub fn armature(&self) -> &[R] {
         &self.armature
@@ -173,8 +176,8 @@ impl<R> Model<R> {
         self.tree.has_mimic()
     }
 
-    /// Returns the index of the frame with this name. Frames are searched in the order: links, frames of the user,
-    /// joints, constraints.
+    /// Returns the index of the frame with this name. Frames of links are searched first, then frames of the user, of
+    /// joints, and of constraints.
     ///
     /// # Errors
     /// Returns [`Error::UnknownFrame`], with the nearest name.
@@ -201,10 +204,10 @@ impl<R> Model<R> {
     }
 }
 
-/// Methods that give passes their view of the model.
+/// Methods with which passes of algorithms read the model.
 #[doc(hidden)]
 impl<R> Model<R> {
-    /// Returns the bodies in the form that passes need.
+    /// Returns the bodies with turned joint frames, which the passes of algorithms use.
     #[inline(always)]
     pub fn nodes(&self) -> &[Node<R>] {
         &self.tree.nodes
@@ -224,7 +227,8 @@ impl<R> Model<R> {
     pub fn support_len(&self) -> usize {
         self.tree.support.len()
     }
-    /// Returns, for each coordinate, the coordinates in which efforts are needed to accelerate it.
+    /// Returns the nonzero rows of each column of M. Row i of column j is nonzero if an acceleration of coordinate j
+    /// needs an effort in coordinate i.
     #[inline(always)]
     pub fn nonzero_rows(&self) -> &[NonzeroRows] {
         &self.tree.nonzero_rows
@@ -245,8 +249,8 @@ impl<R> Model<R> {
     pub fn closed(&self) -> &[usize] {
         &self.tree.closed
     }
-    /// Returns the plan with which single calls compute several bodies at once; `None` if they compute one body after
-    /// the other.
+    /// Returns the plan with which a call for one state computes several bodies at once; `None` if the call computes
+    /// the bodies one after another.
     #[inline(always)]
     pub fn limbs(&self) -> Option<&Plan> {
         self.limbs.as_ref()
@@ -279,7 +283,7 @@ impl Model {
     }
 }
 
-/// Tree of the inertia matrix M. Its columns are the degrees of freedom of the joints, and its rows are the
+/// Tree of the inertia matrix M. The columns of the tree are the degrees of freedom of the joints, and the rows are the
 /// coordinates.
 impl<R> ColumnTree for Model<R> {
     fn rows(&self) -> usize {

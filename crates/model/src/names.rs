@@ -6,8 +6,8 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Number of characters of a name that are compared, and maximum number of pairs of characters that are compared in one
-/// search. The distance of two names needs as many pairs as the product of their lengths.
+/// Limits of a search: the number of compared characters of each name, and the total number of compared pairs of
+/// characters. For two names, the number of pairs is the product of their lengths.
 const COMPARED: [usize; 2] = [128, 1 << 22];
 
 /// Returns the most similar name by [`distance`], among the names that can be compared within the limit. Returns an
@@ -33,7 +33,7 @@ pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> S
 }
 
 /// Returns the optimal string alignment distance: the number of edits that turn `a` into `b`. An edit inserts, removes
-/// or replaces a character, or swaps two neighbouring characters. No character is edited twice.
+/// or replaces a character, or swaps two neighbouring characters. Each character is edited at most once.
 fn distance(a: &[char], b: &[char]) -> usize {
     // d_ij is the distance between the first i characters of `a` and the first j characters of `b`. Only three rows of
     // d are stored.

@@ -8,13 +8,13 @@ use condyle_spatial::Scalar;
 use core::fmt;
 use core::ops::Range;
 
-/// Maximum difference between 1 and the length of a quaternion, or of a pair (cos, sin), in a position. It is chosen
-/// because the difference is 1.5e-4 if √½ is written as 0.707. Integration in single precision causes a smaller
-/// difference.
+/// Maximum difference between 1 and the length of a quaternion, or of a pair (cos, sin), in a position. This maximum
+/// allows numbers with three digits: if √½ is written as 0.707, the difference is 1.5e-4. Integration in single
+/// precision causes a smaller difference.
 const UNIT_ROUNDING: f64 = 1e-3;
 
 /// Maximum [`rotation_error`](condyle_spatial::Mat3::rotation_error) of a rotation matrix that is computed from a valid
-/// position. It is chosen because the error of R = 1 + 2 (w [u] + [u]²) is up to 8 e for a quaternion of length 1 + e.
+/// position. If a quaternion (u, w) has the length 1 + e, the error of R = 1 + 2 (w [u] + [u]²) is up to 8 e.
 #[doc(hidden)]
 pub const ROTATION_ROUNDING: f64 = 10.0 * UNIT_ROUNDING;
 
@@ -42,7 +42,7 @@ impl fmt::Display for PositionFault {
     }
 }
 
-/// Fault of one number: the name of the argument, the index of the number in it, and the value.
+/// Fault of one number: the name of the argument, the index of the number in this argument, and the value.
 struct NotFinite(&'static str, usize, f64);
 
 impl fmt::Display for NotFinite {
@@ -150,7 +150,7 @@ impl Model {
         Ok(())
     }
 
-    /// Returns, for each rotation of a position that must have length 1, the name of its joint and its range in q.
+    /// Returns the name of the joint and the range in q of each rotation that must have length 1.
     #[doc(hidden)]
     pub fn rotations(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
         self.position_parts().filter_map(|(body, _, unit)| Some((self.bodies[body].joint_name.as_str(), unit?)))
@@ -161,8 +161,8 @@ impl Model {
         self.bodies[body].joint_name.clone()
     }
 
-    /// Returns, for each joint that has its own coordinates, its body, its range in q, and the part of this range that
-    /// must have length 1.
+    /// Returns the body and the range in q of each joint that has its own coordinates. Also returns the part of this
+    /// range that must have length 1.
     fn position_parts(&self) -> impl Iterator<Item = (usize, Range<usize>, Option<Range<usize>>)> {
         let own = self.bodies.iter().enumerate().skip(1).filter(|(_, body)| body.mimic.is_none());
         own.map(|(i, body)| {

@@ -1,5 +1,5 @@
-//! Real parts of scalars of any type. With them, a model of dual numbers is checked in the same way as a model of plain
-//! numbers.
+//! Real parts of scalars of any type. With the real parts, a model of dual numbers is checked in the same way as a
+//! model of `f64`.
 
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use core::any::Any;
@@ -7,8 +7,8 @@ use core::any::Any;
 /// Returns the real part of a scalar x that has one lane.
 ///
 /// Scalars can only be compared, so the real part is found by comparisons: it is the largest number y for which x < y
-/// is false. A bisection over the bits of numbers finds y, because the bits, after a conversion, have the same order as
-/// the numbers.
+/// is false. The number y is found by bisection over ranks. The rank of a number is computed from its bits and has the
+/// same order as the numbers.
 fn real<S: Scalar>(x: S) -> f64 {
     if let Some(&x) = (&x as &dyn Any).downcast_ref::<f64>() {
         return x;
@@ -24,10 +24,10 @@ fn real<S: Scalar>(x: S) -> f64 {
         *if is_below(number(middle)) { &mut beyond } else { &mut least } = middle;
     }
     let (double, single) = (number(least), f64::from(number(least) as f32));
-    if equals(single) { single } else { double } // many doubles compare as equal to the same single
+    if equals(single) { single } else { double } // many `f64` numbers compare as equal to one `f32`
 }
 
-/// Returns the rank of a number in the order of all numbers.
+/// Returns the rank of a number in the order of all `f64` numbers.
 fn place(x: f64) -> u64 {
     let bits = x.to_bits();
     if x.is_sign_negative() { !bits } else { bits | 1 << 63 }

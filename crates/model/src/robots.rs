@@ -1,4 +1,4 @@
-//! Built-in robots. With them, examples, tests and benchmarks need no files.
+//! Built-in robots, so that examples, tests and benchmarks need no files.
 
 use crate::io::urdf::UrdfOptions;
 use crate::joint::Joint;

@@ -1,7 +1,8 @@
-//! Tree of bodies in the form that passes need: with turned frames, columns and ancestors.
+//! Tree of bodies for the passes of algorithms. Each joint's frame is turned such that the joint's axis is z. The tree
+//! also lists columns and ancestors.
 //!
 //! A *column* is a degree of freedom of a joint; a *coordinate* is an entry of v. A joint that mimics another joint
-//! shares the coordinate of that joint, so several columns may have the same coordinate.
+//! uses the coordinate of that joint, so several columns may have the same coordinate.
 
 use crate::body::Body;
 use crate::joint::revolute_angles::RevoluteAngles;
@@ -12,7 +13,7 @@ use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use core::iter::successors;
 use core::ops::Range;
 
-/// Body in the form that passes need: the axis of its joint is turned to z, and all data that a pass needs are stored
+/// Body for the passes of algorithms: the axis of its joint is turned to z, and all data that a pass needs are stored
 /// together.
 #[derive(Clone, Debug)]
 pub struct Node<R> {
@@ -61,21 +62,21 @@ pub struct Column {
 
 condyle_spatial::same_layout!(Column);
 
-/// Coordinates of one joint, or of several consecutive joints whose positions are vectors.
+/// Range of coordinates of one joint, or of several consecutive joints whose positions are vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Space {
-    /// Joint of these coordinates, or one of these joints.
+    /// Joint of these coordinates; for several joints, one of them.
     pub joint: Joint,
     pub q: Range<usize>,
     pub v: Range<usize>,
 }
 
-/// Bodies and joints of a robot, in the form that passes need.
+/// Bodies and joints of a robot, with turned joint frames, for the passes of algorithms.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree<R> {
     pub nq: usize,
     pub nv: usize,
-    /// Bodies. Shape: bodies, including the world.
+    /// Bodies, including the world.
     pub nodes: Vec<Node<R>>,
     pub columns: Vec<Column>,
     /// Columns on the path from the root to the joint of each body, one body after the other.
@@ -84,20 +85,21 @@ pub(crate) struct Tree<R> {
     pub closed: Vec<usize>,
     /// Joints that turn about z.
     pub revolute_angles: RevoluteAngles,
-    /// For each coordinate, the coordinates in which efforts are needed to accelerate it: its ancestors and descendants
-    /// in the tree, and the coordinate itself. Shape: nv.
+    /// Nonzero rows of each column of M: the coordinate itself, its ancestors and its descendants in the tree. Length:
+    /// nv.
     pub nonzero_rows: Vec<NonzeroRows>,
-    /// Spaces of all coordinates, in order. Consecutive vector spaces are merged.
+    /// Ranges of the coordinates of all joints, in order. The ranges of consecutive joints whose positions are vectors
+    /// are merged.
     pub spaces: Vec<Space>,
     /// Hash of the parents, joints and coordinates. Different trees have different hashes.
     pub hash: u64,
 }
 
-/// Returns a hash of numbers. The method is FNV-1a (Fowler, Noll, Vo 1991), with words instead of bytes.
+/// Returns a hash of numbers. The method is FNV-1a (Fowler, Noll, Vo 1991), applied to 64-bit words instead of bytes.
 pub(crate) fn hash(words: impl Iterator<Item = u64>) -> u64 {
     words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
         let hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);
-        hash ^ (hash >> 29) // so that the last bits of a number change the first bits of the hash
+        hash ^ (hash >> 29) // lets the high bits change the low bits of the hash
     })
 }
 
@@ -130,7 +132,8 @@ impl Tree<f64> {
     }
 
     fn add_nodes(&mut self, bodies: &[Body]) {
-        let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body, or of its nearest ancestor with a column
+        // The last column of each body. A body without columns has the last column of its parent.
+        let mut last_column: Vec<Option<usize>> = Vec::new();
         for (i, body) in bodies.iter().enumerate() {
             let axis_rotation = body.joint.axis_rotation();
             let bXz = Se3::new(axis_rotation, Vec3::zero());
@@ -177,7 +180,7 @@ impl Tree<f64> {
             });
             self.support.extend(path);
         }
-        // In depth-first order, the columns of a subtree end with the columns of its last descendant.
+        // In depth-first order, the last columns of a subtree belong to its last descendant.
         for c in (0..self.columns.len()).rev() {
             self.columns[c].end = self.columns[c].end.max(c + 1);
             if let Some(p) = self.columns[c].parent {
@@ -186,8 +189,8 @@ impl Tree<f64> {
         }
     }
 
-    /// Finds, for each body, the bodies whose subtrees end with it. In depth-first order, a body without children
-    /// closes its own subtree. It also closes the subtrees of all ancestors of which it is the last descendant.
+    /// Finds the bodies whose subtrees end with each body. In depth-first order, a body without children closes its own
+    /// subtree. Such a body also closes the subtrees of all ancestors whose last descendant it is.
     fn close_subtrees(&mut self) {
         let mut open = Vec::new();
         for i in 1..self.nodes.len() {
@@ -206,7 +209,7 @@ impl Tree<f64> {
             rows.extend(c + 1..self.columns[c].end);
             rows
         };
-        let all = || (0..self.nv).collect(); // followers connect branches
+        let all = || (0..self.nv).collect(); // followers couple the branches, so M is full
         let rows = (0..self.nv).map(|c| if self.has_mimic() { all() } else { related(c) });
         self.nonzero_rows = NonzeroRows::of_columns(rows.collect());
     }

@@ -1,4 +1,4 @@
-//! Validation that every model passes, however it is created. Invalid numbers are errors. Physically impossible
+//! Validation of every model, for all functions that create a model. Invalid numbers are errors. Physically impossible
 //! inertias, and degrees of freedom along which M is singular, are warnings.
 
 use crate::body::{Body, Frame, JointOptions, Limits};
@@ -18,15 +18,16 @@ use rand::{SeedableRng, rngs::StdRng};
 
 /// Relative rounding error of the moments of inertia of a body in a file, because files have six digits.
 const MOMENT_ROUNDING: f64 = 1e-6;
-/// Smallest moment about the centre of mass, as a fraction of the mass times the squared distance of this centre from
-/// the origin. Smaller moments are rounding errors.
+/// Minimum moment about the centre of mass, relative to the mass times the squared distance of this centre from the
+/// origin. Smaller moments are rounding errors.
 const COM_ROUNDING: f64 = 1e-12;
-/// Smallest pivot, as a fraction of the sum of the products in it. Smaller pivots are rounding errors and are treated
-/// as 0.
+/// Minimum pivot, relative to the sum of the products from which the pivot is computed. Smaller pivots are rounding
+/// errors and are treated as 0.
 const PIVOT_ROUNDING: f64 = 1e-13;
 /// Minimum pivot (kg m², kg). The reciprocal of a smaller pivot may overflow.
 const LEAST_PIVOT: f64 = 1e-200;
-/// Number of random positions at which M is tested. A joint is singular if it is singular at all of these positions.
+/// Number of random positions at which M is tested. A joint is reported as singular if it is singular at all of these
+/// positions.
 const SAMPLES: usize = 3;
 /// Maximum radius of gyration of a body without a warning (m). The largest ships and cranes have smaller radii. Public
 /// robots with larger radii use a wrong unit.
@@ -93,7 +94,8 @@ impl JointOptions {
     }
 }
 
-/// Adds warnings about the inertia of a body. Bodies that connect joints of a chain have no mass on purpose.
+/// Adds warnings about the inertia of a body. There is no warning about bodies that connect joints of a chain, because
+/// they have no mass on purpose.
 fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let (I, name) = (body.inertia, || body.name.clone());
     if I == Inertia::zero() {
@@ -238,7 +240,7 @@ impl Model {
         singular
     }
 
-    /// Finds singular joints by the pivots of M. It is used for robots whose joints share coordinates.
+    /// Finds singular joints by the pivots of M. This method is used for robots whose joints share coordinates.
     fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
         let mut M = self.inertia_matrix(placed);
         let diagonal = M.diagonal();
@@ -263,9 +265,9 @@ impl Model {
 
 /// Poses of the bodies, and columns of S in the world's frame, at one position.
 struct Placed {
-    /// Poses oXi of the bodies. Shape: bodies.
+    /// Poses oXi of the bodies, by index of the body.
     oX: Vec<Se3<f64>>,
-    /// Columns of S. Shape: columns.
+    /// Columns of S, by index of the column.
     S: Vec<Motion<f64>>,
 }
 
@@ -350,7 +352,7 @@ impl<R> Model<R> {
     }
 }
 
-/// Panics for [`Model::check_regular`].
+/// Panics with the message of [`Model::check_regular`].
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -27,8 +27,8 @@ impl<R: Scalar> Model<R> {
         Ok(self)
     }
 
-    /// Returns the same robot with another armature, whose numbers have the type of the robot's constants. The armature
-    /// is not checked, because code generation makes it an argument.
+    /// Returns the same robot with another armature, whose entries have the type of the robot's constants. The armature
+    /// is not checked, because its entries may be the symbolic arguments of generated code.
     ///
     /// # Panics
     /// If `armature` does not have nv numbers.
@@ -45,9 +45,9 @@ impl<R: Scalar> Model<R> {
 impl Model {
     /// Returns the same robot with another armature, one number for each degree of freedom (kg m², kg).
     ///
-    /// An armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint, it is an apparent
-    /// mass without weight, as in MuJoCo. This mass resists the acceleration v̇ + ω × v of the body's origin, along the
-    /// axes of the joint's parent.
+    /// An armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint, the armature acts
+    /// as a mass without weight, as in MuJoCo. This mass resists the acceleration v̇ + ω × v of the body's origin,
+    /// along the axes of the joint's parent.
     ///
     /// # Errors
     /// Returns [`Error::Joint`] if a number is negative or not finite, or if the three numbers along the linear
@@ -139,13 +139,13 @@ impl Model {
         Ok(self)
     }
 
-    /// Returns the same robot with constants of another type. The inertia of each body is returned by a function of
-    /// (body, inertia).
+    /// Returns the same robot with constants of another type. A function of (body, inertia) returns the new inertia of
+    /// each body.
     ///
     /// If the new type is a dual number, every algorithm computes derivatives with respect to inertial parameters.
     /// [`Body::inertia`](crate::Body::inertia) contains the real parts of the new inertias, which are checked.
     /// [`warnings`](Self::warnings) and [`singular_joints`](Self::singular_joints) refer to the new inertias. Inertias
-    /// with several lanes are not checked: the model keeps the results for the plain inertias.
+    /// with several lanes are not checked. The model then keeps the warnings for the previous inertias.
     ///
     /// ```
     /// use condyle_model::{Inertia, robots};
@@ -175,7 +175,8 @@ impl Model {
             }
             plain.validate()?;
         }
-        let turned = |i: usize| Se3::new(self.tree.nodes[i].axis_rotation, Vec3::zero()).lift(); // bXz
+        // Returns bXz: the pose, in body i, of the frame whose z axis is the joint's axis.
+        let turned = |i: usize| Se3::new(self.tree.nodes[i].axis_rotation, Vec3::zero()).lift();
         let tree = plain.tree.map(|X| X.lift(), |i| turned(i).act_inv(inertias[i]));
         let mut model = Model {
             tree,
@@ -207,7 +208,8 @@ impl Model {
     }
 
     /// Returns the same robot without rounding errors: numbers next to 0, 1 and −1 in its poses, and numbers next to 0
-    /// in its inertias, become exact. Otherwise, generated code would compute with the rounding errors of right angles.
+    /// in its inertias, become exact. Without this function, generated code would compute with the rounding errors of
+    /// right angles.
     #[doc(hidden)]
     #[must_use]
     pub fn without_residues(mut self) -> Self {
@@ -232,14 +234,14 @@ impl Model {
         self
     }
 
-    /// Returns the same robot with a setting for single calls: they process its limbs in parallel lanes, or one body
-    /// after the other.
+    /// Returns the same robot with a setting for calls with a single state: they compute the limbs of the robot in
+    /// parallel lanes, or the bodies one after another.
     ///
-    /// With enough limbs (four legs, two legs and two arms, fingers), single calls of some functions process four
-    /// bodies of one state at a time, if the processor has AVX2 or NEON. These functions are `rnea`, `aba`, `crba`,
-    /// `minv`, the derivatives of `rnea` and `aba`, and `constrained_dynamics`; they are two to three times as fast. A
-    /// `Batch` never processes limbs in lanes, because its lanes contain states. The two ways of computing sum in
-    /// different orders, so their results differ in the last digits. Without limbs in lanes, a single call returns the
+    /// With enough limbs (four legs, two legs and two arms, fingers), some functions compute four bodies of one state
+    /// at a time, if the processor has AVX2 or NEON. These functions are `rnea`, `aba`, `crba`, `minv`, the derivatives
+    /// of `rnea` and `aba`, and `constrained_dynamics`. With lanes, they are two to three times as fast. A `Batch`
+    /// never computes limbs in lanes, because its lanes contain states. With and without lanes, sums have different
+    /// orders, so results differ in the last digits. Without limbs in lanes, a call with a single state returns the
     /// same bits as a batch.
     ///
     /// ```

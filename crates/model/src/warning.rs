@@ -1,5 +1,5 @@
-//! Warnings about a robot: its description is valid, but something in it is unusual, left out, or replaced by a
-//! default.
+//! Warnings about a robot. The description of the robot is valid, but an item is unusual, left out, or replaced by a
+//! default value.
 
 use crate::error::near_or;
 use crate::names::nearest;
@@ -8,8 +8,7 @@ use alloc::string::String;
 use core::fmt;
 use core::str::FromStr;
 
-/// Fact about a model or its file that a user should know. Loaders collect warnings. Strict loaders refuse a model with
-/// warnings.
+/// Warning about a model or its file. Loaders collect warnings. Strict loaders refuse a model with warnings.
 ///
 /// ```
 /// use condyle_model::{Model, SdfOptions, WarningKind};
@@ -45,7 +44,7 @@ pub enum Warning {
         /// Principal moments (kg m²), smallest first.
         moments: [f64; 3],
     },
-    /// A joint moves nothing that has inertia. So M is singular, and forward dynamics has no solution.
+    /// No body that a joint moves has inertia along the joint. So M is singular, and forward dynamics has no solution.
     Singular {
         /// Name of the joint.
         joint: String,
@@ -64,7 +63,7 @@ pub enum Warning {
         /// Description of the fault, with the numbers.
         what: String,
     },
-    /// An element or attribute of a file is unknown, misspelt or misplaced. It has no effect.
+    /// An element or attribute of a file is unknown, misspelt or misplaced, and has no effect.
     Unknown {
         /// Position in the file; `None` if there is no file.
         place: Option<Place>,
@@ -79,7 +78,7 @@ pub enum Warning {
         place: Option<Place>,
         /// Element with its name, for example ``joint `loop` ``.
         element: String,
-        /// Feature that is left out, and the effect of the missing feature.
+        /// Feature that is left out, and the consequence of the omission.
         what: String,
     },
     /// A value is missing in the file, and a default is used.
@@ -106,7 +105,7 @@ pub enum Warning {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Place {
-    /// Path of the file that contains the element, or `<string>`. It may be an included file.
+    /// Path of the file that contains the element, which may be an included file, or `<string>`.
     pub file: String,
     /// Line, counted from 1.
     pub line: u32,
@@ -208,8 +207,8 @@ impl Warning {
         }
     }
 
-    /// Returns whether the warning is about the source of a model. All other warnings are computed from the model's
-    /// numbers.
+    /// Returns whether the warning is about the source of a model. All other warnings are computed from the model
+    /// itself.
     pub(crate) fn is_about_source(&self) -> bool {
         matches!(self.kind(), WarningKind::Unknown | WarningKind::LeftOut | WarningKind::Assumed | WarningKind::Mimic)
     }
@@ -259,7 +258,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Returns a number rounded to 9 significant digits, which are more digits than files have.
+/// Returns a number rounded to 9 significant digits. Numbers in files have fewer digits.
 fn rounded(x: f64) -> f64 {
     format!("{x:.8e}").parse().unwrap_or(x)
 }

@@ -9,13 +9,13 @@ use alloc::string::String;
 use condyle_spatial::Se3;
 
 impl Model {
-    /// Returns the same robot with an additional frame of the user. The new frame is the last one of
+    /// Returns the same robot with an additional frame of the user. The new frame is the last frame in
     /// [`frames`](Self::frames).
     ///
     /// `parent` is the body or frame to which the new frame is attached, or its name. `placement` is pXf, the pose of
     /// the new frame in the parent's frame. All indices of bodies, frames and coordinates are kept, so scratch memory
-    /// for this robot also fits the new robot. Objects that are planned from frames, such as a constraint set, do not
-    /// fit.
+    /// for this robot also fits the new robot. Objects that were created from frames, such as a constraint set, do not
+    /// fit the new robot.
     ///
     /// ```
     /// use condyle_model::{FrameParent, Se3, Vec3, robots};
@@ -30,7 +30,7 @@ impl Model {
     /// Returns [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has. Returns
     /// [`Error::Frame`] if the parent's index is too large, the name is empty, or the placement is invalid or not
     /// finite. Returns [`Error::Duplicate`] if a frame already has this name, because [`frame`](Self::frame) would not
-    /// find the new one.
+    /// find the new frame.
     pub fn with_frame<'a>(
         &self,
         name: &str,

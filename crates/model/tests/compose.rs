@@ -5,7 +5,7 @@ use condyle_model::{Inertia, Sym3};
 
 const SRDF: &str = include_str!("../../dynamics/tests/data/quadruped.srdf");
 
-/// Returns the text of the SRDF with one replacement.
+/// Returns the text of the SRDF, in which `what` is replaced by `by`.
 fn with(what: &str, by: &str) -> String {
     assert_eq!(SRDF.matches(what).count(), 1, "{what}");
     SRDF.replace(what, by)
@@ -17,7 +17,7 @@ fn refused(text: &str, strict: bool, message: &str) {
     assert_eq!(said, message);
 }
 
-/// Models and builders can be cloned and shared between threads.
+/// Checks that models and builders can be cloned and shared between threads.
 #[test]
 fn models_and_builders_are_values() {
     fn value<T: Clone + Send + Sync + std::fmt::Debug + 'static>(_: &T) {}
@@ -36,7 +36,7 @@ fn positions_have_names() {
     let quadruped = robots::quadruped();
     let positions = quadruped.reference_configurations_str(SRDF, true).unwrap();
     let names: Vec<_> = positions.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["standing", "sitting"]); // the second half of `standing` belongs to the first
+    assert_eq!(names, ["standing", "sitting"]); // two states with the name `standing` form one position
     let mut standing = condyle_model::neutral(&quadruped);
     let joints = [("LF_HFE", 0.7), ("LF_KFE", -1.4), ("RF_HFE", 0.7), ("RF_KFE", -1.4)];
     let hind = [("LH_HFE", -0.7), ("LH_KFE", 1.4), ("RH_HFE", -0.7), ("RH_KFE", 1.4)];
@@ -47,7 +47,7 @@ fn positions_have_names() {
     assert_eq!(positions[0].1, standing);
 }
 
-/// Unknown names have no effect. For a strict reader, they are errors.
+/// Checks that unknown names in an SRDF have no effect, and that they are errors for a strict reader.
 #[test]
 fn positions_with_unknown_names() {
     let text = |state: &str| format!("<robot name='r'><disable_collisions link1='a'/>\n{state}</robot>");
@@ -134,7 +134,7 @@ fn an_appended_robot_is_numbered_after_earlier_children() {
     let knee = quadruped.joint("LF_KFE").unwrap();
     let on_the_knee = quadruped.append(knee, at, &arm, "arm_").unwrap();
     assert_eq!(on_the_knee.joint("arm_joint1").unwrap(), knee + 1);
-    // the frames of the robot that carries the other one keep their indices
+    // the frames of the robot that carries the other robot keep their indices
     for (k, frame) in quadruped.frames().iter().enumerate() {
         assert_eq!(both.frames()[k].name, frame.name);
     }
@@ -151,7 +151,7 @@ fn a_joint_that_follows_has_no_coordinate_of_its_own() {
     let geared = arm.clone().with_armature(&[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]).unwrap();
     let coupled = geared.with_mimic(4, 2, Mimic { ratio: -2.0, offset: 0.1 }).unwrap();
     assert_eq!((coupled.nv(), coupled.bodies().len(), coupled.has_mimic()), (6, 8, true));
-    let expected = [0.1, 0.2 + 4.0 * 0.4, 0.3, 0.5, 0.6, 0.7]; // v_joint = −2 v
+    let expected = [0.1, 0.2 + 4.0 * 0.4, 0.3, 0.5, 0.6, 0.7]; // for the follower, v_joint = −2 v
     assert!(coupled.armature().iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-15), "{:?}", coupled.armature());
     let said = |model: &Model, follower, leader| {
         model.with_mimic(follower, leader, Mimic { ratio: 1.0, offset: 0.0 }).unwrap_err().to_string()

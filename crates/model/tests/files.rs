@@ -1,5 +1,5 @@
-//! Tests of files that are large or deeply nested, and of paths that are not files. The result is an error with the
-//! number and the limit, or a model, without a long wait.
+//! Tests of files that are large or deeply nested, and of paths that are not files. Each reader returns an error with
+//! the number and the limit, or a model, and does not run for a long time.
 //!
 //! No test measures time. Without the limits, and without algorithms in linear time, these files would take between
 //! half a minute and days.
@@ -103,7 +103,7 @@ fn attributes_and_namespaces() {
     refused(urdf(&wide), "the element on line 2 has 100001 attributes, at most 256 are allowed");
     let spaces = format!("<robot{}>{}</robot>", many(3000, "xmlns:a"), "<link name='a'/>".repeat(3000));
     refused(urdf(&spaces), "the element on line 1 has 3000 attributes, at most 256 are allowed");
-    // a prefix is part of a name, so its declaration is dropped and takes no time
+    // declarations of prefixes are dropped, so they take no time
     let spaces: String = (0..100_000).map(|i| format!("<a xmlns:a{i}='a'/>")).collect();
     assert!(urdf(&format!("<robot>{spaces}<link name='a'/></robot>")).is_ok());
     // a comment may contain equals signs, and common files declare a dozen namespaces
@@ -125,7 +125,7 @@ fn long_texts() {
     refused(sdf(&signs), &format!("4194305 equals signs, at most 4194304 {end}"));
 }
 
-/// Unknown names are listed up to a limit, because each of them is compared with all known names.
+/// Checks that unknown names are listed only up to a limit, because each unknown name is compared with all known names.
 #[test]
 fn unknown_names() {
     let tags = "<linkjoint linkjoint='1'/>".repeat(500_000);
@@ -135,7 +135,7 @@ fn unknown_names() {
     assert!(last.ends_with("more than 1000 names are unknown or left out: the rest is not listed"), "{last}");
 }
 
-/// The nearest name is found even among long names and among many names.
+/// Checks that the nearest name is found among long names and among many names.
 #[test]
 fn long_names() {
     let a = "a".repeat(100_000);
@@ -150,7 +150,8 @@ fn long_names() {
     assert!(matches!(model.frame(&b), Err(Error::UnknownFrame { nearest, .. }) if nearest == a));
 }
 
-/// A line break or tab in a name becomes a space, as in every XML attribute. A character reference is kept.
+/// Checks that a line break or tab in a name becomes a space, as in every XML attribute. A line break or tab given as a
+/// character reference is kept.
 #[test]
 fn names_with_line_breaks() {
     for (written, read) in
@@ -165,7 +166,8 @@ fn names_with_line_breaks() {
     }
 }
 
-/// Frames that are attached to frames, and poses that are relative to poses, are visited only once each.
+/// Checks the time for chains of frames attached to frames, and of poses relative to poses: each element is visited
+/// only once.
 #[test]
 fn attached_frames() {
     let row = |last: &str| {
@@ -183,7 +185,7 @@ fn attached_frames() {
     refused(sdf(&own_pose), "is attached to itself");
 }
 
-/// Inherited attributes of classes are counted like other attributes.
+/// Checks that the attributes that classes inherit are counted in the limit on attributes.
 #[test]
 fn default_classes() {
     let row: String = (0..250).map(|i| format!("<default class='c{i}'>")).collect();
@@ -212,7 +214,7 @@ impl Drop for Folder {
     }
 }
 
-/// Reads a file as each kind of robot, and as a file that another file includes.
+/// Reads a file as URDF, as MJCF, as SDF, and as a file that an MJCF includes.
 fn as_robots(path: &Path, folder: &Path) -> [Result<Model, Error>; 4] {
     let main = folder.join("main.xml");
     std::fs::write(&main, format!("<mujoco><include file='{}'/></mujoco>", path.display())).unwrap();
@@ -228,7 +230,7 @@ fn as_robots(path: &Path, folder: &Path) -> [Result<Model, Error>; 4] {
 fn large_files() {
     let folder = Folder::new("large");
     let path = folder.0.join("large.xml");
-    File::create(&path).unwrap().set_len(10_000_000_000).unwrap(); // without blocks, it takes no space on the disk
+    File::create(&path).unwrap().set_len(10_000_000_000).unwrap(); // a sparse file, which takes no space on the disk
     for (k, result) in as_robots(&path, &folder.0).into_iter().enumerate() {
         let main = if k == 3 { std::fs::metadata(folder.0.join("main.xml")).unwrap().len() } else { 0 };
         let found = 10_000_000_000 + main;
@@ -242,7 +244,7 @@ fn large_files() {
     });
 }
 
-/// All files of one robot are counted together.
+/// Checks that the limits apply to all files of one robot together.
 #[test]
 fn large_parts() {
     let folder = Folder::new("parts");
@@ -252,7 +254,7 @@ fn large_parts() {
     write("main.xml", "<mujoco><include file='a.xml'/><include file='b.xml'/><include file='c.xml'/></mujoco>");
     let read = || Model::from_mjcf(folder.0.join("main.xml"), &MjcfOptions::default());
     refused(read(), "1200011 tags, at most 1048576 are allowed in the files of a robot");
-    // one file with two different paths is recognized as the same file
+    // two different paths of the same file are recognized
     write("main.xml", "<mujoco><include file='a.xml'/><include file='./a.xml'/></mujoco>");
     refused(read(), "<include>: `./a.xml` is already part of the model");
     // the depth of an included file is added to the depth of its include

@@ -4,7 +4,7 @@ use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 use roxmltree::Document;
 use std::ops::Range;
 
-/// Robots that contain most of the elements and attributes that have an effect.
+/// URDF with most of the elements and attributes that have an effect.
 const URDF: &str = r#"<robot name="r" version="1.0">
   <link name="a"><inertial><origin xyz="0 0 1" rpy="0 0 0.1"/><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <link name="b"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
@@ -65,7 +65,7 @@ fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     places
 }
 
-/// Checks that a name is reported if a letter is added to it, for each name in the text.
+/// Adds a letter to each name in the text in turn, and checks that the changed name is reported.
 fn check(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) {
     let plain = said(read, text);
     assert!(read(text).is_ok(), "{plain:?}");
@@ -100,7 +100,7 @@ fn names_of_an_mjcf() {
     check(&|text| Model::from_mjcf_str(text, &MjcfOptions::default()), MJCF);
 }
 
-/// A strict reader refuses each unknown name.
+/// Checks that a strict reader refuses each unknown name.
 #[test]
 fn a_strict_reader_refuses() {
     let text = URDF.replace("<dynamics", "<dynamic");

@@ -16,8 +16,8 @@ fn words(letters: &str, length: usize) -> Vec<String> {
     words.split_off(1)
 }
 
-/// The nearest name is the first name with the smallest optimal string alignment distance. Only names that differ in at
-/// most half of their characters count.
+/// Checks that the nearest name is the first name with the smallest optimal string alignment distance. Names that
+/// differ in more than half of their characters are ignored.
 #[test]
 fn nearest_names_are_those_of_strsim() {
     let mut builder = ModelBuilder::new("words");

@@ -1,4 +1,4 @@
-//! Mistakes in a URDF or in calls of a builder: each has its message, with line and element.
+//! Tests of mistakes in a URDF or in calls of a builder: each mistake has its own message, with line and element.
 
 use condyle_model::{
     Error, Inertia, Joint, JointOptions, Mimic, Model, ModelBuilder, Se3, Sym3, UrdfOptions, Vec3, WORLD,
@@ -17,7 +17,7 @@ const GOOD: &str = r#"<robot name="r">
   </joint>
 </robot>"#;
 
-/// Returns the robot with one piece of text replaced.
+/// Returns the text of the robot, in which `what` is replaced by `by`.
 fn with(what: &str, by: &str) -> String {
     assert_eq!(GOOD.matches(what).count(), 1, "{what}");
     GOOD.replace(what, by)
@@ -66,13 +66,13 @@ fn documents() {
     expect(&nested, "<string>:2: <a>: elements are nested 65538 deep, at most 256 are allowed");
 }
 
-/// Unexpanded macros are an error: ignoring them would give another robot.
+/// Checks that unexpanded macros of xacro are an error, because ignoring macros would give another robot.
 #[test]
 fn xacro() {
     let expand = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
     let open = GOOD.find('>').map(|end| GOOD[..end].to_owned()).unwrap();
     let declared = with(&open, &format!("{open} xmlns:xacro='http://www.ros.org/wiki/xacro'"));
-    assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often still declare the namespace
+    assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often declare the namespace of xacro
     let used = declared.replace("</robot>", "<xacro:wheel side='left'/>\n</robot>");
     let error = load(&used, &UrdfOptions::default()).unwrap_err();
     assert!(error.ends_with(&format!(": <xacro:wheel>: belongs to xacro: {expand}")), "{error}");
@@ -179,14 +179,14 @@ fn inertias() {
     expect(&with(mass, r#"<mass value="2e40"/>"#), &format!("<string>:3: link `arm`: {large}"));
 }
 
-/// XML's rules for attribute values apply once: a line break or tab in a name becomes a space, a reference its
-/// character.
+/// Checks XML's rules for names in attributes: a line break or tab becomes a space, and a character reference becomes
+/// its character.
 #[test]
 fn names_in_any_spelling() {
     let spaced = GOOD.replace(r#""j""#, "\"a\tj\"").replace(r#""arm""#, "\"an\narm\"");
     let model = load(&spaced, &UrdfOptions::default()).unwrap();
     assert_eq!((model.bodies()[1].joint_name.as_str(), model.bodies()[1].name.as_str()), ("a j", "an arm"));
-    // a tab given as a reference is kept; different spellings of a name denote the same link
+    // a tab given as a character reference is kept, and a name with character references denotes the same link
     let written = GOOD.replace(r#"link="arm""#, r#"link="&#97;r&#x6d;""#).replace(r#""j""#, r#""j&#9;&lt;&quot;é""#);
     let model = load(&written, &UrdfOptions::default()).unwrap();
     assert_eq!((model.bodies()[1].joint_name.as_str(), model.bodies()[1].name.as_str()), ("j\t<\"é", "arm"));
@@ -204,10 +204,10 @@ fn mimics() {
     let nan = "<string>:9: joint `j`: mimic multiplier: `nan` is no finite number";
     expect(&mimic(r#"joint="j" multiplier="nan""#), nan);
     expect(&mimic(""), "<string>:9: joint `j`: mimic has no joint");
-    assert!(load(&mimic(r#"joint="nobody""#), &UrdfOptions::default()).is_ok()); // mimics were not requested
+    assert!(load(&mimic(r#"joint="nobody""#), &UrdfOptions::default()).is_ok()); // the option `mimic` is not set
 }
 
-/// A continuous joint may only be followed with integer ratios, and not by a slide.
+/// Checks the followers of a continuous joint: the ratio must be an integer, and the follower must not be prismatic.
 #[test]
 fn continuous_leaders() {
     let leader = r#"<link name="wheel"/><joint name="lead" type="continuous"><parent link="base"/><child link="wheel"/></joint></robot>"#;
@@ -228,7 +228,7 @@ fn continuous_leaders() {
     }
 }
 
-/// Faults in ignored elements are ignored.
+/// Checks that faults in ignored elements are ignored.
 #[test]
 fn shapes_and_strangers_are_ignored() {
     let base = r#"<link name="base"/>"#;
@@ -252,7 +252,7 @@ fn shapes_and_strangers_are_ignored() {
     assert_eq!(load(&default, &UrdfOptions::default()).unwrap().to_string(), same);
 }
 
-/// The builder checks its arguments, too.
+/// Checks that the builder refuses invalid arguments.
 #[test]
 fn builders() {
     let z = Vec3::new(0.0, 0.0, 1.0);

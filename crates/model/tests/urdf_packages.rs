@@ -1,11 +1,11 @@
-//! Robots with `package://` addresses: given folders, folders of the environment, and the error for a package that none
-//! of them contains.
+//! Tests of robots with `package://` addresses. Packages are searched in given folders and in folders of environment
+//! variables. A package that no folder contains is an error.
 
 use condyle_model::{Error, Model, UrdfOptions, robots};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Folder with packages in it, for one test.
+/// Folder that contains packages, for one test.
 struct Workspace(PathBuf);
 
 impl Workspace {
@@ -41,7 +41,7 @@ fn folders_that_are_given() {
     let (src, share) = (workspace.0.join("src"), workspace.0.join("install/share"));
     let arm = "package://arm_description/urdf/arm.urdf";
     assert_eq!(load(arm, &[&share, &src]).unwrap().nv(), 7);
-    assert_eq!(load(arm, &[&src.join("arm_description")]).unwrap().nv(), 7); // the package itself
+    assert_eq!(load(arm, &[&src.join("arm_description")]).unwrap().nv(), 7); // the given folder is the package itself
     // the first folder that contains the package is used
     let dog = "package://dog_description/dog.urdf";
     assert_eq!(load(dog, &[&src, &share]).unwrap().nv(), 12);
@@ -58,7 +58,8 @@ fn a_missing_package_is_named() {
     for (address, package, end) in [
         ("package://nowhere/a.urdf", "nowhere", "nowhere/a.urdf"),
         ("package://arm_description/b.urdf", "arm_description", "arm_description/b.urdf"),
-        ("package://arm_description/urdf", "arm_description", "arm_description/urdf"), // a folder, not a file
+        // the address of a folder instead of a file
+        ("package://arm_description/urdf", "arm_description", "arm_description/urdf"),
         ("package://arm_description", "arm_description", "arm_description/"),
     ] {
         let error = load(address, &[&src]).unwrap_err();
@@ -72,7 +73,7 @@ fn a_missing_package_is_named() {
     assert!(matches!(load("package://", &[&src]), Err(Error::Package { .. })));
 }
 
-/// An address names a file of its package and no other, whether the file exists or not.
+/// Checks that an address cannot name a file outside of its package, whether this file exists or not.
 #[test]
 fn addresses_stay_in_their_package() {
     let workspace = Workspace::new("inside");
@@ -92,7 +93,8 @@ fn addresses_stay_in_their_package() {
     assert!(load("package://arm_description/./urdf//arm.urdf", &[&src]).is_ok());
 }
 
-/// Uses ROS_PACKAGE_PATH, then AMENT_PREFIX_PATH, in a separate process with its own environment.
+/// Checks that ROS_PACKAGE_PATH is searched before AMENT_PREFIX_PATH. The search runs in a separate process with its
+/// own environment.
 #[test]
 fn folders_of_the_environment() {
     const CHILD: &str = "CONDYLE_CHILD";
@@ -115,7 +117,7 @@ fn folders_of_the_environment() {
     run(Some(src.clone()), None, "12");
     run(None, Some(install.clone()), "32");
     run(Some(src.clone()), Some(install.clone()), "12");
-    // several folders, and some empty names
+    // the variable contains several folders and some empty names
     let empty = workspace.0.join("nothing");
     let several =
         |first: &Path, second: &Path| Some(std::env::join_paths([first, Path::new(""), second]).unwrap().into());
@@ -126,7 +128,7 @@ fn folders_of_the_environment() {
     run(None, None, &format!("{dog}: no such file in a package `dog_description`; {nowhere}"));
 }
 
-/// Shapes are never read, wherever their meshes are.
+/// Checks that mesh files of shapes are never read.
 #[test]
 fn meshes_are_not_needed() {
     let mesh = |tag: &str| format!(r#"<{tag}><geometry><mesh filename="package://nowhere/a.stl"/></geometry></{tag}>"#);

@@ -1,4 +1,4 @@
-//! Robots that urdf-rs has read are equal to robots that the reader of this crate has read.
+//! Tests that robots that urdf-rs has read are equal to robots that the reader of this crate has read.
 
 use condyle_model::{Error, Joint, Model, UrdfOptions, robots};
 use std::path::Path;
@@ -6,7 +6,8 @@ use std::path::Path;
 /// Parts of error messages for faults that urdf-rs does not detect.
 const UNSEEN: [&str; 3] = ["limit", "belongs to xacro", "drake:"];
 
-/// Compares everything that a robot of urdf-rs contains. Only the file names in warnings may differ.
+/// Compares the models that urdf-rs and the reader of this crate give for one text. Only the file names in warnings may
+/// differ.
 fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
     for root_joint in [None, Some(Joint::FreeFlyer)] {
         for mimic in [false, true] {
@@ -15,7 +16,7 @@ fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
             let (ours, theirs) = match (ours, theirs) {
                 (Ok(ours), Ok(theirs)) => (ours, theirs),
                 (Err(_), Err(_)) => return false,
-                // urdf-rs represents a missing effort by zeros, and information that it drops cannot cause an error
+                // urdf-rs represents a missing effort by zeros; elements that urdf-rs drops cannot cause an error
                 (Err(ours), Ok(_)) if UNSEEN.iter().any(|what| ours.to_string().contains(what)) => return false,
                 (ours, theirs) => panic!("{name}: {:?} {:?}", ours.map(drop), theirs.map(drop)),
             };

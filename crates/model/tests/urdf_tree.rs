@@ -1,4 +1,4 @@
-//! Trees from URDF: numbering, fixed joints, types of joints, and orientations.
+//! Tests of trees from URDF: numbering, fixed joints, types of joints, and orientations.
 #![allow(non_snake_case)]
 
 use condyle_model::{FrameKind, Inertia, Joint, Model, Se3, Sym3, UrdfOptions, Vec3};
@@ -29,15 +29,15 @@ fn flat(X: Se3<f64>) -> Vec<f64> {
     X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array).collect()
 }
 
-/// Returns max |a − b| / (1 + max |b|).
+/// Returns the relative difference max |a − b| / (1 + max |b|).
 fn relative(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let difference = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     difference / (1.0 + b.iter().map(|b| b.abs()).fold(0.0, f64::max))
 }
 
-/// A quaternion gives the same rotation as angles, for joints and for inertias; small errors of its length are
-/// corrected.
+/// Checks that a quaternion gives the same rotation as angles, for joints and for inertias. Small errors of the
+/// quaternion's length are corrected.
 #[test]
 fn quaternions() {
     let robot = |version: &str, turned: &str| {
@@ -46,7 +46,7 @@ fn quaternions() {
         let hinge = joint("j", "revolute", "base", "arm", &format!(r#"<origin xyz="0 0.2 0" {turned}/>"#));
         load(&format!("<robot name='r' {version}><link name='base'/>{arm}{hinge}</robot>"))
     };
-    // yaw of a quarter turn after roll of half a turn: the product of (0, 0, √½, √½) and (1, 0, 0, 0)
+    // a roll of half a turn, then a yaw of a quarter turn: the product of (0, 0, √½, √½) and (1, 0, 0, 0)
     let angles = robot("", &format!(r#"rpy="{} 0 {}""#, std::f64::consts::PI, std::f64::consts::FRAC_PI_2));
     for version in ["version='1.1'", "version='1.2'"] {
         let turned = robot(version, r#"quat_xyzw="0.7071 0.7071 0 0""#);
@@ -58,7 +58,8 @@ fn quaternions() {
     assert_eq!(robot("version='1.0'", r#"rpy="0 0 0""#).nv(), 1);
 }
 
-/// Bodies are numbered depth first, siblings by the bytes of their joints' names, for any order in the file.
+/// Checks that bodies are numbered depth first, and siblings by the bytes of their joints' names, for any order in the
+/// file.
 #[test]
 fn numbering() {
     let mut elements = vec![link("base")];
@@ -91,7 +92,8 @@ fn numbering() {
     }
 }
 
-/// The joints of each link are sorted. A fixed joint is sorted among them, and its link's joints follow there.
+/// Checks the numbering through fixed joints. The joints of a link, including fixed joints, are sorted by name. The
+/// joints on the child of a fixed joint get the position of the fixed joint in this order.
 #[test]
 fn numbering_through_fixed_joints() {
     let links: String = ["base", "plate", "a", "b", "c"].map(link).concat();
@@ -103,10 +105,10 @@ fn numbering_through_fixed_joints() {
     ];
     let model = load(&format!("<robot name='r'>{links}{}</robot>", joints.concat()));
     let names: Vec<&str> = model.bodies().iter().skip(1).map(|b| b.joint_name.as_str()).collect();
-    assert_eq!(names, ["k", "a", "c"]); // k before m; under m, a before c
+    assert_eq!(names, ["k", "a", "c"]); // k comes before m, and on the child link of m, a comes before c
 }
 
-/// Two fixed joints in a row, with rotations, are merged: masses, centre of mass, inertia and frames.
+/// Checks that two successive fixed joints with rotations are merged: masses, centre of mass, inertia and frames.
 #[test]
 fn fixed_joints_are_merged() {
     let text = r#"<robot name="r"><link name="base"/>
@@ -189,7 +191,7 @@ fn joint_types() {
     let limits = model.limits();
     assert_eq!((limits.lower[0], limits.upper[3], limits.velocity[0], limits.effort_upper[2]), (-1.0, 1.0, 3.0, 2.0));
     assert!(limits.upper[1].is_infinite() && limits.upper[4..].iter().all(|x| x.is_infinite()));
-    assert_eq!((limits.velocity[1], limits.effort_upper[1]), (3.0, 2.0)); // allowed for a continuous joint
+    assert_eq!((limits.velocity[1], limits.effort_upper[1]), (3.0, 2.0)); // a continuous joint may have these limits
     // damping and friction of a floating and of a planar joint have no defined unit, and are ignored
     for (part, is_held) in [(0..3, 1.0), (3..12, 0.0), (12..15, 1.0)] {
         assert!(model.damping()[part.clone()].iter().all(|&x| x == 0.5 * is_held));

@@ -51,7 +51,7 @@ fn impossible_inertias_are_named() {
     let flat = |xx, yy, zz| Sym3 { xx, xy: 0.0, yy, xz: 0.0, yz: 0.0, zz };
     assert!(matches!(body(flat(0.1, 0.1, 0.3))[..], [Warning::Triangle { .. }]));
     assert!(matches!(body(flat(0.1, -0.1, 0.1))[..], [Warning::Negative { .. }]));
-    assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate
+    assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate is possible
 }
 
 /// Returns a robot with a hinge and with one joint of each kind whose position contains a rotation of length 1.

@@ -1,6 +1,6 @@
-//! Tests of robots that are written into a copy of their file: only differences are edited, all other bytes are kept,
+//! Tests of robots that are written into a copy of their file. Only differences are edited, all other bytes are kept,
 //! and the new file reproduces the model.
-#![allow(non_snake_case)] // I is an inertia
+#![allow(non_snake_case)] // the variable I is an inertia
 
 use condyle_model::{Inertia, MjcfOptions, Model, Sym3, UrdfOptions, Vec3, robots};
 use std::fs;
@@ -13,7 +13,8 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Returns the text of the file into which a changed robot was written, or the error. `change` makes the changed robot.
+/// Returns the text of the file into which a changed robot was written, or the error. `change` returns the changed
+/// robot.
 fn written(test: &str, text: &str, change: impl Fn(&Model) -> Model) -> Result<String, String> {
     let is_urdf = text.contains("<robot");
     let read = |path: &PathBuf| match is_urdf {
@@ -140,14 +141,15 @@ fn armature_is_written_as_the_inertia_of_a_rotor() {
     let armature = |m: &Model| m.clone().with_armature(&[0.5, 0.125]).unwrap();
     let rotor = |x| format!("<drake:rotor_inertia xmlns:drake=\"http://drake.mit.edu\" value=\"{x}\"/>");
     let of = |joint: &str, x| {
-        let kind = "<type>transmission_interface/SimpleTransmission</type>"; // Drake requires it
+        let kind = "<type>transmission_interface/SimpleTransmission</type>"; // Drake requires this element
         let inside = format!("{kind}<joint name=\"{joint}\"/><actuator name=\"{joint}\">{}</actuator>", rotor(x));
         format!("\n\t<transmission name=\"{joint}\">{inside}</transmission>")
     };
     let begin = "xmlns:k=\"about:k\">";
     let expected = LEG.replace(begin, &format!("{begin}{}{}", of("hip", "0.5"), of("ankle", "0.125")));
     assert_eq!(written("armature", LEG, armature).unwrap(), expected);
-    // an existing transmission gets a rotor; if it has one, the rotor changes according to the gear ratio
+    // a rotor is added to an existing transmission without a rotor; an existing rotor changes according to the gear
+    // ratio
     let hip =
         "<transmission name='t'><joint name='hip'/><actuator name='m'><mechanicalReduction>5</mechanicalReduction>";
     let ankle = "<transmission name='u'><joint name='ankle'/><actuator name='n'><drake:gear_ratio value='2'/>";
@@ -214,14 +216,14 @@ fn links_that_fixed_joints_merge_keep_their_inertias() {
     let more = |m: &Model| m.with_inertias(|i, I| if i == 0 { I } else { I + other(i) }).unwrap();
     let new = written("merged", &text, more).unwrap();
     assert!(new.contains(&bolts), "{new}");
-    // the inertia of the other links would make the rest negative or impossible, so the moving link takes the whole
-    // inertia
+    // after subtracting the inertia of the other links, the moving link would have a negative or impossible inertia, so
+    // the whole inertia is written to the moving link
     let new = written("merged", &text, with_other_inertias).unwrap();
     assert_eq!(new.matches("<mass value='0'/>").count(), 2, "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
     let new = written("merged", &text, small).unwrap();
     assert!(!new.contains(&bolts) && new.matches("<mass value='0'/>").count() == 2, "{new}");
-    // if the moving link has no mass, the heaviest link takes the difference
+    // if the moving link has no mass, the difference is written to the heaviest link
     let light = text.replace("value = \"2.0\"", "value = \"0\"");
     let heavier = |m: &Model| m.with_inertias(|i, I| if i == 1 { I.scale(2.0) } else { I }).unwrap();
     let new = written("merged", &light, heavier).unwrap();
@@ -327,7 +329,7 @@ fn inertias_of_an_mjcf_come_back() {
     assert!(new.contains("<inertial pos='0 0 0' mass='0' diaginertia='0 0 0'/>"), "{new}");
 }
 
-/// An `<inertial>` inside a `<frame>` is edited where it is, along the axes of the frame.
+/// Checks that an `<inertial>` inside a `<frame>` is edited inside this frame, along the axes of the frame.
 #[test]
 fn an_inertial_inside_frames_is_edited() {
     let inertial = "<inertial pos='0.1 0 0' mass='1' diaginertia='0.1 0.2 0.25'/>";
@@ -340,7 +342,7 @@ fn an_inertial_inside_frames_is_edited() {
     written("frames", &text, with_other_inertias).unwrap();
 }
 
-/// Numbers that differ from the file only by rounding are not written.
+/// Checks that numbers that differ from the file only by rounding are not written.
 #[test]
 fn rounding_is_no_difference() {
     let rounded = |_: &Model| {
@@ -364,7 +366,8 @@ fn losses_of_an_mjcf_are_written() {
     assert_eq!(written("losses", HAND, change).unwrap(), expected);
 }
 
-/// Each error names the differing quantity, both numbers, and the attribute of the file that is the cause.
+/// Checks that each error names the differing quantity, both numbers, and the attribute of the file that causes the
+/// difference.
 #[test]
 fn numbers_that_depend_on_the_inertia_name_their_cause() {
     let text = |joint: &str, rest: &str| {

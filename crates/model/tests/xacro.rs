@@ -36,8 +36,8 @@ fn read(name: &str, programs: &[(&str, &str)], arguments: &str) -> String {
     said.split_once('[').unwrap().1.rsplit_once(']').unwrap().0.to_owned()
 }
 
-/// Reads the file in the process that [`read`] starts. A separate process is needed because programs are found by the
-/// PATH of the process.
+/// Reads the file in the process that [`read`] starts. A separate process is needed because programs are searched in
+/// the PATH of the process.
 #[test]
 fn in_a_process() {
     let Ok(arguments) = std::env::var(ARGUMENTS) else {
@@ -77,7 +77,7 @@ fn programs() {
     assert_eq!(said, format!("robot.xacro: {missing}: {how}"));
     let said = read("line", &[("xacro", "echo; echo '<robot><link/></robot>'")], "");
     assert_eq!(said, "robot.xacro (expanded):2: <link>: has no name");
-    // the output may be as long as the files of a robot may be
+    // the output may be as long as the limit for the files of a robot
     let large = "read() { echo \"<!-- $1$1 -->\"; }; echo \"<robot name='r'><link name='a'/>\"; \
                  i=0; while [ $i -lt 20000 ]; do read 0123456789012345678901234567890123456789; i=$((i+1)); done; echo '</robot>'";
     assert_eq!(read("large", &[("xacro", large)], ""), "r|a");

@@ -2,7 +2,7 @@
 
 use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 
-/// Robot with one joint. The name of the joint contains a character that encodings represent differently.
+/// Robot with one joint. The name of the joint contains a character that has different bytes in different encodings.
 const ROBOT: &str = "<robot name='r'><link name='a'/><link name='b'/>
 <joint name='Gelenk für b' type='continuous'><parent link='a'/><child link='b'/></joint></robot>";
 
@@ -48,11 +48,11 @@ fn encodings() {
             assert_eq!(joint(file(name, &units(&text, unit)).unwrap()), "Gelenk für b");
         }
     }
-    // a string is already decoded, so the encoding that it declares is ignored
+    // a string is already decoded, so its declared encoding is ignored
     assert_eq!(joint(urdf(&declare("ISO-8859-1")).unwrap()), "Gelenk für b");
 }
 
-/// An invalid byte has no effect in a comment. In a name, it is an error with a line number.
+/// Checks that an invalid byte has no effect in a comment, and that in a name it is an error with a line number.
 #[test]
 fn bytes_that_are_not_in_the_encoding() {
     let robot = latin(ROBOT);
@@ -98,7 +98,7 @@ fn prologs() {
     assert_eq!(Model::from_mjcf_str(mjcf, &MjcfOptions::default()).unwrap().nv(), 1);
 }
 
-/// Lines are counted from the beginning of the file.
+/// Checks that lines are counted from the beginning of the file.
 #[test]
 fn lines() {
     let good = "<robot\nname='r'>\n<!--\n--><![CDATA[\n]]><link name='a'/><link name='b'/>\n<joint\n name='j'\n type='x'/></robot>";
@@ -110,8 +110,8 @@ fn lines() {
     );
 }
 
-/// Elements and attributes of other programs have prefixes, whether the prefixes are declared or not. They have no
-/// effect.
+/// Checks that elements and attributes with the prefixes of other programs have no effect, whether the prefixes are
+/// declared or not.
 #[test]
 fn prefixes() {
     let with = |inside: &str| ROBOT.replace("</robot>", &format!("{inside}</robot>"));
@@ -123,14 +123,14 @@ fn prefixes() {
     }
     let sdf = "<sdf version='1.9'><model name='m'><gz:note>x</gz:note><link name='a'/></model></sdf>";
     assert!(Model::from_sdf_str(sdf, &SdfOptions::default()).is_ok());
-    // macros of xacro are found by their prefix, declared or not, and by the namespace of a prefix
+    // macros of xacro are recognized by the prefix `xacro`, declared or not, and by the namespace of another prefix
     let expand = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
     refused(&with("<xacro:wheel/>"), &format!("2: <xacro:wheel>: belongs to xacro: {expand}"));
     let renamed = with("<x:wheel name='w'/>").replace("<robot ", "<robot xmlns:x='http://www.ros.org/wiki/xacro' ");
     refused(&renamed, &format!("2: x:wheel `w`: belongs to xacro: {expand}"));
 }
 
-/// The text for other parsers has the same elements on the same lines as the original text.
+/// Checks that the text for other parsers has the same elements on the same lines as the original text.
 #[test]
 fn texts_for_other_parsers() {
     let text = "<!------ a -->\n<?xml version='1.0'?><!DOCTYPE robot><robot name='a&amp;&lt;&quot;'>\n<gz:a b:c='1'\n/>\n\
@@ -196,7 +196,8 @@ fn texts_that_are_no_documents() {
     refuse("</", "</ is never closed");
 }
 
-/// MuJoCo 4.0.0 reads each of these texts, and finds only the first root element in it (`mj_loadXML`).
+/// Checks that items outside of the root element cause a warning. MuJoCo 4.0.0 reads each of these texts, and uses only
+/// the first root element (`mj_loadXML`).
 #[test]
 fn things_outside_of_the_root_element_warn() {
     let mujoco = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>";

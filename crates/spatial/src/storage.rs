@@ -17,7 +17,8 @@ use core::ops::{Deref, DerefMut};
 use core::ptr::NonNull;
 use nalgebra::{Dyn, IsContiguous, Owned, RawStorage, RawStorageMut, Storage, U1, VecStorage};
 
-/// Array of fixed length on the heap. It is a boxed slice, stored as pointer and length, in this order for every `T`.
+/// Array of fixed length on the heap. The array is a boxed slice, stored as pointer and length, in this order for every
+/// `T`.
 #[repr(C)]
 pub struct Array<T> {
     start: NonNull<T>,
@@ -27,7 +28,7 @@ pub struct Array<T> {
 
 // SAFETY: an array owns its entries, as a boxed slice does.
 unsafe impl<T: Send> Send for Array<T> {}
-// SAFETY: as above.
+// SAFETY: an array owns its entries, as a boxed slice does.
 unsafe impl<T: Sync> Sync for Array<T> {}
 
 impl<T> Array<T> {
@@ -35,7 +36,7 @@ impl<T> Array<T> {
     #[inline]
     fn into_boxed_slice(self) -> Box<[T]> {
         let this = ManuallyDrop::new(self);
-        // SAFETY: pointer and length come from a boxed slice (`From<Vec<T>>`), and dropping `this` is prevented.
+        // SAFETY: pointer and length come from a boxed slice (`From<Vec<T>>`), and `this` is not dropped.
         unsafe { Box::from_raw(core::ptr::slice_from_raw_parts_mut(this.start.as_ptr(), this.len)) }
     }
 }
@@ -60,7 +61,7 @@ impl<T> Deref for Array<T> {
 impl<T> DerefMut for Array<T> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [T] {
-        // SAFETY: as for `deref`; in addition, `self` is borrowed exclusively.
+        // SAFETY: pointer and length describe a slice that `self` owns, and `self` is borrowed exclusively.
         unsafe { core::slice::from_raw_parts_mut(self.start.as_ptr(), self.len) }
     }
 }
@@ -133,8 +134,8 @@ impl<'a, T> IntoIterator for &'a mut Array<T> {
     }
 }
 
-// SAFETY: the struct is `repr(C)` and consists of a thin pointer, a number and a zero-sized field. If it is dropped as
-// an array of B, entries that are alike are dropped, and memory of the same layout is freed.
+// SAFETY: the struct is `repr(C)` and consists of a thin pointer, a number and a zero-sized field. If an array of A is
+// dropped as an array of B, its entries are valid values of B, and the freed memory has the same layout.
 #[doc(hidden)]
 unsafe impl<A: SameLayout<B>, B> SameLayout<Array<B>> for Array<A> {}
 
@@ -149,7 +150,8 @@ impl<A: SameLayout<B>, B> Rename<Array<B>> for Array<A> {
 
 /// Matrix in a workspace or in a result: nalgebra's matrix type, column-major, over an [`Array`].
 ///
-/// It has the indices, products, comparisons and views of a `DMatrix`. `clone_owned` copies it into a `DMatrix`.
+/// A matrix of this type has the indices, products, comparisons and views of a `DMatrix`. `clone_owned` copies it into
+/// a `DMatrix`.
 ///
 /// ```
 /// use condyle_spatial::{Matrix, matrix};
@@ -198,7 +200,7 @@ pub fn matrix<T: nalgebra::Scalar>(rows: usize, columns: usize, entry: T) -> Mat
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct MatrixStorage<T> {
-    /// Entries, column by column. Length: rows · columns, which never changes.
+    /// Entries, column by column. The length is rows · columns and never changes.
     numbers: Array<T>,
     rows: Dyn,
     columns: Dyn,
@@ -251,7 +253,8 @@ unsafe impl<T> RawStorage<T, Dyn, Dyn> for MatrixStorage<T> {
     }
 }
 
-// SAFETY: as above. The pointer refers to numbers that `self` owns.
+// SAFETY: there are rows · columns numbers, stored column by column, and `self` owns the numbers to which the pointer
+// refers.
 unsafe impl<T> RawStorageMut<T, Dyn, Dyn> for MatrixStorage<T> {
     #[inline(always)]
     fn ptr_mut(&mut self) -> *mut T {

@@ -53,7 +53,7 @@ proptest! {
     fn cross_products(u in motion(), v in motion(), m in motion(), f in force(), X in pose()) {
         let jacobi = u.cross(v.cross(m)) + v.cross(m.cross(u)) + m.cross(u.cross(v));
         prop_assert!(distance(jacobi.to_array(), [0.0; 6]) < ROUNDING);
-        prop_assert!((v.cross(m).dot(f) + m.dot(v.cross(f))).abs() < ROUNDING); // (v×)ᵀ = −(v×*)
+        prop_assert!((v.cross(m).dot(f) + m.dot(v.cross(f))).abs() < ROUNDING); // the transpose of v× is −(v×*)
         let expected = u.cross(v.cross(f)) - v.cross(u.cross(f));
         prop_assert!(distance((u.cross(v)).cross(f).to_array(), expected.to_array()) < ROUNDING);
         prop_assert!(distance(v.cross(v).to_array(), [0.0; 6]) < ROUNDING);
@@ -63,7 +63,7 @@ proptest! {
 
     #[test]
     fn inertia_moves_by_congruence(X in pose(), I in inertia(), m in motion()) {
-        // X* I X⁻¹ m
+        // transforming the inertia gives the same as X* I X⁻¹ m: m transformed back, multiplied by I, and transformed
         prop_assert!(distance((X.act(I) * m).to_array(), X.act(I * X.act_inv(m)).to_array()) < 10.0 * ROUNDING);
     }
 
@@ -77,14 +77,14 @@ proptest! {
 
     #[test]
     fn gyroscopic_torque(c in vec3(), mass in 0.1..2.0, w in vec3(), d in prop::array::uniform3(0.1..2.0)) {
-        // about the centre of mass, for a body that rotates about it: the moment is n = ω × J ω, and the force is zero
+        // a body rotates about its centre of mass: the moment about this point is n = ω × J ω, and the force is zero
         let J = Sym3 { xx: d[0], yy: d[1], zz: d[2], ..Sym3::zero() };
         let at_com = Inertia::from_com(mass, Vec3::zero(), J);
         let v = Motion::new(Vec3::zero(), w);
         let f = v.cross(at_com * v);
         prop_assert!(distance(f.linear.to_array(), [0.0; 3]) < ROUNDING);
         prop_assert!(distance(f.angular.to_array(), w.cross(J * w).to_array()) < ROUNDING);
-        // about another point, the centripetal force m ω × (ω × c) is added, which acts at c
+        // if the body rotates about another point, the centripetal force m ω × (ω × c) is added; it acts at c
         let away = Inertia::from_com(mass, c, J);
         let f = v.cross(away * v);
         let pull = w.cross(w.cross(c)).scale(mass);

@@ -5,7 +5,7 @@ use condyle_spatial::elementary::{exp, tanh};
 use condyle_spatial::lane_dual::LaneDual;
 use num_dual::{Dual64, DualNum};
 
-/// A few rounding errors.
+/// Error bound: a few rounding errors of double precision.
 const ROUNDING: f64 = 2e-15;
 
 fn all<S: Scalar>(x: S, y: S) -> Vec<S> {
@@ -36,8 +36,8 @@ fn lane_duals_agree_with_num_dual() {
     }
 }
 
-/// tanh agrees with num-dual, and exp with the standard library. The error bound of exp grows with the magnitude of its
-/// argument.
+/// Checks tanh against num-dual, and exp against the standard library. The error bound of exp grows with the magnitude
+/// of its argument.
 #[test]
 fn tanh_and_exp_agree_with_the_library() {
     for k in -4000..=4000 {

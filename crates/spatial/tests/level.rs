@@ -3,13 +3,14 @@
 use condyle_spatial::level::{Level, level};
 use std::process::Command;
 
-/// Uses vectors; `refused_levels` runs this test as a program.
+/// Runs code that uses vectors. The test `refused_levels` starts this test as a separate program.
 #[test]
 fn program() {
     println!("level {}, then {}", level(), level());
 }
 
-/// Runs the program with a value of the environment variable, and returns its standard output and standard error.
+/// Runs the test `program` as a separate process with a value of the environment variable, and returns its standard
+/// output and standard error.
 fn run(value: &str) -> [String; 2] {
     let mut program = Command::new(std::env::current_exe().unwrap());
     let output = program.args(["--exact", "program", "--nocapture"]).env("CONDYLE_LEVEL", value).output().unwrap();
@@ -17,7 +18,7 @@ fn run(value: &str) -> [String; 2] {
     [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
 }
 
-/// An invalid value of the variable is reported once, and the best level is used.
+/// Checks that an invalid value of `CONDYLE_LEVEL` is reported once, and that the best level is used.
 #[test]
 fn refused_levels() {
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap();

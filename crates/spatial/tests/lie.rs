@@ -14,15 +14,15 @@ use proptest::prelude::*;
 
 /// Rounding error of a dozen operations on numbers between 1 and 4.
 const ROUNDING: f64 = 2e-14;
-/// Rounding error of nalgebra's matrix exponential. It is larger than the error of `exp6`, because nalgebra scales the
-/// matrix and squares the result.
+/// Rounding error of nalgebra's matrix exponential. This error is larger than the error of `exp6`, because nalgebra
+/// scales the matrix and squares the result.
 const MATRIX_EXPONENTIAL: f64 = 1e-12;
 
 fn four(q: Quaternion<f64>) -> [f64; 4] {
     [q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Returns the numbers x + ε d.
+/// Returns the dual numbers x + ε d, one per component.
 fn dual(x: Vec3<f64>, d: Vec3<f64>) -> Vec3<Dual64> {
     let (x, d) = (x.to_array(), d.to_array());
     core::array::from_fn(|k| Dual64::new(x[k], d[k])).into()
@@ -52,7 +52,7 @@ proptest! {
         prop_assert!(distance(lie::log3(lie::exp3(w)).to_array(), w.to_array()) < ROUNDING);
     }
 
-    /// If the angle exceeds π, the shortest rotation turns in the opposite direction.
+    /// Checks rotations by more than π: their logarithm is the shorter rotation in the opposite direction.
     #[test]
     fn log3_is_the_shortest(n in axis(), angle in PI + 1e-9..TAU) {
         let w = lie::log3(lie::exp3(n.scale(angle)));
@@ -103,7 +103,7 @@ proptest! {
         prop_assert!(distance(p.to_array(), X.translation.to_array()) < ROUNDING);
     }
 
-    /// The Jacobian J of exp satisfies exp(w + ε d) = exp(w) exp(ε J d).
+    /// Checks that the Jacobian J of exp satisfies exp(w + ε d) = exp(w) exp(ε J d).
     #[test]
     fn jexp3_is_the_derivative(w in rotation_vector(), stretch in 0.0..2.0, d in vec3()) {
         let w = w.scale(stretch); // up to angles of 2π
@@ -114,7 +114,7 @@ proptest! {
         prop_assert!(distance((lie::jexp3(w) * d).to_array(), d_body.to_array()) < ROUNDING);
     }
 
-    /// The Jacobian J of log satisfies log(exp(w) exp(ε d)) = w + ε J d.
+    /// Checks that the Jacobian J of log satisfies log(exp(w) exp(ε d)) = w + ε J d.
     #[test]
     fn jlog3_is_the_derivative(w in rotation_vector(), d in vec3()) {
         let turned = lie::exp3(dual(w, Vec3::zero())) * lie::exp3(dual(Vec3::zero(), d));
@@ -162,7 +162,8 @@ proptest! {
         }
     }
 
-    /// Covers all four branches of the conversion: the largest component is x, y, z or w.
+    /// Checks the conversion of a quaternion to a matrix and back. All four branches are covered: the largest component
+    /// is x, y, z or w.
     #[test]
     fn quaternion_and_rotation(q in prop::array::uniform4(-1.0..1.0), large in 0..4_usize) {
         let mut q = q;
@@ -184,7 +185,8 @@ proptest! {
         prop_assert!(distance(four(a * a.conjugate()), four(Quaternion::identity())) < ROUNDING);
     }
 
-    /// Includes half turns. Their rotation matrices are symmetric, so that iterative methods do not advance.
+    /// Checks the conversion of poses from and to nalgebra. Half turns are included, because their rotation matrices
+    /// are symmetric and iterative methods fail on them.
     #[test]
     fn nalgebra_isometry(X in pose(), x in vec3()) {
         let peer = nalgebra::Isometry3::from(X);
@@ -196,7 +198,7 @@ proptest! {
     }
 }
 
-/// For half turns, either sign of the rotation vector is correct.
+/// Checks the logarithm of half turns. Both signs of the rotation vector are correct.
 #[test]
 fn log3_of_half_turns() {
     for w in [[PI, 0.0, 0.0], [0.0, -PI, 0.0], [0.0, 0.6 * PI, 0.8 * PI], [PI / 3.0, -2.0 * PI / 3.0, 2.0 * PI / 3.0]] {
@@ -205,7 +207,7 @@ fn log3_of_half_turns() {
     }
 }
 
-/// Second derivatives are correct at the removable singularity: ∂(J_exp d)/∂w along e is −½ e × d.
+/// Checks second derivatives at the removable singularity w = 0: the derivative of J_exp(w) d along e is −½ e × d.
 #[test]
 fn second_derivatives_at_zero() {
     type Second = Dual<Dual64>;
@@ -214,7 +216,7 @@ fn second_derivatives_at_zero() {
     let J: Mat3<Dual64> = lie::jexp3(dual(Vec3::zero(), e.into()));
     let moved = J * dual(d.into(), Vec3::zero());
     assert!(distance(eps(moved).to_array(), cross.map(|x| -0.5 * x)) < ROUNDING);
-    // log ∘ exp is the identity: its first derivative is 1, its second derivative is 0
+    // the composition log(exp(w)) is the identity: its first derivative is 1 and its second derivative is 0
     let w: [Second; 3] = core::array::from_fn(|k| Dual::new(Dual64::new(0.0, d[k]), Dual64::new(e[k], 0.0)));
     let back = lie::log3(lie::exp3(Vec3::from(w))).to_array();
     assert!(distance(back.map(|x| x.re.eps), d) < ROUNDING);
@@ -235,8 +237,8 @@ fn stumpff_exactly(k: u32, n: i128) -> f64 {
     sum as f64 / ONE as f64
 }
 
-/// Below t = 1, the error is the rounding error relative to cₖ. Above 1, the recurrence adds the rounding errors of
-/// sine and cosine twice, relative to 1.
+/// Checks the error of the Stumpff functions cₖ(t). Below t = 1, the error is the rounding error relative to cₖ. Above
+/// 1, the recurrence adds the rounding errors of sine and cosine twice, relative to 1.
 #[test]
 fn stumpff_functions() {
     const ABSOLUTE: f64 = 4.0 * f64::EPSILON;
@@ -261,7 +263,7 @@ fn stumpff_functions() {
 fn stumpff_is_continuous_at_the_switch() {
     let (below, above) = (lie::stumpff(1f64.next_down()), lie::stumpff(1.0));
     assert!(distance(below, above) < 4.0 * f64::EPSILON);
-    // the derivatives follow c_k' = (k c_{k+2} − c_{k+1}) / 2, so they are continuous, too
+    // the derivatives satisfy c_k' = (k c_{k+2} − c_{k+1}) / 2, so the derivatives are continuous, too
     for t in [1f64.next_down(), 1.0, 1e-300, 0.0, 9.0] {
         let c = lie::stumpff(Dual64::new(t, 1.0));
         for k in 0..4 {
@@ -272,7 +274,7 @@ fn stumpff_is_continuous_at_the_switch() {
     }
 }
 
-/// For NaN, lanes take the same branch as for large t, and nothing panics.
+/// Checks that NaN gives NaN. Lanes with NaN take the same branch as lanes with large t, and nothing panics.
 #[test]
 fn stumpff_of_nan_is_nan() {
     assert!(lie::stumpff(f64::NAN).iter().all(|c| c.is_nan()));

@@ -1,4 +1,4 @@
-//! Tests of one generic function with every kind of number: values and derivatives agree.
+//! Tests of one generic function with every scalar type: values and derivatives agree.
 #![allow(non_snake_case)]
 
 use condyle_spatial::{Constant, Scalar, Vec3, lie};

@@ -4,7 +4,7 @@ use condyle_spatial::Scalar;
 
 /// Error bound: 2.3e-16 for this crate, plus half a unit in the last place of numbers below 1 for the platform.
 const DOUBLE: f64 = 2.3e-16 + 0.6e-16;
-/// A few rounding errors of single precision.
+/// Error bound in single precision: a few rounding errors.
 const SINGLE: f64 = 2e-7;
 
 /// Returns angles of all magnitudes, including multiples of π/4 and numbers next to them.
@@ -37,7 +37,8 @@ fn single_precision() {
     }
 }
 
-/// For larger angles, the parts of π/2 are not exact enough, so the platform's functions are used.
+/// Checks angles beyond the limit of the crate's method. For such angles, the three parts of π/2 are not exact enough,
+/// so the platform's functions are used.
 #[test]
 fn beyond() {
     for x in [1e5_f64.next_up(), 1e9, -3e22, f64::MAX] {

@@ -1,4 +1,4 @@
-//! Tests of arrays and matrices in workspaces, and of types that are alike.
+//! Tests of arrays and matrices in workspaces, and of types with the same memory layout.
 #![allow(non_snake_case, unsafe_code)] // M
 
 use condyle_spatial::gate::{self, FusedF64, Rename, SimdToken};
@@ -7,7 +7,8 @@ use condyle_spatial::{Array, Matrix, Motion, matrix};
 use nalgebra::{DMatrix, RawStorage, Storage, dmatrix};
 use std::rc::Rc;
 
-/// Each entry is a reference-counted pointer, whose count shows whether the entry was dropped.
+/// Checks that arrays drop and clone each entry once. Each entry is a reference-counted pointer, and its count shows
+/// whether the entry was dropped.
 #[test]
 fn arrays_drop_and_clone_each_entry_once() {
     let owners: Vec<Rc<usize>> = (0..5).map(Rc::new).collect();
@@ -24,7 +25,7 @@ fn arrays_drop_and_clone_each_entry_once() {
     assert!(owners.iter().all(|owner| Rc::strong_count(owner) == 1));
 }
 
-/// The unused capacity of a vector is dropped when the vector becomes an array.
+/// Checks that the unused capacity of a `Vec` is freed when the `Vec` becomes an array.
 #[test]
 fn arrays_take_vectors_with_room() {
     let mut entries = Vec::with_capacity(10);
@@ -53,7 +54,7 @@ fn arrays_hold_entries_without_size() {
     assert_eq!((units.len(), units.clone().len(), Vec::from(units).len()), (7, 7, 7));
 }
 
-/// Vectors of eight numbers are aligned to 64 bytes.
+/// Checks the alignment of arrays whose entries are vectors of eight numbers: 64 bytes.
 #[test]
 fn arrays_align_their_entries() {
     #[derive(Clone, Debug, PartialEq)]
@@ -132,7 +133,8 @@ fn matrices_may_be_empty() {
     }
 }
 
-/// Some functions of nalgebra move entries out one by one, and leave it to the caller to drop the rest.
+/// Checks that a matrix forgets its entries without dropping them. Some functions of nalgebra need this: they move
+/// entries out one by one.
 #[test]
 fn matrices_forget_their_elements() {
     let owner = Rc::new(0);

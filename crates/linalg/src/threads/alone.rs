@@ -1,5 +1,5 @@
-//! Replacement for shared work without the feature `threads`: the calling thread does all work, and results have the
-//! same bits.
+//! Functions of `shared.rs` for builds without the feature `threads`. The calling thread does all work, and results
+//! have the same bits.
 
 /// Returns the number of threads that share work: one.
 pub fn threads() -> usize {

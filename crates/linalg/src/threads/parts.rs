@@ -1,12 +1,13 @@
-//! Parts of a horizon that go through phases. The first free thread does the next phase of a part.
+//! Parts of a time horizon, each with several phases of computation. A thread that becomes free computes the next phase
+//! of a part.
 #![allow(unsafe_code)]
 
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// Bit of a part's state that is set while a thread works on the part. The state is 2·phase while the part waits for
-/// the phase, and 2·phase + `AT_WORK` during the phase.
+/// Bit of a part's state, set while a thread works on the part. The state is 2·phase before the phase begins, and
+/// 2·phase + `AT_WORK` during the phase.
 const AT_WORK: u8 = 1;
 
 /// Parts of two slices of equal length, which are split at the same indices. Each part goes through the phases 0, 1, …
@@ -18,7 +19,7 @@ pub struct Parts<'a, A, B> {
     /// Start index of each part, and the end of the last part.
     cuts: &'a [usize],
     states: &'a [AtomicU8],
-    /// Whether a thread has panicked during its work.
+    /// Whether a thread has panicked while it worked on a part.
     abandoned: AtomicBool,
     marker: PhantomData<(&'a mut [A], &'a mut [B])>,
 }
@@ -49,8 +50,8 @@ impl<'a, A, B> Parts<'a, A, B> {
         self.states.len()
     }
 
-    /// Executes a phase on a part if the part waits for this phase, and returns whether it did. The closure receives
-    /// the index of the part's first item, and the items of the part in both slices.
+    /// Executes a phase on a part if the part waits for this phase. Returns whether the phase was executed. The closure
+    /// receives the index of the part's first item, and the items of the part in both slices.
     pub fn work(&self, part: usize, phase: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
         let (state, waiting) = (&self.states[part], 2 * phase);
         if state.compare_exchange(waiting, waiting + AT_WORK, Ordering::Acquire, Ordering::Relaxed).is_err() {
@@ -58,9 +59,9 @@ impl<'a, A, B> Parts<'a, A, B> {
         }
         let mut at_work = AtWork { abandoned: &self.abandoned, panics: true };
         let (start, end) = (self.cuts[part], self.cuts[part + 1]);
-        // SAFETY: the cuts ascend within both slices, so parts do not overlap. No other thread works on this part: only
-        // one of the threads that find the part waiting succeeds, and the part waits again only after this thread has
-        // finished.
+        // SAFETY: the cuts ascend within both slices, so parts do not overlap. No other thread works on this part: of
+        // the threads that try to change the part's state, only one succeeds. The part waits for the next phase only
+        // after this thread has finished.
         let (first, second) = unsafe {
             let first = core::slice::from_raw_parts_mut(self.first.add(start), end - start);
             (first, core::slice::from_raw_parts_mut(self.second.add(start), end - start))
@@ -71,19 +72,19 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Returns whether a phase of a part has yet to begin: the part waits for this phase, or an earlier phase is not
+    /// Returns whether a phase of a part is still to begin: the part waits for this phase, or an earlier phase is not
     /// finished.
     pub fn awaits(&self, part: usize, phase: u8) -> bool {
         self.states[part].load(Ordering::Relaxed) <= 2 * phase
     }
 
-    /// Returns whether a thread has panicked during its work, so that the thread's part will not advance.
+    /// Returns whether a thread has panicked while it worked on a part. This part will then never finish its phase.
     pub fn is_abandoned(&self) -> bool {
         self.abandoned.load(Ordering::Relaxed)
     }
 }
 
-/// Guard that informs the other threads if the work on a part panics.
+/// Guard that sets `abandoned` if the work on a part panics, so that the other threads stop waiting.
 struct AtWork<'a> {
     abandoned: &'a AtomicBool,
     panics: bool,

@@ -1,4 +1,4 @@
-//! Shared work on rayon's threads, also after fork() in a process that already had such threads.
+//! Work that rayon's threads share, also in a process that fork() created from a process with such threads.
 //!
 //! fork() copies the memory of a process, but only one of its threads: the calling thread. The child process has a copy
 //! of the parent's thread pool without the threads, and waiting for this pool never ends. So each process starts its
@@ -9,22 +9,23 @@ use std::error::Error;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Id of the process that uses rayon's global pool: the first process that asked for threads. It is 0 before that.
+/// Id of the process that uses rayon's global pool: the first process that shared work. The value is 0 before any work
+/// is shared.
 static FIRST: AtomicU32 = AtomicU32::new(0);
 
 /// Number of threads of the global pool; 1 if the pool could not be started.
 static GLOBAL: OnceLock<usize> = OnceLock::new();
 
-/// Pool of the first process that was forked from `FIRST` and asked for threads.
+/// Pool of the first process that was forked from the process `FIRST` and shared work.
 static FORKED: OnceLock<Forked> = OnceLock::new();
 
-/// Pool of a forked process. It is never dropped. It is read without a lock, because a thread might hold the lock
-/// during a fork.
+/// Pool of a forked process. The pool is never dropped. It is read without a lock, because another thread might hold
+/// the lock during a fork.
 struct Forked {
     process: u32,
     /// Thread pool; `None` if no thread could be started.
     pool: Option<ThreadPool>,
-    /// Pool of a process that was forked from this one.
+    /// Pool of a process that was forked from this process.
     next: OnceLock<Box<Forked>>,
 }
 
@@ -60,7 +61,7 @@ fn pool() -> Pool {
 /// Starts the global pool unless it exists, and returns the number of threads in the pool.
 fn start_global() -> usize {
     match ThreadPoolBuilder::new().build_global() {
-        Err(error) if error.source().is_some() => 1, // the operating system refuses threads
+        Err(error) if error.source().is_some() => 1, // the operating system cannot start a thread
         _ => rayon::current_num_threads(),
     }
 }
@@ -73,8 +74,8 @@ impl Forked {
     }
 }
 
-/// Returns the number of threads that share work. Inside a rayon pool, these are the threads of that pool. Otherwise
-/// they are the threads of the global pool or, in a forked process, of the pool that replaces it.
+/// Returns the number of threads that share work. Inside a rayon pool, these are the threads of that pool. Outside a
+/// pool, they are the threads of the global pool. In a forked process, another pool replaces the global pool.
 pub fn threads() -> usize {
     match pool() {
         Pool::Current | Pool::Global => rayon::current_num_threads(),
@@ -91,9 +92,9 @@ pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     });
 }
 
-/// Executes [`join`] for all types of closures. It is compiled only once, because rayon's code for each type takes some
-/// kilobytes. A calling thread outside the pool runs its closure itself: waking another thread takes about 50 µs, and
-/// the data is still in the cache of the caller's core.
+/// Executes [`join`] for all types of closures. This function is compiled only once, because rayon's code takes some
+/// kilobytes for each type of closure. A calling thread outside the pool runs the first closure itself. Waking another
+/// thread takes about 50 µs, and the data is still in the cache of the caller's core.
 fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     match pool() {
         Pool::Current => {

@@ -53,7 +53,7 @@ fn elimination_and_solves_match_nalgebra_for_every_edge() {
     });
 }
 
-/// Eliminating rows with `eliminate_rows` gives the same result as storing the rows below the matrix.
+/// Checks that `eliminate_rows` gives the same result as an elimination with these rows stored below the matrix.
 #[test]
 fn rows_apart_are_rows_below() {
     at_each_level(|| {

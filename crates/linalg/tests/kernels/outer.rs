@@ -6,7 +6,8 @@ use condyle_linalg::{OuterProducts, SLACK, SparseRows, Vector, Vectorized, at_le
 /// Rounding error of sums of 20 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
-/// Work that adds the squares of the first rows, and the product of each later row with the next row.
+/// Test function for a register type: adds the squares of the first rows, and the product of each later row with the
+/// next row.
 struct Fill<'a> {
     sum: &'a mut OuterProducts,
     rows: &'a SparseRows,

@@ -24,7 +24,7 @@ fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
     (out, stride)
 }
 
-/// Checks each kind of product of A with B.
+/// Checks every product function of this crate on A and B.
 fn check_products(a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let (rows, columns, length) = (a.nrows(), b.nrows(), a.ncols());
     let (shape, expected) = ([rows, columns, length], a * b.transpose());
@@ -76,7 +76,7 @@ fn products_match_nalgebra_for_every_edge() {
     });
 }
 
-/// Work that computes sums of matrices; each sum is written to two offsets.
+/// Test function for a register type: computes sums of matrices, and writes each sum to two offsets.
 struct Sums<'a>(&'a mut [f64], usize, [View<'a>; 2], [usize; 2]);
 
 impl Vectorized for Sums<'_> {

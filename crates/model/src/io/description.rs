@@ -1,5 +1,5 @@
-//! Models in formats of serde. A file contains the fields that a user may edit. All other fields are computed from them
-//! and checked when a file is read.
+//! Models in formats of serde. A file contains the fields that a user may edit. When a file is read, all other fields
+//! are computed from these fields, and the model is checked.
 
 use crate::actuator::Actuator;
 use crate::body::{Body, Frame, Limits};
@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Fields of a model that a file contains. Each field is as in [`Model`].
+/// Fields of a model that a file contains. Each field has the same meaning as in [`Model`].
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -103,9 +103,9 @@ impl Description {
         (model.springs, model.gravity_compensation) = (self.springs, self.gravity_compensation);
         (model.actuators, model.keyframes, model.constraints) = (self.actuators, self.keyframes, self.constraints);
         for keyframe in model.keyframes.iter_mut().filter(|keyframe| keyframe.control.is_empty()) {
-            keyframe.control = vec![0.0; model.actuators.len()]; // the file is of a version without controls
+            keyframe.control = vec![0.0; model.actuators.len()]; // files of earlier versions have no controls
         }
-        // Bodies `name#1`, … without mass connect the joints of a chain, unless there is a warning about them.
+        // Bodies `name#1`, … without mass connect the joints of a chain, unless the file has a warning about them.
         let warned: BTreeSet<&str> = warnings
             .iter()
             .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
@@ -137,7 +137,8 @@ impl Description {
             let options = Default::default();
             ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
         }
-        builder.check_size()?; // must come before leaders are searched among all bodies
+        // Limits the number of bodies before the leaders are searched among them.
+        builder.check_size()?;
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let Some(mimic) = body.mimic else { continue };
             let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;

@@ -51,8 +51,8 @@ const MODEL_PATHS: [&str; 4] = ["GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PAT
 /// `file://`, or a path.
 ///
 /// A path may be relative to the folder of the file that contains the address. Otherwise, the address is searched in
-/// `packages`, in the folder of that file and its parent folder, and in the `models` folder of both. Finally, it is
-/// searched in the folders listed in environment variables of Gazebo and ROS.
+/// `packages`. The next folders are the folder of that file, the parent of that folder, and the `models` folder in each
+/// of them. The last folders are those listed in environment variables of Gazebo and ROS.
 pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Error> {
     let (scheme, path) = address.split_once("://").map_or(("", address), |(scheme, path)| (scheme, path));
     let missing = |what: &str| Error::File { file: address.to_owned(), what: what.to_owned() };

@@ -1,9 +1,9 @@
 //! Known elements and attributes of a format, by parent element. All other names in a file are misspelt or misplaced,
-//! and have no effect. Each of them causes a warning with the file, the line and the nearest known name.
+//! and have no effect. Each such name causes a warning with the file, the line and the nearest known name.
 //!
-//! A name with a prefix (`prefix:name`) belongs to another program and is not checked, unless the prefix occurs in the
-//! format's table or is similar to a prefix that does. If there are no prefixes in a table, the format has no
-//! extensions, and a name with a prefix is unknown.
+//! A name with a prefix (`prefix:name`) belongs to another program and is not checked. It is checked if the format's
+//! table contains the same prefix or a similar prefix. If the table contains no prefixes, the format has no extensions,
+//! and every name with a prefix is unknown.
 
 use super::xml::Element;
 use crate::names::{near, nearest};
@@ -19,9 +19,9 @@ use std::collections::HashMap;
 /// ```
 ///
 /// The type of a child is its tag, unless `=type` names another type. A child whose type has no line has neither
-/// attributes nor children. `*` marks a known child without effect on a robot. Its content is not checked, except that
-/// elements of a robot are misplaced there. The line of the type `*` lists these elements as its children. `**` marks a
-/// child whose content is not checked at all.
+/// attributes nor children. `*` marks a known child without effect on a robot. The content of such a child is not
+/// checked, but elements of a robot cause a warning there, because they are misplaced. The line of the type `*` lists
+/// these elements as its children. `**` marks a child whose content is not checked at all.
 pub(crate) struct Known {
     types: HashMap<&'static str, Type>,
     /// XML prefixes (before `:`) of the attributes and children in `types`.
@@ -36,19 +36,20 @@ struct Type {
     children: Vec<(&'static str, &'static str)>,
 }
 
-/// Maximum number of warnings about one file; chosen because each warning takes a search for the nearest name.
+/// Maximum number of warnings about one file. The number is limited because each warning needs a search for the nearest
+/// name.
 const MAX_WARNINGS: usize = 1000;
 
-/// Type of a child whose content is not checked, except that elements of a robot are misplaced there. The line of this
-/// type lists these elements.
+/// Type of a child without effect on a robot. Its content is not checked, but elements of a robot cause a warning
+/// there. The line of this type lists these elements.
 pub(crate) const OPEN: &str = "*";
 /// Type of a child whose content is not checked.
 const FREE: &str = "**";
 /// Prefixes of attributes that XML itself uses.
 const XML: [&str; 2] = ["xml", "xsi"];
 
-/// Features of a format that a model cannot represent: the type of an element, its attribute or child, and the effect
-/// of the missing feature.
+/// Features of a format that a model cannot represent: the type of an element, its attribute or child, and the
+/// consequence of the omission.
 pub(crate) type LeftOut = [(&'static str, &'static str, &'static str)];
 
 impl Known {
@@ -144,13 +145,13 @@ impl Known {
         }
     }
 
-    /// Returns whether a name belongs to another program.
+    /// Returns whether a name has the prefix of another program.
     fn is_extension(&self, name: &str) -> bool {
         let prefix = name.split_once(':').map(|(prefix, _)| prefix).filter(|_| !self.prefixes.is_empty());
         prefix.is_some_and(|prefix| nearest(prefix, self.prefixes.iter().copied()).is_empty())
     }
 
-    /// Returns the message about an element: it is unknown, or it is misplaced in its parent.
+    /// Returns the message about an element that is unknown, or misplaced in its parent.
     fn misplaced(&self, known: &Type, parent: &Element, tag: &str) -> String {
         let near = near(&similar(tag, &known.children.iter().map(|(tag, _)| *tag).collect::<Vec<_>>()));
         let elsewhere = self.types.values().any(|t| t.children.iter().any(|(known, _)| *known == tag));
@@ -164,8 +165,8 @@ fn is_full(warnings: &[Warning]) -> bool {
     warnings.len() >= MAX_WARNINGS
 }
 
-/// Returns the nearest known name. If no known name is near, returns the name that is nearest to the given name without
-/// its prefix.
+/// Returns the nearest known name. If no known name is similar, returns the name that is nearest to the given name
+/// without its prefix.
 fn similar(name: &str, known: &[&str]) -> String {
     let of = |name: &str| nearest(name, known.iter().copied());
     let found = of(name);

@@ -55,54 +55,54 @@ pub struct MjcfOptions {
     /// Folders that contain packages, or are packages themselves, for `package://` addresses; see
     /// [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
-    /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2
-    /// ([`Mimic`](crate::Mimic)). Otherwise, the element becomes a [constraint](Model::constraints).
+    /// Whether joint1 follows joint2 ([`Mimic`](crate::Mimic)) in a `<joint>` of `<equality>` with a linear `polycoef`.
+    /// If not, the element becomes a [constraint](Model::constraints).
     pub mimic: bool,
-    /// Whether a mesh that cannot be read has no mass and causes a warning in [`Model::warnings`]. Otherwise, it is an
-    /// error.
+    /// Whether a mesh that cannot be read only causes a warning ([`Model::warnings`]) and has no mass. If not, such a
+    /// mesh is an error.
     pub weightless_meshes: bool,
 }
 
 impl Model {
     /// Reads an MJCF file and the files that it includes.
     ///
-    /// Joints keep MuJoCo's order, so q and v correspond to its `qpos` and `qvel`, with two differences. Quaternions
-    /// are x, y, z, w. The velocity of a free joint is in the body's frame (in MuJoCo, its linear velocity is in the
-    /// world's frame). A hinge has one coordinate, with or without limits
+    /// Joints keep MuJoCo's order, so q and v correspond to MuJoCo's `qpos` and `qvel`, with two differences.
+    /// Quaternions are x, y, z, w. The velocity of a free joint is in the body's frame, whereas MuJoCo's linear
+    /// velocity is in the world's frame. A hinge has one coordinate, with or without limits
     /// ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints of one body become a chain, with intermediate
     /// bodies `name#1`, `name#2`, … without mass. A body without joints is merged into its parent and stays as a frame
     /// of kind [`FrameKind::User`], as sites do.
     ///
     /// The frame of a model's body is at the body's last joint. The frame of the MJCF body is a separate frame of kind
     /// [`FrameKind::Link`] with the body's name. The two frames differ by the joint's `pos`. The q of a free joint is
-    /// the pose of the MJCF body in the world; with `align`, it is the pose of the frame of inertia, as in MuJoCo.
+    /// the pose of the MJCF body in the world; with `align`, q is the pose of the frame of inertia, as in MuJoCo.
     /// `<frame>` elements with a name, and cameras of mode `fixed`, are frames of kind [`FrameKind::User`], too. If a
-    /// site has the same name, they are named `frame:name` or `camera:name`.
+    /// site has the same name, such a frame is named `frame:name` or `camera:name`.
     ///
     /// The reader supports `<compiler>` (everything that affects a model), default classes, `<include>`, `<replicate>`,
     /// `<frame>`, `<inertial>`, masses of geoms, gravity and flags. It also supports `<attach>` of files with their own
-    /// settings. Included files are searched in the main file's folder, and then in the folder of the file that
-    /// includes them. With the feature `meshes`, masses and inertias of meshes follow MuJoCo's rules (`inertia` of
-    /// `<mesh>`). Primitives that are fitted to meshes follow these rules, too.
+    /// settings. An included file is searched in the main file's folder, and then in the folder of the including file.
+    /// With the feature `meshes`, masses and inertias of meshes follow MuJoCo's rules (`inertia` of `<mesh>`).
+    /// Primitives that are fitted to meshes follow these rules, too.
     ///
     /// Springs ([`springs`](Self::springs)), damping, friction and armature are equal to the values in the compiled
     /// MuJoCo model. `springdamper` and `dampratio` are evaluated with the inertia in the initial configuration of the
-    /// file. Actuators add gear² times their armature and damping. A `<fixed>` tendon that moves with a single
-    /// coordinate adds its spring, losses, armature and range to that coordinate. `gravcomp` becomes a [gravity
-    /// compensation](Self::gravity_compensation). As in MuJoCo, negative values of `gravcomp` act only if another value
-    /// is positive.
+    /// file. Actuators add gear² times their armature and damping. If a `<fixed>` tendon moves with a single
+    /// coordinate, its spring, damping, friction, armature and range are added to that coordinate. `gravcomp` becomes a
+    /// [gravity compensation](Self::gravity_compensation). As in MuJoCo, negative values of `gravcomp` act only if
+    /// another value is positive.
     ///
-    /// Limits of effort are sums over the actuators of a joint, clipped to the joint's `actuatorfrcrange`. An actuator
-    /// contributes its `forcerange` times gear. If the force of an actuator depends only on the control, the actuator
-    /// also contributes the control range times gain and gear. A joint without actuators has its `actuatorfrcrange`, or
-    /// no limit. Forces at sites do not limit joints. For several actuators of a ball joint, or a tendon over several
-    /// joints, the limits are a box around the reachable efforts. [`actuators`](Self::actuators) lists the actuators of
-    /// joints, fixed tendons and sites, except muscles, plugins and dampers.
+    /// The limits of effort of a joint are sums over its actuators, clipped to the joint's `actuatorfrcrange`. An
+    /// actuator contributes its `forcerange` times gear. If the force of an actuator depends only on the control, the
+    /// actuator also contributes the control range times gain and gear. A joint without actuators has its
+    /// `actuatorfrcrange`, or no limit. Forces at sites do not limit joints. For several actuators of a ball joint, or
+    /// a tendon over several joints, the limits are a box around the reachable efforts. [`actuators`](Self::actuators)
+    /// lists the actuators of joints, fixed tendons and sites, except muscles, plugins and dampers.
     ///
     /// Active `connect`, `weld` and `joint` elements of `<equality>` become [`constraints`](Self::constraints). A
     /// constraint without a name is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow
-    /// others in the tree instead. Ranges, losses, springs and efforts of a follower then act on the coordinate of its
-    /// leader. Keyframes without a name are named by their number: `key0`, `key1`, ….
+    /// others in the tree instead. Ranges, damping, friction, springs and efforts of a follower then act on the
+    /// coordinate of its leader. Keyframes without a name are named by their number: `key0`, `key1`, ….
     ///
     /// An unknown, misspelt or misplaced name is a [warning](Model::warnings). So is each effect that a model cannot
     /// represent: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
@@ -121,7 +121,7 @@ impl Model {
         model(&files, options)
     }
 
-    /// Reads an MJCF from a string. This MJCF may not include files; see [`from_mjcf`](Self::from_mjcf).
+    /// Reads an MJCF from a string. The string must not include files; see [`from_mjcf`](Self::from_mjcf).
     ///
     /// ```
     /// use condyle_model::{MjcfOptions, Model};
@@ -147,7 +147,7 @@ impl Model {
     }
 
     /// Reads a text that describes a compiled model of MuJoCo. Errors and warnings have no line number, because the
-    /// user does not see the text.
+    /// user does not know the text.
     ///
     /// # Errors
     /// Returns the errors of [`from_mjcf`](Self::from_mjcf).
@@ -158,7 +158,8 @@ impl Model {
         model(&files, options)
     }
 
-    /// Reads a text instead of a file. `path` is named in errors, and its folder is searched for included files.
+    /// Reads a text instead of the file at `path`. Errors name this path, and included files are searched in its
+    /// folder.
     ///
     /// # Errors
     /// Returns the errors of [`from_mjcf`](Self::from_mjcf).
@@ -170,7 +171,7 @@ impl Model {
     }
 }
 
-/// Returns a function that computes the pose of a `<frame>` in the element around it, by the settings of its file.
+/// Returns a function that computes the pose of a `<frame>` in its parent element, with the settings of its file.
 ///
 /// # Errors
 /// Returns the errors of [`Model::from_mjcf`].
@@ -179,7 +180,7 @@ pub(super) fn frame_poses(root: &Element) -> Result<impl Fn(&Element) -> Result<
     Ok(move |frame: &Element| compiler.pose(&Attributes::plain(frame)))
 }
 
-/// File that has its own settings.
+/// File with its own settings: the main file or an attached file.
 struct Source<'a> {
     root: &'a Element,
     compiler: Compiler,
@@ -224,7 +225,7 @@ struct Reader<'a> {
     gravity: Vec3<f64>,
     /// Files with their own settings, the main one first.
     sources: &'a [Source<'a>],
-    /// Number of bodies that have been read, which is MuJoCo's index of the last body.
+    /// Number of bodies that have been read. This number is also MuJoCo's index of the last body.
     bodies: usize,
     /// Elements with a name, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
@@ -234,9 +235,9 @@ struct Reader<'a> {
     solids: Solids,
     /// Mass of all bodies that have been read (kg).
     mass: f64,
-    /// Whether the weight of at least one body is compensated.
+    /// Whether a positive `gravcomp` compensates the weight of at least one body.
     compensates: bool,
-    /// Frames and cameras with a name that have been read.
+    /// Named frames and cameras that have been read.
     placed: Vec<Placed<'a>>,
     warnings: Vec<Warning>,
 }
@@ -287,7 +288,7 @@ impl<'a> Reader<'a> {
         self.source(element).defaults.of(element, around)
     }
 
-    /// Returns the element's name; if it has none, returns a name that is not yet used.
+    /// Returns the element's name. If the element has no name, returns a new name that is not used yet.
     fn name(&mut self, kind: &'static str, element: &'a Element, otherwise: &str) -> Result<String, Error> {
         let own = element.attribute("name").filter(|n| !n.is_empty());
         let mut name = own.unwrap_or(otherwise).to_owned();
@@ -312,7 +313,7 @@ fn names<'e>(elements: impl Iterator<Item = &'e Element>) -> Result<HashMap<&'e 
     Ok(names)
 }
 
-/// Returns the error that another element already has the name of an element.
+/// Returns the error for an element whose name another element already has.
 fn taken(element: &Element, other: &Element) -> Error {
     element.wrong(format!("the name is taken by the {} on line {}", other.tag, other.line))
 }

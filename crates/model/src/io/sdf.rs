@@ -26,8 +26,8 @@ use std::path::{Path, PathBuf};
 /// Options for reading an SDF.
 #[derive(Clone, Debug, Default)]
 pub struct SdfOptions {
-    /// Joint between the world and each root link. Root links are the links that no joint carries. The first such joint
-    /// is named `root_joint`, and the others are named `root_joint#2` and so on. `None` fixes root links to the world.
+    /// Joint between the world and each root link. Root links are the links that no joint carries. The first root joint
+    /// is named `root_joint`, the second `root_joint#2`, and so on. `None` fixes root links to the world.
     pub root_joint: Option<Joint>,
     /// Whether each warning ([`Model::warnings`]) becomes an error.
     pub strict: bool,
@@ -36,8 +36,7 @@ pub struct SdfOptions {
     /// Folders that contain packages or models, or that are a package or model themselves, for `package://` and
     /// `model://` addresses; see [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
-    /// Whether an axis with a `<mimic>` follows another axis ([`Mimic`](crate::Mimic)). Otherwise, the axis moves
-    /// freely.
+    /// Whether an axis with a `<mimic>` follows another axis ([`Mimic`](crate::Mimic)). If not, the axis moves freely.
     pub mimic: bool,
     /// Name of the model that is read. `None` reads all models of the file into one robot.
     pub model: Option<String>,
@@ -46,9 +45,9 @@ pub struct SdfOptions {
 impl Model {
     /// Reads an SDF file. Its version may be 1.0, or 1.2 to 1.12.
     ///
-    /// An older version is converted by the rules of the format's own library. Up to version 1.4, an axis is in the
-    /// model's frame. Up to version 1.6, it is in the joint's frame, unless `use_parent_model_frame` is true. In later
-    /// versions, it is in the frame that `expressed_in` names.
+    /// An older version is converted by the rules of the format's own library. Up to version 1.4, an axis is given in
+    /// the model's frame. In versions 1.5 and 1.6, it is given in the joint's frame, unless `use_parent_model_frame` is
+    /// true. In later versions, it is given in the frame that `expressed_in` names.
     ///
     /// **Models.** All models of a file, or of its first world, become one robot; [`SdfOptions::model`] selects one
     /// model instead. If there are several models, all names begin with the name of the model: `robot::arm`. Names in
@@ -56,7 +55,7 @@ impl Model {
     /// model. The address of this model may be a path relative to the file, or begin with `model://`, `package://` or
     /// `file://`. Models are searched in:
     /// - [`SdfOptions::packages`];
-    /// - the folder of the file, its parent folder, and the folder `models` in both of them;
+    /// - the folder of the file, its parent folder, and the folder `models` in each of these two folders;
     /// - the folders listed in GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH, GAZEBO_MODEL_PATH and the
     ///   environment variables of ROS.
     ///
@@ -64,25 +63,26 @@ impl Model {
     /// is not found, this is an error.
     ///
     /// **Tree.** Joints are visited breadth first, in the order of the file: from the world, then from each root link.
-    /// If the parent link of a joint cannot be reached otherwise, the joint is visited from its child link. The
-    /// position of such a joint stays the same, except for a ball joint. Links that are joined to the world, links of
-    /// static models, and root links without a root joint stay at their poses in the file. With a root joint, q is the
-    /// pose of the root link in the world.
+    /// If the parent link of a joint cannot be reached in another way, the joint is visited from its child link. The
+    /// coordinates of a joint visited in this direction stay the same, except for a ball joint. Links that are joined
+    /// to the world, links of static models, and root links without a root joint stay at their poses in the file. With
+    /// a root joint, q is the pose of the root link in the world.
     ///
-    /// **Loops.** A joint that would give a link a second parent closes a loop. It becomes a constraint with the
+    /// **Loops.** A joint whose child link already has a parent closes a loop. The joint becomes a constraint with the
     /// joint's name in [`constraints`](Self::constraints). A fixed joint constrains two frames, and a ball joint
     /// constrains two points. A revolute joint makes two constraints, for two points 1 m apart on its axis; the second
-    /// constraint is named `name#2`. One of the six rows of these two constraints is redundant, so solve them with a
-    /// damping. A universal joint constrains only its point. Prismatic and screw joints are left out. A gearbox becomes
-    /// a coupling of two joints. Motions that are not constrained are reported in [`warnings`](Self::warnings).
+    /// constraint is named `name#2`. One of the six rows of these two constraints is redundant, so their equations must
+    /// be solved with damping. A universal joint constrains only its point. Prismatic and screw joints are left out. A
+    /// gearbox becomes a coupling of two joints. Motions that are not constrained are reported in
+    /// [`warnings`](Self::warnings).
     ///
     /// **Joints.** `revolute` has one coordinate, with or without limits ([`Joint::Revolute`]). `continuous` has q =
     /// [cos, sin], as in a URDF. `ball` is [`Joint::Spherical`]. `universal` and `revolute2` become two revolute
     /// joints, with a body `child#1` between them; the first joint is named `name#1`. `screw` is [`Joint::Helical`],
-    /// with `screw_thread_pitch` or the older `thread_pitch`. The frame of the model's body is the frame of the joint.
-    /// The child link is a separate frame ([`FrameKind::Link`](crate::FrameKind::Link)); the two frames differ by the
-    /// joint's `<pose>`. Siblings are numbered in the order of the file. Damping, friction and springs are stored.
-    /// Drake's `drake:rotor_inertia` and `drake:gear_ratio` determine the armature.
+    /// with the pitch of `screw_thread_pitch` or the older `thread_pitch`. The frame of the model's body is the frame
+    /// of the joint. The child link is a separate frame ([`FrameKind::Link`](crate::FrameKind::Link)); the two frames
+    /// differ by the joint's `<pose>`. Siblings are numbered in the order of the file. Damping, friction and springs
+    /// are stored. Drake's `drake:rotor_inertia` and `drake:gear_ratio` determine the armature.
     ///
     /// **Poses** may be `relative_to` links, joints, frames and models. `<frame>` elements and nested models become
     /// frames of kind [`FrameKind::User`](crate::FrameKind::User).
@@ -102,7 +102,7 @@ impl Model {
         model(&root, includes, options)
     }
 
-    /// Reads an SDF from a string. This SDF cannot include files by relative paths; see [`from_sdf`](Self::from_sdf).
+    /// Reads an SDF from a string. The string cannot include files by relative paths; see [`from_sdf`](Self::from_sdf).
     ///
     /// ```
     /// use condyle_model::{Model, SdfOptions};

@@ -19,26 +19,26 @@ group_state: name group ; joint
 joint: name value
 ";
 
-/// Maximum number of `<group_state>`s in a file; chosen because each of them is stored as a whole position of the
-/// robot.
+/// Maximum number of `<group_state>`s in a file. The number is limited because each state is stored as a complete
+/// position of the robot.
 const MAX_STATES: usize = 4096;
 
 impl Model {
     /// Reads the named positions of an SRDF file, which are its `<group_state>`s. Returns (name, q) in the order of the
     /// file.
     ///
-    /// A `<joint>` of a state has as many numbers as the joint has in q, or one angle if the joint is continuous.
-    /// Joints that are not mentioned are at their [`neutral`] positions. States with the same name, such as `home` of
-    /// an arm and `home` of its hand, form one position. An SRDF is often shared by robots with fewer joints: joints
-    /// that this robot does not have are ignored, or are errors if `strict` is set. Joints that follow others do not
-    /// have their own number. All other elements of the file (groups, pairs that cannot collide, …) are ignored.
-    /// Unknown, misspelt or misplaced names are ignored, too, unless `strict` is set.
+    /// In a state, a `<joint>` lists all coordinates of its joint in q, or one angle if the joint is continuous. Joints
+    /// that are not mentioned are at their [`neutral`] positions. States with the same name, such as `home` of an arm
+    /// and `home` of its hand, form one position. An SRDF is often shared by several robots. Joints that this robot
+    /// does not have are ignored, or are errors if `strict` is set. Joints that follow other joints have no coordinate
+    /// of their own. All other elements of the file (groups, pairs that cannot collide, …) are ignored. Unknown,
+    /// misspelt or misplaced names are ignored, too, unless `strict` is set.
     ///
     /// # Errors
-    /// Returns [`Error::File`], [`Error::Xml`] or [`Error::Element`], with file, line and element. Examples are invalid
-    /// numbers, a wrong count of numbers for a joint, and rotations whose length is not 1. Returns [`Error::Strict`]
-    /// for an unknown name if `strict` is set. The limits of files are listed in the [crate
-    /// documentation](crate#limits-of-files).
+    /// Returns [`Error::File`], [`Error::Xml`] or [`Error::Element`], with file, line and element. Examples of errors
+    /// are invalid numbers, a wrong number of coordinates for a joint, and quaternions or (cos, sin) pairs whose length
+    /// is not 1. Returns [`Error::Strict`] for an unknown name if `strict` is set. The limits of files are listed in
+    /// the [crate documentation](crate#limits-of-files).
     pub fn reference_configurations(
         &self,
         path: impl AsRef<Path>,

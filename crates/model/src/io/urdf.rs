@@ -22,11 +22,11 @@ use std::path::{Path, PathBuf};
 /// Options for reading a URDF.
 #[derive(Clone, Debug, Default)]
 pub struct UrdfOptions {
-    /// Joint between the world and the root link. It is named `root_joint`, or `root_joint_2`, … if the file has a
-    /// joint with that name. `None` fixes the root link to the world.
+    /// Joint between the world and the root link. The joint is named `root_joint`. If the file already has a joint with
+    /// that name, it is named `root_joint_2`, `root_joint_3`, and so on. `None` fixes the root link to the world.
     pub root_joint: Option<Joint>,
-    /// Whether joints with a `<mimic>` share the coordinate of their leader; see [`Mimic`](crate::Mimic). Otherwise,
-    /// they have their own coordinates.
+    /// Whether joints with a `<mimic>` share the coordinate of their leader; see [`Mimic`](crate::Mimic). If not, these
+    /// joints have their own coordinates.
     pub mimic: bool,
     /// Whether each warning ([`Model::warnings`]) becomes an error.
     pub strict: bool,
@@ -44,34 +44,33 @@ impl Model {
     /// Reads a URDF file. `path` is a path, or an address `package://name/path/in/the/package`
     /// ([`UrdfOptions::packages`]).
     ///
-    /// The child of a fixed joint is merged into the body that carries the joint, and stays as a frame. Siblings are
-    /// numbered in the order of their joints' names (compared as bytes), as in Pinocchio. Versions 1.0 to 1.2 are
-    /// supported. A file without a version number has version 1.0, in which an `<origin>` cannot have a quaternion.
+    /// The child link of a fixed joint is merged into the body that carries the joint, and a frame remains at its pose.
+    /// Siblings are numbered in the order of their joints' names (compared as bytes), as in Pinocchio. Versions 1.0 to
+    /// 1.2 are supported. A file without a version number has version 1.0, in which an `<origin>` cannot have a
+    /// quaternion.
     ///
-    /// - A planar joint moves in the plane normal to its axis, as the format and Drake define it. A missing axis is 1 0
-    ///   0. The z axis of the joint's frame is rotated to the axis by the shortest rotation. In Pinocchio, the plane is
+    /// - A planar joint moves in the plane normal to its axis, as the format and Drake define it. A missing axis is x.
+    ///   The z axis of the joint's frame is rotated to the axis by the shortest rotation. In Pinocchio, the plane is
     ///   always normal to z.
-    ///   0. The z axis of its frame is rotated to the axis by the shortest rotation. Pinocchio's plane is always normal
-    ///   to z.
     /// - If the parent of a joint is `world` and no link has this name, the joint is attached to the world, as in
     ///   Drake. This causes a warning.
-    /// - A revolute or prismatic joint needs a limit with effort and velocity; for a continuous joint, both are
-    ///   optional. A negative effort or velocity is not a limit, and position limits in reverse order are not limits
-    ///   either. Both cause a warning.
+    /// - A revolute or prismatic joint needs a limit with effort and velocity. For a continuous joint, effort and
+    ///   velocity are optional. A negative effort or velocity means no limit and causes a warning. So do position
+    ///   limits in reverse order.
     /// - A `<transmission>` with the inertia J of a rotor (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a
-    ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) results in the armature n² J. A reduction without an
+    ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) gives the armature n² J. A reduction without an
     ///   inertia causes a warning.
     /// - `<frame>` elements of Drake become frames. The joints `ball`, `screw`, `planar` and `universal` of Drake are
     ///   supported. A universal joint becomes two revolute joints about x and y, with a body `child#1` between them;
     ///   the first joint is named `name#1`.
-    /// - The losses of a spherical, ball or universal joint act along each of its coordinates.
+    /// - The damping and friction of a spherical, ball or universal joint act along each of its coordinates.
     ///
     /// An unknown, misspelt or misplaced name causes a warning, and so does each feature that a model cannot represent
     /// ([`Model::warnings`]). Some elements are ignored without a warning: shapes, materials, sensors, controllers,
-    /// calibrations, soft limits of a `<safety_controller>`, and entries of `<gazebo>` about contact, looks and
-    /// numerics. Mesh files need not exist.
+    /// calibrations, soft limits of a `<safety_controller>`, and entries of `<gazebo>` about contact, appearance and
+    /// numerics. Mesh files are not opened and may be missing.
     ///
-    /// A file whose name ends in `.xacro` is expanded first, by the program `xacro` or, if it is missing, by
+    /// A file whose name ends in `.xacro` is expanded first, by the program `xacro` or, if `xacro` is not installed, by
     /// `xacrodoc`. One of these programs must be installed. The expansion may take a minute. The program receives
     /// [`UrdfOptions::arguments`] and the folders of packages (`ROS_PACKAGE_PATH`). xacro evaluates Python expressions,
     /// so expand only files that you trust. Line numbers in messages refer to the expanded text.
@@ -99,7 +98,7 @@ impl Model {
         xacro::expand(path, &options.arguments, &options.packages)
     }
 
-    /// Reads a URDF from a string. Errors and warnings name it `file`.
+    /// Reads a URDF from a string. Errors and warnings use the value of `file` as its file name.
     #[doc(hidden)]
     pub fn from_urdf_text(text: &str, file: &str, options: &UrdfOptions) -> Result<Self, Error> {
         Reader::new(&Element::parse(text, file, &mut Amount::default())?)?.model(options)

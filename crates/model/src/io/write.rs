@@ -1,11 +1,11 @@
-//! Writing of a robot's inertias, limits, losses and armature into a copy of the robot's file. All other bytes are
-//! copied.
+//! Writing of a robot's inertias, limits, damping, friction and armature into a copy of the robot's file. All other
+//! bytes are copied.
 //!
-//! The original text is edited at the elements that differ. Then the new text is read again, because only the reader
-//! defines what a file means. A number of a body or joint may have contributions from several elements: from links that
-//! fixed joints merge, or from the armature of an actuator. The contribution of the other elements is the difference
-//! between the number read and the number written; it is subtracted once. If the new file still does not reproduce the
-//! model, it is not written.
+//! The original text is edited at the elements that differ. Then the new text is read again and compared with the
+//! model. A number of a body or joint may be a sum over several elements, for example over links that fixed joints
+//! merge, or over a joint and its actuators. The contribution of the other elements is the difference between the
+//! number read and the number written. This difference is subtracted once. If the new text still does not reproduce the
+//! model, the file is not written.
 
 mod changes;
 mod differences;
@@ -24,7 +24,7 @@ use edits::Edits;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// File format, given by its reader and by the elements that contain the numbers of a robot.
+/// File format: its reader, and the elements of the format that contain the numbers of a robot.
 trait Format {
     /// Reads a text as if it were the original file.
     fn read(&self, text: &str) -> Result<Model, Error>;
@@ -41,10 +41,10 @@ impl Model {
     /// Only numbers that differ from the original are edited, so an unchanged robot results in the same bytes. `path`
     /// may be the same as `original`. Reading the new file reproduces this model, up to rounding.
     ///
-    /// The inertia of a body is the sum over its links, which fixed joints merge. One link takes the whole difference:
-    /// the link that the body's joint carries or, if that link has no mass, the heaviest link. The new inertia of this
-    /// link must be physical, with at least a thousandth of the body's mass. Otherwise, this link takes the whole
-    /// inertia of the body, and the other links have no inertia.
+    /// The inertia of a body is the sum of the inertias of its links, which fixed joints merge. The whole difference is
+    /// written to one link: the link that the body's joint carries or, if that link has no mass, the heaviest link. The
+    /// new inertia of this link must be physical, with at least a thousandth of the body's mass. If it is not, the
+    /// whole inertia of the body is written to this link, and the inertia of the other links becomes zero.
     ///
     /// ```
     /// use condyle_model::{Model, UrdfOptions, robots};
@@ -63,10 +63,10 @@ impl Model {
     /// An armature is written as the rotor inertia in the joint's `<transmission>`, with Drake's tags.
     ///
     /// # Errors
-    /// Returns [`Error::File`] if the file cannot represent a number, or if the robots differ in something else; the
-    /// message contains the quantity and both values. Joints, frames and gravity must be the same as in the original. A
-    /// URDF has one number for the efforts in both directions, and no infinite limits. The file must be in UTF-8, and
-    /// must not be a xacro file. Also returns the errors of [`from_urdf`](Self::from_urdf).
+    /// Returns [`Error::File`] if the file cannot represent a number, or if the robots differ in any other quantity.
+    /// The message contains the quantity and both values. Joints, frames and gravity must be the same as in the
+    /// original. A URDF has one number for the efforts in both directions, and no infinite limits. The file must be in
+    /// UTF-8, and must not be a xacro file. Also returns the errors of [`from_urdf`](Self::from_urdf).
     pub fn write_urdf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
         let original = Original::read(original.as_ref())?;
         let root = urdf::root(&original.root).and_then(|root| self.bodies.iter().skip(1).find(|b| b.name == root));
@@ -80,25 +80,25 @@ impl Model {
     ///
     /// Attributes of elements override the attributes of their classes, so default classes stay unchanged. A changed
     /// inertia is written as an `<inertial>`, even if geoms determined the inertia before. Limits of effort are written
-    /// as `actuatorfrcrange` of the joint. The weight that `gravcomp` compensates is proportional to the mass, so it
-    /// changes with the mass.
+    /// as `actuatorfrcrange` of the joint. The weight that `gravcomp` compensates is proportional to the mass, so the
+    /// compensated weight changes with the mass.
     ///
     /// # Errors
     /// Returns the errors of [`write_urdf`](Self::write_urdf). The file itself must contain the bodies and joints that
-    /// differ: if they are in an included file, or made by `replicate` or `attach`, there is no element to edit. An
-    /// MJCF has no speed limits. The `<compiler>` must not replace inertias (`inertiafromgeom`) or scale them
-    /// (`settotalmass`). Also returns the errors of [`from_mjcf`](Self::from_mjcf).
+    /// differ. Bodies and joints from an included file, from `replicate` or from `attach` cannot be edited. An MJCF has
+    /// no speed limits. The `<compiler>` must not replace inertias (`inertiafromgeom`) or scale them (`settotalmass`).
+    /// Also returns the errors of [`from_mjcf`](Self::from_mjcf).
     pub fn write_mjcf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
         let original = Original::read(original.as_ref())?;
         let mimic = self.bodies.iter().any(|b| b.mimic.is_some());
         let mut format = mjcf::Mjcf { path: original.path, options: MjcfOptions { mimic, ..MjcfOptions::default() } };
-        // Meshes whose file is missing have no mass.
+        // If the original can only be read with missing mesh files, these meshes have no mass.
         format.options.weightless_meshes = format.read(&original.text).is_err();
         write(self, path.as_ref(), &original, &format)
     }
 }
 
-/// Original file, of which a copy is edited.
+/// Original file; the edits are made in a copy of its text.
 struct Original<'a> {
     path: &'a Path,
     text: String,
@@ -122,7 +122,7 @@ impl<'a> Original<'a> {
         Error::File { file: self.path.display().to_string(), what }
     }
 
-    /// Returns the original text, in which the changed numbers are replaced.
+    /// Returns the original text with the changed numbers.
     fn edited(&self, format: &impl Format, changes: &Changes) -> Result<String, Error> {
         let mut edits = Edits::new(&self.text);
         format.edit(&mut edits, &self.root, changes).map_err(|what| self.wrong(what))?;

@@ -21,12 +21,12 @@ use std::rc::Rc;
 const MAX_BYTES: usize = 64 << 20;
 /// Maximum number of tags in all files together. Comments and end tags count, too.
 const MAX_TAGS: usize = 1 << 20;
-/// Maximum number of equals signs in all files together. It limits the number of attributes and the memory for
-/// attributes.
+/// Maximum number of equals signs in all files together. It limits the number of attributes and their memory.
 const MAX_EQUALS: usize = 1 << 22;
 /// Maximum number of attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// Maximum depth of nested elements; chosen because an MJCF of a chain nests as deep as it has bodies.
+/// Maximum depth of nested elements. The limit is high enough for an MJCF of a chain, in which every body is nested in
+/// its parent.
 pub(crate) const MAX_DEPTH: usize = 256;
 
 /// XML element with its content. A prefix is part of a name (`gz:note`). Declarations of prefixes are dropped.
@@ -38,7 +38,7 @@ pub(crate) struct Element {
     pub(crate) children: Vec<Element>,
     /// Path of the file, or `<string>`.
     pub(crate) file: Rc<str>,
-    /// Line number, counted from 1; 0 if the user does not see the text.
+    /// Line number, counted from 1; 0 if the user does not know the text.
     pub(crate) line: u32,
     /// Byte index of the element's `<` in the text of the file.
     pub(crate) at: usize,
@@ -57,7 +57,7 @@ pub(crate) struct Amount {
 }
 
 impl Amount {
-    /// Reads the text of a file. Returns an error if it is not a regular file, or if it is too large.
+    /// Reads the text of a file. Returns an error if the file is not a regular file or is too large.
     pub(crate) fn read(&self, path: &Path) -> Result<String, Error> {
         let wrong = |what: String| Error::File { file: path.display().to_string(), what };
         if let Some(text) = path.to_str().map(str::trim_start).filter(|text| text.starts_with('<')) {
@@ -67,7 +67,7 @@ impl Amount {
             return Err(Error::File { file, what: what.to_owned() });
         }
         let said = |e: std::io::Error| wrong(e.to_string());
-        // This is checked before the file is opened, because opening a pipe waits for a writer.
+        // Checks the type of the file before opening it, because opening a pipe waits for a writer.
         let kind = std::fs::metadata(path).map_err(said)?;
         if !kind.is_file() {
             let found = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
@@ -86,7 +86,8 @@ impl Amount {
         Ok(encoding::decode(bytes))
     }
 
-    /// Counts the copies of an element that a file requests as if the file contained them.
+    /// Adds copies of an element to the amount of text that has been read. A file that requests copies is treated as if
+    /// it contained them.
     pub(crate) fn add_copies(&mut self, element: &Element, count: usize) -> Result<(), Error> {
         let (mut tags, mut equals, mut waiting) = (0usize, 0usize, vec![element]);
         while let Some(e) = waiting.pop() {
@@ -103,7 +104,8 @@ impl Amount {
         Ok(())
     }
 
-    /// Counts the bytes, tags and equals signs of a text. The error names the limit that is exceeded.
+    /// Adds the bytes, tags and equals signs of a text to the amount that has been read. The error names the limit that
+    /// is exceeded.
     fn add(&mut self, text: &str) -> Result<(), String> {
         let (bytes, count) = (text.as_bytes(), |byte| count(text.as_bytes(), byte));
         (self.bytes, self.tags, self.equals) =
@@ -165,12 +167,13 @@ impl Element {
         }
     }
 
-    /// Returns the message that an attribute or child of the element is missing. It suggests the most similar name that
-    /// the element has.
+    /// Returns the message that an attribute or child of the element is missing. The message suggests the most similar
+    /// name among the element's attributes and children.
     pub(crate) fn missing(&self, name: &str) -> String {
         let attributes = self.attributes.iter().map(|(name, _)| &**name);
         let names = attributes.chain(self.children.iter().map(|child| &*child.tag));
-        let near = near(&nearest(name, names.filter(|found| *found != name))); // it may be there, without a value
+        // Excludes `name` itself, which may exist with an empty value.
+        let near = near(&nearest(name, names.filter(|found| *found != name)));
         format!("has no {name}{near}")
     }
 
@@ -193,12 +196,12 @@ impl Element {
         }
     }
 
-    /// Returns the file and line number of this element; `None` if the user does not see the text.
+    /// Returns the file and line number of this element; `None` if the user does not know the text.
     pub(crate) fn place(&self) -> Option<Place> {
         (self.line > 0).then(|| Place { file: self.file.to_string(), line: self.line })
     }
 
-    /// Removes the line numbers of this element and of its content, for a text that the user does not see.
+    /// Removes the line numbers of this element and of its content, for a text that the user does not know.
     pub(crate) fn forget_lines(&mut self) {
         self.line = 0;
         self.children.iter_mut().for_each(Self::forget_lines);
@@ -222,12 +225,12 @@ impl Element {
     }
 
     /// Returns the same warning as [`left_out`](Self::left_out), but with the line number of an element inside this
-    /// one.
+    /// element.
     pub(crate) fn left_out_inside(&self, inside: &Self, what: impl Into<String>) -> Warning {
         Warning::LeftOut { place: inside.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns a warning about a default that is used because this element does not specify a value.
+    /// Returns a warning about a default value that is used because this element specifies no value.
     pub(crate) fn assumed(&self, what: impl Into<String>) -> Warning {
         Warning::Assumed { place: self.place(), element: self.label(), what: what.into() }
     }
@@ -243,7 +246,7 @@ impl Element {
     }
 }
 
-/// Advice for files with macros of xacro. No reader expands such macros.
+/// Advice in the error message for files with macros of xacro, which no reader expands.
 const EXPAND: &str = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
 
 /// Returns whether a text is a path, given by mistake instead of the text of a robot's file.

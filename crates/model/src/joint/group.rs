@@ -18,7 +18,8 @@ impl Joint {
         }
     }
 
-    /// Returns the range of the coordinates that form a vector of length 1; `None` if there are no such coordinates.
+    /// Returns the range of the joint's coordinates that form a vector of length 1; `None` if the joint has no such
+    /// coordinates.
     pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
         match self {
             Self::Continuous { .. } => Some(0..2),
@@ -38,7 +39,7 @@ impl Joint {
         }
         let (sin, cos) = (core::f64::consts::TAU * rng.random::<f64>()).sin_cos();
         let mut rotate = |q: &mut [f64]| {
-            // A quaternion that is uniform on the sphere. Source: Shoemake (1992).
+            // Draws a quaternion that is uniformly distributed on the unit sphere. Source: Shoemake (1992).
             let (u, a) = (rng.random::<f64>(), (core::f64::consts::TAU * rng.random::<f64>()).sin_cos());
             let (r, s) = ((1.0 - u).sqrt(), u.sqrt());
             q.copy_from_slice(&[r * sin, r * cos, s * a.0, s * a.1]);
@@ -70,7 +71,7 @@ impl Joint {
             _ => {
                 let (R, p) = self.pose(q);
                 let (dR, dp) = lie::exp6(self.twist(v));
-                // The quaternions r and −r are the same rotation. Uses the one that is nearer to q.
+                // The quaternions r and −r are the same rotation. Selects the sign for which the result is nearer to q.
                 let sign = S::select(dR.scalar.lt(S::zero()), -S::one(), S::one());
                 let dR = Quaternion { vector: dR.vector.scale(sign), scalar: dR.scalar * sign };
                 self.set_pose((R * dR).normalize(), p + R.to_rotation() * dp, out);
@@ -142,7 +143,7 @@ impl Joint {
         }
     }
 
-    /// Sets q to a pose. This is the inverse of `pose`.
+    /// Sets q to the position that has a given pose. This function is the inverse of `pose`.
     #[inline(always)]
     fn set_pose<S: Scalar>(self, R: Quaternion<S>, p: Vec3<S>, q: &mut [S]) {
         let (u, w) = (R.vector, R.scalar);
@@ -155,7 +156,7 @@ impl Joint {
     }
 }
 
-/// Jacobian of a joint's group; integration and differences use these Jacobians.
+/// Kind of Jacobian of a joint's Lie group, for integration and differences of positions.
 #[derive(Clone, Copy)]
 pub enum GroupJacobian {
     /// Derivative ∂(q ⊕ v)/∂v.

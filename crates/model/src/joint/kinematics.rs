@@ -10,16 +10,17 @@ use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct JointSinCos<S> {
-    /// Sine of the angle of each joint. Shape: bodies, rounded up to whole steps. Written by: `Joint::sin_cos`.
+    /// Sine of the angle of each joint. Length: the number of bodies, rounded up to a multiple of `STEP`. Written by:
+    /// `Joint::sin_cos`.
     pub sin: Array<S>,
-    /// Cosine of the angle of each joint. Shape: as `sin`. Written by: `Joint::sin_cos`.
+    /// Cosine of the angle of each joint. Length: the same as for `sin`. Written by: `Joint::sin_cos`.
     pub cos: Array<S>,
 }
 
 same_layout!(JointSinCos { sin, cos });
 
 impl<S: Scalar> JointSinCos<S> {
-    /// Number of entries that are computed at once; they fill two vectors.
+    /// Number of entries that are computed at once. These entries fill two vectors.
     pub const STEP: usize = if S::LANES == 1 { 8 } else { 2 };
 
     /// Allocates entries for `bodies` bodies, including the world.
@@ -70,7 +71,7 @@ impl Joint {
         (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
-    /// Returns the pose λXi = X_T X_J(q) of joint i of a pass, in the parent's frame.
+    /// Returns the pose λXi = X_T X_J(q) of body i in the frame of its parent λ.
     #[inline(always)]
     pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
         let (sin, cos) = match l.joint(i) {
@@ -81,7 +82,8 @@ impl Joint {
         Self::placement_with(l, i, q, sin, cos)
     }
 
-    /// Returns the pose λXi = X_T X_J(q) of joint i of a pass, given the sine and cosine of its angle.
+    /// Returns the pose λXi = X_T X_J(q) of body i in the frame of its parent λ, given the sine and cosine of its
+    /// joint's angle.
     #[inline(always)]
     pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         Self::placement_on(l, i, l.placement(i), q, sin, cos)

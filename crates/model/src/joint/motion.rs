@@ -2,7 +2,8 @@
 
 use condyle_spatial::{Mat3, Motion, Scalar, Vec3};
 
-/// Velocity S q̇ or acceleration S q̈ of a joint in the body's frame, in the form with which computations are cheapest.
+/// Velocity S q̇ or acceleration S q̈ of a joint in the body's frame. Each kind of joint has the form with the fewest
+/// numbers.
 #[derive(Clone, Copy)]
 pub enum JointMotion<S> {
     /// Motion about z.
@@ -56,14 +57,14 @@ impl<S: Scalar> ClassicalMotion<S> {
 condyle_spatial::same_layout!(ClassicalMotion { w, dw, a });
 
 impl<S: Scalar> JointMotion<S> {
-    /// Returns all six numbers of the motion.
+    /// Returns the motion with all six components.
     #[inline(always)]
     fn motion(self) -> Motion<S> {
         Motion::zero() + self
     }
 
-    /// Returns the motion of a body: ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J. `self` is the motion
-    /// that the body would have without the joint. The joint's velocity and its acceleration aJ are given.
+    /// Returns the motion of a body: ω + ω_J, ω̇ + ω̇_J + ω × ω_J, a + a_J + (2 ω + ω_J) × v_J. `self` is the motion
+    /// that the body would have if the joint were fixed. The velocity and the acceleration aJ of the joint are given.
     #[inline(always)]
     pub fn added_to(
         self,

@@ -3,13 +3,13 @@
 use super::Joint;
 use alloc::vec::Vec;
 
-/// Joints that turn about z. They are collected once, so that passes need not inspect each joint.
+/// Joints that turn about z. These joints are collected once, so that a pass finds them without a test of every joint.
 #[derive(Clone, Debug, Default)]
 pub struct RevoluteAngles {
     /// Runs of consecutive joints with consecutive angles in q. Each run has its first joint, the index of this joint's
     /// angle, and the number of joints.
     pub(super) runs: Vec<[usize; 3]>,
-    /// Joints that follow others, so that their angles are computed from the angles of other joints.
+    /// Joints that follow other joints. Their angles are computed from the angles of these joints.
     pub(super) followers: Vec<usize>,
     /// Joints whose cosines and sines are stored in q.
     pub(super) circles: Vec<usize>,

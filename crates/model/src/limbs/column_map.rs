@@ -1,12 +1,13 @@
-//! Map of columns. It contains, for each step, the columns of other steps that share matrix entries with the columns of
-//! this step, and the indices of these entries.
+//! Map of columns. For each step, the map contains the columns of other steps that share matrix entries with the
+//! columns of this step. It also contains the indices of these entries.
 //!
-//! Usually, the ancestors of a step's bodies are in the same lanes as these bodies. But if a limb is attached to a body
-//! in another lane, this body and its ancestors are in that lane. Their columns are copied, once per call, to indices
-//! after all columns. Then all bodies of the limb find the columns that they need in their own lanes.
+//! Usually, the ancestors of a step's bodies are in the same lanes as these bodies. If a limb is attached to a body in
+//! another lane, this body and its ancestors are in that other lane. The columns of these ancestors are copied, once
+//! per call, to indices after all other columns. Then every body of the limb finds the columns that it needs in its own
+//! lane.
 //!
-//! Some data of a column change from body to body on the way from the root to the tips, such as the columns of the
-//! factor of M⁻¹. These data have a slot for each entry of the support.
+//! Some data of a column, such as the columns of the factor of M⁻¹, have a different value for each body between the
+//! root and the tips. Such data have a slot for each entry of the support.
 
 use super::LANES;
 use super::schedule::Schedule;
@@ -23,19 +24,19 @@ pub struct ColumnMap {
     pub support: Vec<LaneColumn>,
     /// Pairs of each column in `support` with the own columns of its step.
     pub pairs: Vec<Pair>,
-    /// Copies of columns, which are stored after the columns of all steps. For each copy, the sources and the changes
-    /// of lanes.
+    /// Copies of columns, which are stored after the columns of all steps. Each copy has its source columns, with the
+    /// moves between lanes.
     pub copies: Vec<Vec<(usize, Move)>>,
-    /// Predecessor of each entry of the support: the entry from which it gets its data, of the step before it on the
-    /// way from the root.
+    /// Predecessor of each entry of the support: the entry for the same column in the parent's step. Data are copied
+    /// from the predecessor.
     pub predecessors: Vec<Predecessor>,
-    /// Blocks of all columns. Each block consists of consecutive columns.
+    /// Partition of all columns into blocks of consecutive columns.
     pub blocks: Vec<ColumnBlock>,
-    /// Sizes of the matrices that contain Z.
+    /// Sizes of the matrices Z D⁻¹ and Zᵀ, where Z = L⁻¹.
     pub sizes: Sizes,
 }
 
-/// Column in each lane, on the path from the root to the joints of a step.
+/// Column of each lane, on the path from the root to the joints of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneColumn {
     /// Index of the column in arrays indexed by column.
@@ -45,8 +46,8 @@ pub struct LaneColumn {
     pub pair: usize,
 }
 
-/// Indices of the entries of a pair of columns in a matrix that is stored by columns, one index for each lane. In lanes
-/// without such a pair, the index points to an entry that the first lane sets after all other entries.
+/// Indices of the entries of a pair of columns in a matrix that is stored by columns, one index for each lane. In a
+/// lane without such a pair, the index refers to an entry that the first lane overwrites at the end.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     /// Index of the entry in the row of the step's own column.
@@ -59,11 +60,11 @@ pub struct Pair {
     pub in_Zt: [u32; LANES],
 }
 
-/// Entry, or entries, from which an entry of the support gets its data. These data change on the way from the root to
-/// the tips.
+/// Source of the data of a support entry, in the support of the parent's step. The data change from each body to its
+/// children.
 #[derive(Clone, Debug)]
 pub enum Predecessor {
-    /// One entry in the same lanes. For the step's own columns, it is the entry itself.
+    /// One entry, in the same lanes. For the columns of the step itself, the source is the entry itself.
     InPlace(usize),
     /// Several entries, or entries in other lanes.
     Moved(Vec<(usize, Move)>),
@@ -136,12 +137,12 @@ struct Ancestor {
     /// Lane in which the column is.
     lane: usize,
     coordinate: usize,
-    /// Entry of the support that the preceding step has for this column.
+    /// Entry for this column in the support of the parent's step.
     entry: usize,
 }
 
-/// Entry of the support that is not yet finished: the index of its column in arrays indexed by column, and the
-/// coordinate in each lane.
+/// Unfinished entry of the support: the index of its column in arrays indexed by column, and the coordinate of each
+/// lane.
 type Draft = (usize, [Option<usize>; LANES]);
 
 impl ColumnMap {
@@ -150,7 +151,8 @@ impl ColumnMap {
         let sizes = Sizes::new(tree);
         let (support, pairs, copies, predecessors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut map = Self { support, pairs, copies, predecessors, blocks: blocks(tree), sizes };
-        // The entry of the first body's last column with itself is set last, in the first lane.
+        // Lanes without a pair write to the diagonal entry of the first body's last column. The first lane sets this
+        // entry last.
         let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]);
         let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
         let unused = (last * (tree.nv + 1)) as u32;
@@ -220,7 +222,7 @@ impl ColumnMap {
                     Some(entry) => Predecessor::InPlace(entry),
                     None => Predecessor::Moved(moves(entries)),
                 });
-                // A column that is in all lanes is also in this lane.
+                // A column of the body that is in all lanes can be read from the own lane.
                 let in_all = |column: usize| schedule.shared && column < steps[1].joint.nv();
                 let columns = [0, 1, 2, 3]
                     .map(|lane| here[lane].map(|a| (a.column, if in_all(a.column) { lane } else { a.lane })));
@@ -234,15 +236,16 @@ impl ColumnMap {
     }
 }
 
-/// Returns the index from which all lanes read, if there is one such index and each lane reads from its own lane.
-/// `from` contains (index, lane) for each lane.
+/// Returns the index from which all lanes read, if the index is the same for all lanes and each lane reads from its own
+/// lane. `from` contains (index, lane) for each lane.
 fn in_place(from: [Option<(usize, usize)>; LANES]) -> Option<usize> {
     let (first, _) = from.iter().flatten().next()?;
     let stays = |(lane, from): (usize, &Option<(usize, usize)>)| from.is_none_or(|from| from == (*first, lane));
     from.iter().enumerate().all(stays).then_some(*first)
 }
 
-/// Returns the indices from which lanes read, and the changes of lanes. It is used if `in_place` returns `None`.
+/// Returns the indices from which lanes read, each with a move between lanes. This function is used if `in_place`
+/// returns `None`.
 fn moves(from: [Option<(usize, usize)>; LANES]) -> Vec<(usize, Move)> {
     let mut places: Vec<usize> = from.iter().flatten().map(|x| x.0).collect();
     places.sort_unstable();

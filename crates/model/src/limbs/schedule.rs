@@ -1,16 +1,16 @@
 //! Schedule of a pass: it assigns bodies to steps and lanes.
 //!
-//! The method is list scheduling. Each step takes up to four bodies whose parents are done, and prefers bodies with the
-//! longest path to a tip. It assigns each body to the lane of its parent; if there is time, a body waits until this
-//! lane is free. If one body carries all others, this body is in all lanes. Each lane sums up the forces of its own
-//! limbs on this body.
+//! The method is list scheduling. Each step takes up to four bodies whose parents are in earlier steps. Bodies with the
+//! longest path to a tip come first. A body is assigned to the lane of its parent. If the lane is occupied, the body
+//! waits for it, unless waiting would add steps. If one body carries all other bodies, this body is in all lanes. Each
+//! lane then sums the forces of its own limbs on this body.
 
 use super::LANES;
 use crate::tree::Node;
 use alloc::vec::Vec;
 
-/// Minimum number of bodies per step, including the world, with which parallel lanes are faster. Two legs with six
-/// joints each under one trunk just reach this number.
+/// Minimum number of bodies per step, including the world, for which parallel lanes are faster. A trunk with two legs
+/// of six joints each has just this number.
 const WORTH: usize = 2;
 
 /// Bodies of each step, and the step of each body.
@@ -27,15 +27,16 @@ pub(super) struct Schedule {
 impl Schedule {
     /// Creates the schedule for a robot. Returns `None` if the robot has too few limbs.
     pub(super) fn new(nodes: &[Node<f64>]) -> Option<Self> {
-        // The first schedule serves bodies with the longest paths first, which determines the number of steps. In the
-        // second schedule, bodies wait for a lane if there is time.
+        // The first schedule treats all bodies as urgent, which determines the number of steps. In the second schedule,
+        // bodies may wait for the lane of their parent if the number of steps stays the same.
         let hasty = Self::until(nodes, 0);
         let patient = Self::until(nodes, hasty.bodies.len() - 1);
         let schedule = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
         (nodes.len() >= WORTH * (schedule.bodies.len() - 1)).then_some(schedule)
     }
 
-    /// Creates a schedule. Bodies that cannot wait, if `last` is to be the last step, are served first.
+    /// Creates a schedule. If waiting would delay a body's subtree beyond step `last`, the body is urgent. Urgent
+    /// bodies are assigned first.
     fn until(nodes: &[Node<f64>], last: usize) -> Self {
         let n = nodes.len();
         let mut children = vec![Vec::new(); n];
@@ -87,7 +88,7 @@ impl Schedule {
         schedule
     }
 
-    /// Returns whether a step has the same body in all lanes: the world, or the one body that carries all others.
+    /// Returns whether a step has the same body in all lanes: the world, or the body that carries all other bodies.
     #[inline(always)]
     pub(super) fn in_all_lanes(&self, step: usize) -> bool {
         step == 0 || (step == 1 && self.shared)

@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 
-/// Step of a pass: four bodies in lanes. Data in lanes come first, so that no vector crosses a cache line.
+/// Step of a pass: four bodies in lanes. The fields with lanes come first, so that no vector crosses a cache line.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Step {
@@ -22,11 +22,11 @@ pub struct Step {
     pub joint: Joint,
     /// Indices of the bodies; 0 means an empty lane.
     pub bodies: [usize; LANES],
-    /// Index of the first number of the bodies' positions, in arrays of lanes.
+    /// Index, in arrays of lanes, at which the positions of the step's joints begin.
     pub idx_q: usize,
-    /// Index of the first number of the bodies' velocities, in arrays of lanes.
+    /// Index, in arrays of lanes, at which the velocities of the step's joints begin.
     pub idx_v: usize,
-    /// Steps and lanes in which the parents of the bodies are.
+    /// Steps and lanes of the parents of the bodies.
     pub parents: Parents,
     /// Range (first, end) in `ColumnMap::support` of the columns from the root to the joints of the step.
     pub support: (usize, usize),
@@ -41,35 +41,35 @@ pub enum Parents {
     InPlace(usize),
     /// Several steps contain the parents, or the parents are in other lanes.
     Moved {
-        /// Steps from which data are read, and the changes of lanes.
+        /// Steps from which data of the parents are read, with the moves between lanes.
         from: Vec<(usize, Move)>,
-        /// Steps to which data are added, and the changes of lanes.
+        /// Steps to which data for the parents are added, with the moves between lanes.
         to: Vec<(usize, Move)>,
     },
 }
 
-/// Indices from which the four numbers of a position or a velocity are read. Each number is a number of the robot times
-/// `ratio`, plus `offset`.
+/// Indices from which the four lanes of a position or a velocity are read. The value of a lane is an entry of q or v
+/// times `ratio`, plus `offset`.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
-    /// Indices in the robot's q or v. In a lane without a joint, it is the index after the last number.
+    /// Indices in the robot's q or v. In a lane without a joint, the index is the length of q or v.
     pub from: [usize; LANES],
-    /// Ratios of joints that follow others; otherwise 1.
+    /// Ratios of joints that follow other joints; 1 for all other joints.
     pub ratio: [f64; LANES],
-    /// Offsets of joints that follow others; otherwise 0.
+    /// Offsets of joints that follow other joints; 0 for all other joints.
     pub offset: [f64; LANES],
 }
 
-/// Indices from which numbers in lanes are read, and to which they are written.
+/// Indices from which positions and velocities are read into lanes, and to which results in lanes are written.
 #[derive(Clone, Debug)]
 pub struct StateMap {
     /// Sources of the positions of all steps.
     pub positions: Vec<Source>,
     /// Sources of the degrees of freedom of all steps.
     pub coordinates: Vec<Source>,
-    /// For each coordinate, the index of its number in arrays of lanes.
+    /// Index of each coordinate in arrays of lanes.
     pub leaders: Vec<usize>,
-    /// Joints that follow others, each with its coordinate, the index of its number in arrays of lanes, and its ratio.
+    /// Joints that follow other joints, each with its coordinate, its index in arrays of lanes, and its ratio.
     pub followers: Vec<(usize, usize, f64)>,
 }
 
@@ -117,7 +117,7 @@ impl StateMap {
     fn add(&mut self, tree: &Tree<f64>, schedule: &Schedule, s: usize, joint: Joint) {
         let bodies = schedule.bodies[s];
         let mut neutral = vec![0.0; joint.nq()];
-        joint.neutral(&mut neutral); // for lanes without a joint
+        joint.neutral(&mut neutral); // lanes without a joint have this position
         let mimics = bodies.map(|i| tree.nodes[i].mimic);
         let ratio = mimics.map(|m| m.map_or(1.0, |m| m.ratio));
         for (k, neutral) in neutral.into_iter().enumerate() {
@@ -160,7 +160,8 @@ fn parents(tree: &Tree<f64>, schedule: &Schedule, s: usize) -> Parents {
         let mut pairs: Vec<_> =
             at.iter().filter(|(_, (s, _))| *s == source).map(|(lane, (_, its))| (*its, *lane)).collect();
         from.push((source, Move::new(&pairs)));
-        // In passes towards the root, two lanes must not be added to the same lane at once.
+        // In passes towards the root, one move must not add two lanes to the same lane. So such lanes are put into
+        // separate moves.
         while !pairs.is_empty() {
             let (mut now, mut later) = (Vec::<(usize, usize)>::new(), Vec::new());
             for (its, lane) in pairs {

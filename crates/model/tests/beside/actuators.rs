@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Compares the limits with the extremes of MuJoCo's `qfrc_actuator` at rest, over all controls.
+/// Compares the limits of effort with the minimum and maximum of MuJoCo's `qfrc_actuator` at rest, over all controls.
 #[test]
 fn actuators_limit_effort() {
     const INF: f64 = f64::INFINITY;
@@ -43,7 +43,7 @@ fn actuators_limit_effort() {
         assert_eq!(effort(&driven(joint, actuators)), expected, "{actuators}");
     }
     let none = model("", HINGE, "");
-    assert_eq!(effort(&none), [-INF, INF]); // without an actuator
+    assert_eq!(effort(&none), [-INF, INF]); // no actuator limits the effort
     let off = model(
         "<option><flag clampctrl='disable'/></option>",
         HINGE,
@@ -52,8 +52,8 @@ fn actuators_limit_effort() {
     assert_eq!(effort(&off), [-INF, INF]);
 }
 
-/// Compares with MuJoCo's `qfrc_actuator`. The force of an actuator on a tendon is clipped to the tendon's range, then
-/// to the actuator's range.
+/// Compares the limits of effort for actuators on tendons with MuJoCo's `qfrc_actuator`. The force of such an actuator
+/// is clipped to the tendon's range, then to the actuator's range.
 #[test]
 fn tendons_limit_effort() {
     let tendon = "<tendon><fixed name='t' actuatorfrcrange='-3 3'><joint joint='j' coef='-2'/></fixed></tendon>";
@@ -63,7 +63,7 @@ fn tendons_limit_effort() {
     assert_eq!(effort(&found), [-32.0, 12.0]);
     let Transmission::Tendon { name, joints } = &found.actuators()[1].transmission else { panic!() };
     assert_eq!((name.as_str(), &joints[..]), ("t", &[(1, -2.0)][..]));
-    assert_eq!(found.actuators()[1].force, (-3.0, 3.0)); // `actuator_force` stays in this range, whatever the gear
+    assert_eq!(found.actuators()[1].force, (-3.0, 3.0)); // range of `actuator_force`, for any gear
     assert!(said(&found).is_empty());
     let shared =
         model("", joint, &format!("{tendon}<actuator>{}</actuator>", "<motor tendon='t' ctrlrange='-9 9'/>".repeat(2)));
@@ -73,7 +73,8 @@ fn tendons_limit_effort() {
     assert_eq!(said(&shared), [format!("<string>:1: fixed `t`: {what}")]);
 }
 
-/// In a ball joint, the gear of an actuator is an axis. A free joint has limits only along the axes of its body.
+/// Checks actuators of ball joints, whose gear is an axis, and of free joints, whose limits of effort are only along
+/// the axes of the body.
 #[test]
 fn balls_and_free_joints() {
     let ball = driven("<joint name='j' type='ball'/>", "<motor joint='j' gear='1 -2 0' ctrlrange='-3 4'/>");
@@ -89,11 +90,11 @@ fn balls_and_free_joints() {
     assert!(parent.actuators().is_empty());
 }
 
-/// Compares the laws with MuJoCo's `actuator_gainprm` and `actuator_biasprm`.
+/// Compares the force laws of actuators with MuJoCo's `actuator_gainprm` and `actuator_biasprm`.
 #[test]
 fn laws_of_actuators() {
     let cases = [
-        // gain, bias, kp, kv
+        // the expected numbers are gain, bias, kp and kv
         ("<motor joint='j'/>", [1.0, 0.0, 0.0, 0.0]),
         ("<position joint='j'/>", [1.0, 0.0, 1.0, 0.0]),
         ("<position joint='j' kp='100' kv='10'/>", [100.0, 0.0, 100.0, 10.0]),
@@ -124,9 +125,10 @@ fn laws_of_actuators() {
     assert_eq!(site.frames()[frame].name, "s");
 }
 
-/// Compares with MuJoCo's `actuator_gainprm`, `actuator_biasprm`, `actuator_gear` and `actuator_ctrlrange`, for
-/// elements without their own numbers. A kind inherits its law from the innermost class whose last default has the same
-/// kind or is `<general>`. It inherits all other attributes from any class.
+/// Compares inherited parameters with MuJoCo's `actuator_gainprm`, `actuator_biasprm`, `actuator_gear` and
+/// `actuator_ctrlrange`, for actuators that specify no parameters. An actuator inherits its force law from the
+/// innermost class whose last default has the same kind or is `<general>`. All other attributes are inherited from any
+/// class.
 #[test]
 fn classes_of_actuators() {
     let servo = "<position kp='100' kv='10'/>";
@@ -158,7 +160,7 @@ fn classes_of_actuators() {
         let a = &found.actuators()[0];
         close(&[a.gain, a.bias, a.kp, a.kv], &expected);
     }
-    // a list of numbers may be shorter than the list in the class
+    // a list of numbers in an element may be shorter than the list in its class
     let shared = "<default><motor gear='5 0 1' ctrlrange='-1 1' armature='0.1'/></default>";
     let found = model(shared, HINGE, "<actuator><position joint='j' gear='2'/></actuator>");
     assert_eq!(found.actuators()[0].gear, [2.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
@@ -167,7 +169,8 @@ fn classes_of_actuators() {
     let found = model(joints, "<joint name='j' axis='0 1 0' stiffness='7' damping='8'/>", "");
     assert_eq!((found.springs()[0].stiffness, found.damping()), ([7.0, 2.0, 3.0], &[8.0][..]));
     assert_eq!(found.damping_polynomial(), [[5.0, 6.0]]);
-    // the list in a nested class may be shorter, too; an attribute with an empty value is treated as missing
+    // a list in a nested class may be shorter than the list in the outer class, and an empty attribute is treated as
+    // missing
     let nested = |outer: &str, inner: &str, own: &str| {
         let class = format!("<default class='y'><joint {inner}/></default>");
         let before = format!("<default><default class='x'><joint {outer}/>{class}</default></default>");
@@ -179,12 +182,13 @@ fn classes_of_actuators() {
     assert_eq!(damping(&nested("damping='2 3 4'", "damping='5 6'", "damping='7'")), (7.0, [6.0, 4.0]));
     assert_eq!(nested("armature='0.3'", "armature=''", "armature=' '").armature(), [0.3]);
     assert_eq!(nested("range='-1 1'", "range=''", "").limits().upper, [1f64.to_radians()]);
-    // the square of this gear is infinite, so the actuator adds neither damping nor armature
+    // the square of the gear is infinite, so the actuator adds neither damping nor armature
     let found = driven(HINGE, "<motor joint='j' gear='1e300'/>");
     assert_eq!((found.damping(), found.armature()), (&[0.0][..], &[0.0][..]));
 }
 
-/// Compares with MuJoCo's `mj_fullM` and `qfrc_damper`: armature and damping of an actuator are multiplied by gear².
+/// Compares M and damping forces with MuJoCo's `mj_fullM` and `qfrc_damper`: armature and damping of an actuator are
+/// multiplied by gear².
 #[test]
 fn armature_and_damping_of_actuators() {
     let found = driven(
@@ -213,7 +217,8 @@ fn armature_and_damping_of_actuators() {
     close(found.damping_polynomial().as_flattened(), &[8.0 * 200.0, 16.0 * 300.0]);
 }
 
-/// Every effect that a model cannot represent causes a warning with the element and the effect.
+/// Checks that every effect of an actuator that a model cannot represent causes a warning with the element and the
+/// effect.
 #[test]
 fn lost_features_of_actuators_warn() {
     let cases = [

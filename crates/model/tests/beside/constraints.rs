@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Compares with MuJoCo's `eq_data`: anchors in body1 and body2, and the relative orientation.
+/// Compares constraints with MuJoCo's `eq_data`: anchors in body1 and body2, and the relative orientation.
 #[test]
 fn loops_and_couplings() {
     let text = "<mujoco><worldbody><body name='a' pos='1 2 3' quat='1 2 3 4'><joint name='p' axis='0 1 0' ref='15' pos='.1 .2 .3'/>
@@ -45,7 +45,7 @@ fn loops_and_couplings() {
     let [first, second] = placed(2, ["a", "world"]);
     close(&place(first), &[0.1, 0.2, 0.3]);
     close(&place(second), &[0.3, 0.2, 0.1]);
-    // with `torquescale` 0, the rotation is free
+    // with `torquescale` 0, a weld does not constrain the rotation
     assert!(matches!(found.constraints()[2].kind, ModelConstraintKind::Point { .. }));
     for X in placed(4, ["u", "v"]) {
         close(&place(X), &[0.0; 3]);
@@ -64,13 +64,13 @@ fn loops_and_couplings() {
     };
     assert_eq!(coefficients, [0.25, 0.0, 0.0, 0.0, 0.0]);
     let kinds: Vec<_> = found.warnings().iter().map(|warning| warning.kind()).collect();
-    assert_eq!(kinds, [WarningKind::Mimic, WarningKind::LeftOut]); // nothing enforces the couplings
+    assert_eq!(kinds, [WarningKind::Mimic, WarningKind::LeftOut]); // the couplings are not enforced
     // both bodies of the constraint are merged into one body of the model
     let held = model("", &format!("{HINGE}<body name='c'/>"), "<equality><weld body1='b' body2='c'/></equality>");
     assert_eq!(said(&held), ["<string>:1: <weld>: both ends are fixed to one body, which no constraint can move"]);
 }
 
-/// In a chain of followers, all followers have the same leader. A circle of followers becomes a constraint.
+/// Checks that all followers in a chain get the same leader, and that a circle of followers becomes a constraint.
 #[test]
 fn followers_of_followers() {
     let ball = "<geom size='0.1'/>";
@@ -108,7 +108,8 @@ fn followers_of_followers() {
     assert_eq!(said(&constant), [format!("<string>:1: joint `e`: {what}")]);
 }
 
-/// With x = 2 q + 0.1, the range of x from −20° to 60° is the range of q from −0.2245 to 0.4736.
+/// Checks that the range of a follower limits its leader. With x = 2 q + 0.1, the range of x from −20° to 60° is the
+/// range of q from −0.2245 to 0.4736.
 #[test]
 fn ranges_of_followers() {
     let text = "<mujoco><worldbody><body><joint name='a'/><geom size='1'/></body><body><joint name='b' range='-20 60'/>
@@ -118,7 +119,8 @@ fn ranges_of_followers() {
     close(&[found.limits().lower[0], found.limits().upper[0]], &ends);
 }
 
-/// Compares with MuJoCo's `key_qpos`, and with `mj_objectVelocity` along the body's axes.
+/// Compares the positions of keyframes with MuJoCo's `key_qpos`, and their velocities with `mj_objectVelocity` along
+/// the body's axes.
 #[test]
 fn keyframes() {
     let ball = "<geom size='0.1'/>";
@@ -140,7 +142,7 @@ fn keyframes() {
     let refused = |keys: &str, expected: &str| assert_eq!(read(&text(keys)).unwrap_err().to_string(), expected);
     refused("<key qpos='1 2'/>", "<string>:2: <key>: qpos: expected 12 numbers, found 2");
     refused("<key name='k' qvel='1'/>", "<string>:2: key `k`: qvel: expected 10 numbers, found 1");
-    // as in MuJoCo, a list may contain only the numbers of the first joints
+    // as in MuJoCo, a list may be shorter and contain only the coordinates of the first joints
     let short = read(&text("<key name='k' qpos='1 2 3 2 0 0 2' qvel='0 0 0 0 0 1'/>")).unwrap();
     close(&short.keyframes()[0].q, &[1.0, 2.0, 3.0, 0.0, 0.0, half, half, 0.0, 0.0, 0.0, 1.0, 0.25]);
     close(&short.keyframes()[0].v, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
@@ -156,8 +158,8 @@ fn keyframes() {
     assert_eq!((&found.keyframes()[0].q[..], &found.keyframes()[0].v[..]), (&[2.0][..], &[4.0][..]));
 }
 
-/// Compares with MuJoCo's `key_ctrl` and `key_act`. The controls are at `actuator_ctrladr` 0, 1, 2, 4, 5, 6, 8, 9, 12.
-/// The activations of integrators are at `actuator_actadr` 0 and 5.
+/// Compares the controls of keyframes with MuJoCo's `key_ctrl` and `key_act`. The controls are at `actuator_ctrladr` 0,
+/// 1, 2, 4, 5, 6, 8, 9, 12. The activations of integrators are at `actuator_actadr` 0 and 5.
 #[test]
 fn controls_of_keyframes() {
     let text = |actuators: &str, keys: &str| {

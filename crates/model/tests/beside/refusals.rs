@@ -78,7 +78,7 @@ fn errors() {
     }
 }
 
-/// A file whose content is multiplied beyond a limit is refused at once.
+/// Checks that a file is refused at once if its parts refer to each other so often that their product exceeds a limit.
 #[test]
 fn limits_of_multiplied_content() {
     let keys = format!("<keyframe>{}</keyframe>", "<key/>".repeat(300_000));
@@ -97,7 +97,7 @@ fn limits_of_multiplied_content() {
     assert_eq!(said, format!("<string>:1: <motor>: {what}"));
 }
 
-/// When a robot is changed, its springs, actuators, constraints and keyframes stay with their bodies and joints.
+/// Checks that springs, actuators, constraints and keyframes stay with their bodies and joints when a robot is changed.
 #[test]
 fn models_that_are_changed() {
     let ball = "<geom size='0.1'/>";
@@ -130,8 +130,8 @@ fn models_that_are_changed() {
     assert_eq!(carried(&two, 1), carried(&found, 0));
 }
 
-/// Compares with MuJoCo's `qfrc_actuator` at the positions 0.3 and 0.4 and the control 0.9. The locked joint keeps its
-/// share of the tendon's length 1.0.
+/// Compares the force on a tendon over a locked joint with MuJoCo's `qfrc_actuator`, at the positions 0.3 and 0.4 and
+/// the control 0.9. The locked joint still contributes to the tendon's length 1.0.
 #[test]
 fn a_locked_joint_of_a_tendon() {
     let text =
@@ -150,7 +150,8 @@ fn a_locked_joint_of_a_tendon() {
     }
 }
 
-/// A locked follower holds its leader if the polynomial is linear. Otherwise, there is a warning. Other warnings stay.
+/// Checks that a locked follower fixes its leader if the polynomial is linear, and that other polynomials cause a
+/// warning. All other warnings are kept.
 #[test]
 fn a_locked_joint_of_a_coupling() {
     let text = |equality: &str| {
@@ -181,7 +182,8 @@ fn a_locked_joint_of_a_coupling() {
     assert_eq!(both.warnings().len(), 4);
 }
 
-/// The user does not see the text of a compiled model, so errors and warnings about this text have no line number.
+/// Checks that errors and warnings about the text of a compiled model have no line number, because the user does not
+/// know this text.
 #[test]
 fn a_text_without_lines() {
     let text = one("", "<joint name='j' dampng='1'/>", "");

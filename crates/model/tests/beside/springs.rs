@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Compares with MuJoCo's `jnt_stiffness`, `qpos_spring` and `dof_damping`.
+/// Compares springs and damping of joints with MuJoCo's `jnt_stiffness`, `qpos_spring` and `dof_damping`.
 #[test]
 fn springs_of_joints() {
     let found = model("", "<joint axis='0 1 0' stiffness='5 1 2' springref='10' ref='30' damping='3 1 2'/>", "");
@@ -22,9 +22,9 @@ fn springs_of_joints() {
     assert_eq!(found.damping_polynomial(), [[1.0, 2.0]]);
 }
 
-/// Compares with MuJoCo's `jnt_stiffness`, `dof_damping` and `actuator_biasprm`, for robots whose joints carry other
-/// joints. The inertia is the inverse of J M⁻¹ Jᵀ, with the rotors of joints and tendons, in the initial configuration
-/// of the file.
+/// Compares springs and gains that depend on inertia with MuJoCo's `jnt_stiffness`, `dof_damping` and
+/// `actuator_biasprm`. In these robots, joints carry other joints. The inertia is the inverse of J M⁻¹ Jᵀ, with the
+/// rotors of joints and tendons, in the initial configuration of the file.
 #[test]
 fn springs_and_gains_from_inertia() {
     let text = format!(
@@ -62,8 +62,8 @@ fn springs_and_gains_from_inertia() {
     close(&rest[3..], &[0.02980901962620916, 0.34071865342161006, 0.08189960831908934, 0.9361168066628592]);
 }
 
-/// Compares with MuJoCo's `qfrc_spring`, `qfrc_damper` and `ten_length`. A tendon over one joint is a spring, a damper
-/// and a limit of this joint.
+/// Compares tendons with MuJoCo's `qfrc_spring`, `qfrc_damper` and `ten_length`. A tendon over one joint is a spring, a
+/// damper and a limit of this joint.
 #[test]
 fn tendons_over_one_joint() {
     let fixed = |attributes: &str| {
@@ -82,7 +82,7 @@ fn tendons_over_one_joint() {
         -(found.damping()[0] + found.damping_polynomial()[0][0] * v + found.damping_polynomial()[0][1] * v * v) * v
     };
     close(&[d(0.7)], &[-27.104]);
-    // by default, the tendon's spring is at rest where the joint's spring is at rest
+    // by default, the rest length of the tendon's spring is its length at the rest position of the joint's spring
     let found = model("", "<joint name='j' axis='0 1 0' springref='20'/>", &fixed("stiffness='3'"));
     close(&found.springs()[0].rest, &[0.3490658503988659]);
     let found = model("", HINGE, &fixed("range='-1 0.5'"));
@@ -100,7 +100,8 @@ fn tendons_over_one_joint() {
     assert_eq!(said(&slack), [format!("<string>:1: fixed `t`: {what}")]);
 }
 
-/// Compares with MuJoCo's `mj_fullM`. Only effects that the diagonal of M cannot represent cause warnings.
+/// Compares M with MuJoCo's `mj_fullM`, for tendons over several joints. Only effects that the diagonal of M cannot
+/// represent cause warnings.
 #[test]
 fn tendons_over_several_joints() {
     let text = |first: &str, second: &str, attributes: &str| {
@@ -147,10 +148,10 @@ fn weight_is_compensated() {
         compensation.carried(model.bodies()[1].inertia)
     };
     assert_eq!(carried(&found).mass, 5.0);
-    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 · (0.1, 0, 0) + 0.5 · 2 · (0.1, 0, 1)
+    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 kg at (0.1, 0, 0), 0.5 · 2 kg at (0.1, 0, 1)
     let scaled = read(&text.replace("<worldbody>", "<compiler settotalmass='12'/><worldbody>")).unwrap();
     close(&[carried(&scaled).mass], &[10.0]);
-    // as in MuJoCo, a negative `gravcomp` acts only if another one is positive
+    // as in MuJoCo, a negative `gravcomp` acts only if another `gravcomp` is positive
     let negative = text.replace("gravcomp='0.5'", "gravcomp='-0.5'");
     close(&[carried(&read(&negative).unwrap()).mass], &[3.0]);
     let alone = read(&negative.replace("gravcomp='2'", "").replace("gravcomp='1'", "")).unwrap();
@@ -164,7 +165,7 @@ fn weight_is_compensated() {
     assert_eq!(said(&found), [format!("<string>:1: joint `j`: {what}")]);
 }
 
-/// Compares with MuJoCo's `qfrc_passive`, and tests the effect of `disable` on forces and limits.
+/// Compares passive forces with MuJoCo's `qfrc_passive`, and checks the effect of `disable` on forces and limits.
 #[test]
 fn switches() {
     let joint = "<joint name='j' axis='0 1 0' stiffness='1' damping='2' frictionloss='3' range='-10 10'/>";
@@ -182,7 +183,7 @@ fn switches() {
     assert_eq!((on.gravity_compensation().len(), on.armature()[0]), (1, 0.1));
     assert!(flag(&["spring"]).springs().is_empty());
     assert_eq!(flag(&["damper"]).damping(), [0.0]);
-    assert_eq!(flag(&["spring", "damper"]).gravity_compensation(), []); // MuJoCo then has no passive force at all
+    assert_eq!(flag(&["spring", "damper"]).gravity_compensation(), []); // without both, MuJoCo has no passive force
     assert_eq!(flag(&["frictionloss"]).friction(), [0.0]);
     assert_eq!(flag(&["limit"]).limits().upper, [f64::INFINITY]);
     assert!(flag(&["equality"]).constraints().is_empty());
@@ -195,8 +196,8 @@ fn switches() {
     }
 }
 
-/// `gravcomp` is a ratio in MuJoCo: if its masses are doubled, `body_mass · body_gravcomp` is doubled, too. A part of
-/// the body with another ratio keeps this ratio.
+/// Checks that the compensated weight changes with the inertia. In MuJoCo, `gravcomp` is a ratio: if masses are
+/// doubled, `body_mass · body_gravcomp` is doubled, too. A part of the body with another ratio keeps this ratio.
 #[test]
 fn compensation_follows_the_inertia() {
     let text = format!(
@@ -210,7 +211,7 @@ fn compensation_follows_the_inertia() {
         [carried.mass, carried.mass_com.x, carried.mass_com.y, carried.mass_com.z]
     };
     close(&carried(&found), &[1.0, 0.1, 0.0, 0.0]); // 0.5 · 2 kg at (0.1, 0, 0)
-    // the moving link has 4 kg more at its centre, as `write_mjcf` writes it
+    // 4 kg are added at the centre of the moving link, to which `write_mjcf` writes the difference
     let more = Inertia::from_com(4.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.1));
     let heavier = found.with_inertias(|i, I| if i == 1 { I + more } else { I }).unwrap();
     close(&carried(&heavier), &[3.0, 0.3, 0.0, 0.0]); // 0.5 · 6 kg
@@ -220,7 +221,8 @@ fn compensation_follows_the_inertia() {
     heavier.write_mjcf(&path, &path).unwrap();
     let written = Model::from_mjcf(&path, &MjcfOptions::default()).unwrap();
     close(&carried(&written), &carried(&heavier));
-    // without the rest of the inertia, the part has no inertia either, and the compensated mass changes
+    // with a smaller inertia, the whole inertia is written to the moving link, so the part loses its inertia and the
+    // compensated mass changes
     let light = found.with_inertias(|i, I| if i == 1 { I.scale(0.3) } else { I }).unwrap();
     let said = light.write_mjcf(&path, &path).unwrap_err().to_string();
     let what = "cannot be written, for its links have different ratios: the file gives";
@@ -228,7 +230,8 @@ fn compensation_follows_the_inertia() {
     std::fs::remove_file(path).unwrap();
 }
 
-/// A locked body keeps its own ratio, and so does the base of a robot that is attached to another robot.
+/// Checks that a locked body keeps its own ratio of compensated weight. The base of a robot that is attached to another
+/// robot also keeps its ratio.
 #[test]
 fn compensation_of_merged_bodies() {
     let text = |ratio: [&str; 2]| {

@@ -1,4 +1,4 @@
-//! Tests of MJCF: files in files, and copies of parts of a tree.
+//! Tests of MJCF: included and attached files, and copies of parts of a tree.
 
 use super::*;
 
@@ -21,12 +21,12 @@ fn replicas_turn_and_move_on() {
     ]) {
         near(&body.name, &flat(&body.placement), &expected, 1e-12);
     }
-    // suffixes of inner copies come first, and a suffix has as many digits as the count
+    // the suffix of an inner copy comes first, and a suffix has the same number of digits as the count
     let nested = replicate("count='2'", &replicate("count='10' sep='_'", LINK));
     assert_eq!(names(&model("", &nested, ""))[..2], ["b_000", "b_010"]);
     assert_eq!(names(&model("", &nested, ""))[19], "b_091");
     assert_eq!(names(&model("", &replicate("count='0'", LINK), "")), [""; 0]);
-    // elements without a name stay without a name
+    // copies of elements without a name have no name
     let class = "<default><default class='c'><joint armature='3'/></default></default>";
     let unnamed = model(class, &replicate("count='2' childclass='c'", "<body><joint/><geom size='0.1'/></body>"), "");
     assert_eq!((names(&unnamed), unnamed.armature()), (vec!["body1", "body2"], &[3.0, 3.0][..]));
@@ -41,7 +41,7 @@ fn elements_that_refer_to_a_replica_are_copied() {
         <motor name='n' joint='k'/><motor name='o' tendon='t'/></actuator>";
     let actuators = model("", &tree, after);
     let actuators: Vec<_> = actuators.actuators().iter().map(|a| a.name.as_str()).collect();
-    assert_eq!(actuators, ["n", "m0", "o0", "m1", "o1"]); // in MuJoCo's order
+    assert_eq!(actuators, ["n", "m0", "o0", "m1", "o1"]); // the same order as in MuJoCo
     let mixed = "<equality><joint joint1='j' joint2='k'/></equality>";
     assert!(refused("", &tree, mixed).contains("joint1: no joint is named `j`"));
 }
@@ -116,7 +116,7 @@ fn attached_files_keep_their_own_settings() {
     let model = attached("<attach model='c' body='d' prefix='x-'/>").unwrap();
     assert_eq!(names(&model), ["b", "x-d", "x-e"]);
     let masses: Vec<_> = model.bodies()[1..].iter().map(|b| b.inertia.mass).collect();
-    assert_eq!(masses, [2.0, 0.5, 1.0]); // bounded by the settings of the attached file
+    assert_eq!(masses, [2.0, 0.5, 1.0]); // limited by the settings of the attached file
     assert_eq!((model.limits().lower[1], model.limits().upper[1]), (-1.0, 1.0));
     assert_eq!((model.damping(), model.armature()), (&[0.0, 0.5, 0.5][..], &[9.0, 0.0, 2.0][..]));
     near("place", &flat(&model.bodies()[2].placement)[..4], &[0.0, 1.0, 0.0, 0.0], 1e-12);

@@ -1,10 +1,10 @@
-//! Errors of a file with its name, line and element; warnings; files that include others.
+//! Tests of MJCF: errors with file, line and element, warnings, and included files.
 
 use super::read;
 use condyle_model::{Error, MjcfOptions, Model, Vec3, Warning};
 use std::path::PathBuf;
 
-/// Returns the path of a file that the tests of dynamics read too.
+/// Returns the path of a file that the tests of the crate `dynamics` also read.
 fn data(file: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../dynamics/tests/data").join(file)
 }
@@ -57,12 +57,12 @@ fn arm_has_what_its_classes_say() {
     let names: Vec<&str> = arm.bodies().iter().skip(1).map(|b| b.joint_name.as_str()).collect();
     assert_eq!(names, ["pan", "lift", "elbow", "body4_joint", "wrist"]);
     assert_eq!(arm.bodies()[1].name, "shoulder#1");
-    assert_eq!(arm.limits().effort()[0], 1.0); // ±1 by its motor, ±40 by the joint
+    assert_eq!(arm.limits().effort()[0], 1.0); // the limit of the motor is ±1, of the joint ±40
     assert_eq!(arm.friction(), [0.05; 7]);
     assert_eq!(*arm.gravity(), Vec3::new(0.3, -0.2, -9.7));
     assert_eq!(arm.frames()[arm.frame("bracket").unwrap()].body, 4);
     let [Warning::LeftOut { element, what, .. }] = arm.warnings() else { panic!("{:?}", arm.warnings()) };
-    assert!(element == "joint `wrist`" && what.starts_with("range: the limit of 1.39")); // a ball joint
+    assert!(element == "joint `wrist`" && what.starts_with("range: the limit of 1.39")); // `wrist` is a ball joint
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn errors_name_file_line_and_element() {
     assert!(matches!(missing, Error::File { .. }));
 }
 
-/// An error in an included file reports that file's name.
+/// Checks that an error in an included file contains the name of the included file.
 #[test]
 fn includes() {
     let folder = std::env::temp_dir().join(format!("condyle-mjcf-{}", std::process::id()));
@@ -131,7 +131,8 @@ fn what_is_left_out_is_said() {
     assert!(matches!(strict, Error::Strict { .. }));
 }
 
-/// A mesh without an <inertial> element is rejected, or is left out if an option asks for it.
+/// Checks a mesh that cannot be read, in a body without an <inertial>: it is an error, or it has no mass if the option
+/// `weightless_meshes` is set.
 #[test]
 fn meshes_weigh_nothing_if_asked() {
     let text = body(&format!("<joint/>{BALL}<geom name='cover' type='mesh' mesh='m'/><geom type='mesh' mass='0'/>"));

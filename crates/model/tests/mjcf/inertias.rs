@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Tolerance for meshes: MuJoCo computes their principal axes only up to 1e-7.
+/// Tolerance for meshes: MuJoCo computes the principal axes of a mesh only up to 1e-7.
 const MESH: f64 = 1e-7;
 
 /// Returns an MJCF with a dented mesh, and a body with this mesh.
@@ -193,8 +193,8 @@ fn files_of_meshes() {
     }
 }
 
-/// Compares with `body_mass` and `body_ipos` of MuJoCo 4.0.0. If the face were cut as a fan from its first corner, the
-/// mass would be 17500 kg.
+/// Compares the mass of a mesh with faces of five corners with `body_mass` and `body_ipos` of MuJoCo 4.0.0. If the face
+/// were cut as a fan from its first corner, the mass would be 17500 kg.
 #[test]
 fn faces_of_five_corners_that_are_in_no_plane() {
     let mut obj = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\n".to_owned();
@@ -232,8 +232,8 @@ fn invalid_meshes() {
     let inside_out = mesh("inertia='exact' scale='1 1 1'", "type='mesh'", "").replace("0 2 1  0 1 3", "0 1 2  0 3 1");
     let inside_out = inside_out.replace("0 3 2  1 2 4  2 3 4  3 1 4", "0 2 3  1 4 2  2 4 3  3 4 1");
     assert!(read(&inside_out).unwrap_err().to_string().contains("is negative: its triangles are inside out"));
-    // a body with an invalid mesh can be read if it is fixed to the world, and a body with an <inertial> does not need
-    // its mesh
+    // an invalid mesh is accepted in a body that is fixed to the world; a body with an <inertial> does not need its
+    // mesh
     let fixed = model(flat, "<body name='w'><geom type='mesh' mesh='m'/></body>", "");
     assert!(said(&fixed, WarningKind::LeftOut)[0].contains("the mass of a mesh on body `w` is left out"));
     assert_eq!(model(flat, &body("", "<geom type='mesh' mesh='m'/>"), "").warnings(), []);
@@ -253,7 +253,8 @@ fn bodies_fixed_to_the_world_have_mass() {
     assert_eq!(model(field, "<body><joint/><geom type='hfield' hfield='h'/></body>", "").total_mass(), 44000.0);
 }
 
-/// MuJoCo refuses such a body if it moves: "mass and inertia of moving bodies must be larger than mjMINVAL".
+/// Checks a body whose <inertial> has a mass but no moments. MuJoCo refuses such a body if it moves: "mass and inertia
+/// of moving bodies must be larger than mjMINVAL".
 #[test]
 fn an_inertial_without_moments() {
     let read = model("", "<body name='b'><joint/>\n<inertial pos='0 0.1 0' mass='2'/></body>", "");

@@ -50,7 +50,8 @@ fn joints_in_frames() {
     let body = &model.bodies()[1];
     near("anchor", &flat(&body.placement)[..3], &[1.0, 1.9, 3.0], 1e-12);
     near("axis", &body.joint.axis().unwrap().to_array(), &[0.0, 0.0, 1.0], 1e-12);
-    // MuJoCo's inertia is in the body's frame, which differs from the model's frame by the anchor of the joint
+    // MuJoCo's inertia is in the MJCF body's frame, which differs from the frame of the model's body by the anchor of
+    // the joint
     let expected = [2.0, 1.1 - 1.0, 2.0 - 1.9, 3.0 - 3.0, 0.02, 0.04, 0.03, 0.0, 0.0, 0.0];
     near("inertia", &inertia(body), &expected, 1e-12);
     assert_eq!(model.armature(), [3.0]);
@@ -69,7 +70,7 @@ fn free_joints() {
     let site = [0.601_774_446_315_367_6, -0.190_594_781_415_027_53, -0.575_844_984_086_267_7];
     near("site", &placement(&model, "s")[..3], &site, 1e-12);
     assert_eq!(placement(&model, "f"), flat(&Se3::identity()));
-    // the frame is aligned only without child bodies, and only if `align` is set
+    // the free joint is aligned with the frame of inertia only if `align` is set and the body has no child bodies
     for (from, to) in
         [("<site", "<body><joint/><geom size='0.1'/></body><site"), (" align='true'", ""), ("true", "false")]
     {

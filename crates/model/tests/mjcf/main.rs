@@ -1,5 +1,5 @@
 //! Tests of the structure of MJCF: names, frames, copies, files, geoms and meshes. Expected numbers are from MuJoCo
-//! 4.0: its compiled model, or `mj_forward`.
+//! 4.0: from the fields of its compiled model, or from `mj_forward`.
 
 #![allow(non_snake_case)]
 

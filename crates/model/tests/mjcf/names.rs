@@ -29,7 +29,8 @@ fn unknown_names_warn_with_the_nearest_one() {
     }
 }
 
-/// Elements of a robot have no effect inside elements that do not change the robot.
+/// Checks that elements of a robot cause a warning inside elements that do not change the robot, because they have no
+/// effect there.
 #[test]
 fn misplaced_elements() {
     for (before, after, expected) in [
@@ -45,7 +46,7 @@ fn misplaced_elements() {
     }
 }
 
-/// MuJoCo 4.0 refuses these keywords, and so does the reader.
+/// Checks that the reader refuses the keywords that MuJoCo 4.0 refuses.
 #[test]
 fn keywords() {
     for (before, inside, after, expected) in [
@@ -77,7 +78,8 @@ fn repeated_names() {
     let taken =
         |lines: [u8; 2]| format!("<string>:{}: geom `g`: the name is taken by the geom on line {}", lines[0], lines[1]);
     assert_eq!(refused("", &geoms("<geom name='g' size='1'/>"), ""), taken([2, 1]));
-    assert_eq!(refused("", &(geoms("") + "<geom name='g' size='1'/>"), ""), taken([1, 2])); // the world comes first
+    // the geoms of the world are read first, so the geom on line 1 has the taken name
+    assert_eq!(refused("", &(geoms("") + "<geom name='g' size='1'/>"), ""), taken([1, 2]));
     let twice = |section: &str, one: &str, two: &str| {
         let after = format!("<{section}>\n{one}\n{two}</{section}>");
         refused("", &body("", ""), &after)
@@ -135,7 +137,7 @@ fn contradictions_are_errors() {
     }
     assert!(refused("", "", "<deformable><flex name='f'/></deformable>").contains("flex `f`: is not supported"));
     assert!(refused("<option><flag spring='off'/></option>", "", "").contains("spring: `off` is neither enable nor"));
-    // a class has a single orientation, which is the last one in it; a pos of 0 0 0 does not contradict fromto
+    // the last orientation in a class replaces the others, and a pos of 0 0 0 does not contradict fromto
     let before = "<default><geom euler='90 0 0'/><default class='c'><geom quat='0 1 0 0'/></default></default>";
     let inside = "<body><joint/><geom class='c' type='box' size='0.1 0.2 0.3' pos='1 0 0' mass='1'/></body>";
     near("class", &inertia(&model(before, inside, "").bodies()[1])[4..7], &[0.13 / 3.0, 0.1 / 3.0, 0.05 / 3.0], 1e-12);

@@ -1,10 +1,10 @@
-//! Errors of a file, and the tree, limits and warnings of a robot with many elements.
+//! Tests of SDF: errors of a file, and the tree, limits and warnings of a robot with many elements.
 
 use super::*;
 
 const LINKAGE: &str = include_str!("../../../dynamics/tests/data/linkage.sdf");
 
-/// Checks the tree, its limits, its placement when fixed, and the omitted elements.
+/// Checks the tree of a robot, its limits, its placement if its root is fixed, and the warnings about omitted elements.
 #[test]
 fn tree_and_limits() {
     let model = read(LINKAGE).unwrap();
@@ -12,7 +12,7 @@ fn tree_and_limits() {
     assert_eq!(names, ["turn", "cross#1", "cross", "slide", "spin"]);
     assert_eq!((model.nq(), model.nv()), (6, 5));
     assert_eq!((model.limits().lower[0], model.limits().upper[0]), (-1.0, 2.0));
-    assert_eq!(model.limits().lower[1], f64::NEG_INFINITY); // −1e16
+    assert_eq!(model.limits().lower[1], f64::NEG_INFINITY); // the file has −1e16, which means no limit
     assert_eq!((model.limits().effort()[0], model.limits().velocity[0]), (30.0, f64::INFINITY));
     assert_eq!((model.damping()[0], model.friction()[0]), (0.4, 0.3));
     let base = &model.frames()[model.frame("base").unwrap()];

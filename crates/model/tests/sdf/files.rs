@@ -1,4 +1,4 @@
-//! Tests of SDF: models in models, and files in files.
+//! Tests of SDF: nested models and included files.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn models_in_models() {
     let m = read(&format!("<sdf version='1.9'>{text}</sdf>")).unwrap();
     let names: Vec<_> = m.bodies().iter().skip(1).map(|b| (b.joint_name.as_str(), b.name.as_str())).collect();
     assert_eq!(names, [("shoulder", "inner::arm"), ("inner::wrist", "inner::hand")]);
-    // the tip is at the pose of the inner model, and the frame of the inner model is fixed to its first link, the arm
+    // the tip is at the pose of the inner model, whose frame is fixed to its first link, the arm
     let base = frame(&m, "base", FrameKind::Link);
     let tip = m.bodies()[1].placement * frame(&m, "inner::tip", FrameKind::User);
     close(&tip.translation.to_array(), &[1.0, 2.0, 3.0]);
@@ -35,7 +35,7 @@ fn models_in_models() {
     assert!(error.contains("link `hand`: no link, joint or frame is named `base`"), "{error}");
 }
 
-/// A frame without `attached_to` is fixed to the same link as the frame of its model, not to the world.
+/// Checks that a frame without `attached_to` is fixed to the same link as the frame of its model, not to the world.
 #[test]
 fn the_frame_of_a_model_moves_with_its_link() {
     let inside =
@@ -137,7 +137,7 @@ fn included_files() {
     fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Some models of a world may be missing, such as the sun, but not all of them.
+/// Checks that some models of a world may be missing, such as the sun, but not all models.
 #[test]
 fn worlds_with_missing_models() {
     let world = |inside: &str| {
@@ -155,7 +155,7 @@ fn worlds_with_missing_models() {
     assert!(world("").unwrap_err().to_string().contains("no_sun_here"));
 }
 
-/// Files that include each other, deeply nested models and long names are refused at once.
+/// Checks that files that include each other, deeply nested models and long names are refused at once.
 #[test]
 fn files_that_grow() {
     let folder = folder("grow");

@@ -1,5 +1,4 @@
-//! Tests of SDF: versions, models in models, files that include others, features that a model cannot represent, and
-//! errors.
+//! Tests of SDF: versions, nested models, included files, features that a model cannot represent, and errors.
 //!
 //! Expected poses and inertias are from Drake 1.51, which reads SDF with the format's own library.
 #![allow(non_snake_case)]

@@ -18,7 +18,7 @@ fn placement_frames() {
     assert_eq!(z("placement_frame='b'", ""), Err(expected.to_owned()));
 }
 
-/// A static model does not move, and neither do the models inside it.
+/// Checks that a static model and the models nested in it do not move.
 #[test]
 fn static_models() {
     let turn = |name: &str, ends| joint(name, "revolute", ends, "<axis><xyz>0 0 1</xyz></axis>");
@@ -74,7 +74,7 @@ fn several_models() {
     assert!(warned.iter().any(|w| w.ends_with("world `second`: is not the first world of the file, and is left out")));
 }
 
-/// Each link that no joint carries is the root of its own tree.
+/// Checks that each link without a joint that carries it is the root of its own tree.
 #[test]
 fn several_roots() {
     let turn = joint("j", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
@@ -91,7 +91,7 @@ fn several_roots() {
     };
     assert_eq!(names(&text), ["root_joint", "j", "root_joint#2"]);
     assert_eq!(names(&text.replace("'j'", "'root_joint'")), ["root_joint#2", "root_joint", "root_joint#3"]);
-    // one of the root links is joined to the world, so only the others are free
+    // a joint connects one root link to the world, so only the other root links are free
     let anchored = text.replace("</model>", &format!("{}</model>", joint("w", "fixed", ["world", "a"], "")));
     assert_eq!(names(&anchored), ["j", "root_joint"]);
     let warned = said(&read(&anchored).unwrap());
@@ -99,8 +99,8 @@ fn several_roots() {
     assert!(warned[0].contains("link `c`"), "{warned:?}");
 }
 
-/// If the parent link of a joint is not reached otherwise, the child link carries the parent link, and the axis is
-/// reversed.
+/// Checks joints that are visited from their child link, because their parent link cannot be reached in another way.
+/// The child link then carries the parent link, and the axis is reversed.
 #[test]
 fn joints_walked_from_their_child() {
     let turn = |name: &str, ends| joint(name, "revolute", ends, "<axis><xyz>0 1 0</xyz></axis>");
@@ -114,8 +114,8 @@ fn joints_walked_from_their_child() {
     assert!(said(&model("1.9", &ball))[0].contains("its position is that of the parent, seen from the child"));
 }
 
-/// In a ring of links, the joint that is visited last becomes a constraint. The two frames of this constraint coincide
-/// at the links' poses in the file.
+/// Checks a ring of links: the joint that is visited last becomes a constraint. The two frames of this constraint
+/// coincide at the links' poses in the file.
 #[test]
 fn loops() {
     let ring = |kind: &str, inside: &str| {
@@ -129,7 +129,7 @@ fn loops() {
         else {
             panic!("no frames");
         };
-        // at q = 0, each body is at its joint, so placements can be multiplied
+        // at q = 0, the pose of a body is the product of the placements of the joints that carry it
         frames.map(|f| {
             let frame = &m.frames()[f];
             (frame.body, m.bodies()[frame.body].placement * frame.placement)
@@ -169,7 +169,8 @@ fn loops() {
     assert!(said(&cross)[0].ends_with("only its point is held, and it may turn about all axes"));
 }
 
-/// A gearbox couples two angles, θ₂ = −ratio θ₁. Each angle is about its own axis, relative to the reference body.
+/// Checks that a gearbox couples two angles by θ₂ = −ratio θ₁. Each angle is about its own axis, relative to the
+/// reference body.
 #[test]
 fn gearboxes() {
     let geared = |axes: [&str; 2], reference: &str| {
@@ -232,7 +233,7 @@ fn springs_and_links_without_weight() {
     assert!(fixed.gravity_compensation().is_empty());
 }
 
-/// If a joint follows a follower, it follows the leader of that follower.
+/// Checks that a joint that follows a follower gets the leader of this follower.
 #[test]
 fn chains_of_followers() {
     let turn = |name: &str, ends, inside: &str| {
@@ -254,7 +255,7 @@ fn chains_of_followers() {
     assert_eq!(m.nv(), 1);
     let rules: Vec<_> =
         m.bodies().iter().filter_map(|b| b.mimic.map(|r| (b.joint_name.as_str(), r.ratio, r.offset))).collect();
-    // 2 (2 (q − 0.1) + 0.5 − 0.1) + 0.5
+    // the composed relation is 2 (2 (q − 0.1) + 0.5 − 0.1) + 0.5
     assert_eq!(rules.iter().map(|r| (r.0, r.1)).collect::<Vec<_>>(), [("k", 2.0), ("l", 4.0)]);
     close(&[rules[0].2, rules[1].2], &[0.3, 0.9]);
     let missing = chain(&mimic("jj")).unwrap_err().to_string();
@@ -265,7 +266,7 @@ fn chains_of_followers() {
     assert!(chain(&mimic("l")).unwrap_err().to_string().ends_with("mimic: follows itself, through others"));
 }
 
-/// If a link and a joint have the same name, as in older files, references to this name mean the link.
+/// Checks that a reference means the link if a link and a joint have the same name, as in older files.
 #[test]
 fn joints_named_as_links() {
     let turn = joint("b", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// Compares mass, mass times centre, and moments about the link's origin (xx yy zz xy xz yz) with Drake's numbers.
+/// Compares the mass, the mass times the centre of mass, and the moments about the link's origin (xx yy zz xy xz yz)
+/// with Drake's numbers.
 #[test]
 fn inertias_of_shapes() {
     let of = |inertial: &str, collisions: &str| {
@@ -113,8 +114,8 @@ fn missing_inertias() {
     warned(&frame, "inertial: the pose is in the link's frame, not relative to `a`");
 }
 
-/// Misspelt and misplaced elements cause warnings, and so do known elements that a model cannot represent. Visual
-/// elements and sensors cause no warnings.
+/// Checks that misspelt and misplaced elements cause warnings, and so do known elements that a model cannot represent.
+/// Visual elements and sensors cause no warnings.
 #[test]
 fn what_a_model_does_not_hold() {
     let turn = |inside: &str| joint("j", "revolute", ["a", "b"], inside);
@@ -232,13 +233,13 @@ fn invalid_values() {
         let error = read(&text).expect_err(what).to_string();
         assert!(error.contains(what), "{error}\n{what}");
     }
-    // an empty element means the default value, and a type may have capital letters
+    // an empty element means the default value, and the type of a joint may have capital letters
     let m = model("1.9", "<static/><link name='a'><pose/><gravity/></link><link name='b'/>
       <joint name='j' type='Revolute'><parent>a</parent><child>b</child><axis><xyz/><limit><upper/></limit></axis></joint>");
     assert_eq!((m.nv(), m.limits().upper[0]), (1, f64::INFINITY));
 }
 
-/// Text after a number is dropped with a warning. Text without a number is an error.
+/// Checks that text after a number is dropped with a warning, and that text without a number is an error.
 #[test]
 fn numbers_followed_by_text() {
     let limit = |text: &str| {
@@ -265,8 +266,8 @@ fn numbers_followed_by_text() {
     assert!(limit("fast").unwrap_err().to_string().ends_with("joint `j`: velocity: `fast` is no number"));
 }
 
-/// A rotor with Drake's elements adds the armature ratio² times its inertia. A joint that only Drake defines is an
-/// error.
+/// Checks that Drake's elements for a rotor give the armature: ratio² times the inertia of the rotor. A type of joint
+/// that only Drake defines is an error.
 #[test]
 fn elements_of_drake() {
     let of = |inside: &str, model: &str| {
@@ -291,7 +292,7 @@ fn elements_of_drake() {
     assert!(error.ends_with("drake:joint `k`: joints of Drake's own are not supported: `planar`"), "{error}");
 }
 
-/// A screw without a pitch makes one turn per metre.
+/// Checks that a screw without a pitch makes one turn per metre.
 #[test]
 fn a_screw_without_a_pitch() {
     let screw = joint("j", "screw", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
@@ -301,7 +302,8 @@ fn a_screw_without_a_pitch() {
     assert!(said(&m)[0].ends_with("has no screw_thread_pitch: 1 m for each turn, as SDF has it"));
 }
 
-/// Elements of a robot have no effect inside elements that do not change the robot.
+/// Checks that elements of a robot cause a warning inside elements that do not change the robot, because they have no
+/// effect there.
 #[test]
 fn misplaced_elements() {
     let world = |version: &str, physics: &str, visual: &str| {

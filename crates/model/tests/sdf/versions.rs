@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// The axis 0 0 1 of a joint is tested, whose child is rotated by 90° about x. Depending on the version, it is the z
-/// axis of the joint, or the z axis of the model, which is the y axis of the joint.
+/// Checks the axis 0 0 1 of a joint whose child is rotated by 90° about x. Depending on the version, this axis is the z
+/// axis of the joint, or the z axis of the model. The z axis of the model is the y axis of the joint.
 #[test]
 fn the_version_determines_the_frame_of_an_axis() {
     let axis = |version: &str, inside: &str| {
@@ -34,12 +34,12 @@ fn the_version_determines_the_frame_of_an_axis() {
         close(&found, &of_joint);
         assert!(warned.iter().any(|w| w.contains("unknown element <use_parent_model_frame>")), "{warned:?}");
     }
-    // an axis without a direction is z, also if it is in the model's frame
+    // an axis without a direction is z, also if the axis is given in the model's frame
     let bare = |version| axis(version, "").0;
     close(&bare("1.4"), &of_model);
 }
 
-/// Up to version 1.6, a pose has the attribute `frame`; later versions have `relative_to`.
+/// Checks the attribute of a pose: `frame` up to version 1.6, and `relative_to` in later versions.
 #[test]
 fn the_version_determines_the_attribute_of_a_pose() {
     let z = |version: &str, name: &str| {
@@ -53,7 +53,7 @@ fn the_version_determines_the_attribute_of_a_pose() {
     assert_eq!(z("1.7", "frame"), (1.0, 1));
 }
 
-/// In version 1.0, some values are attributes that are elements in later versions.
+/// Checks files of version 1.0, in which some values are attributes. In later versions, these values are elements.
 #[test]
 fn the_first_version() {
     let old = "<gazebo version='1.0'><world name='w'><physics type='ode'><gravity xyz='0 0 -2'/></physics>
@@ -78,7 +78,7 @@ fn the_first_version() {
     let (old, new) = (read(old).unwrap(), read(new).unwrap());
     assert_eq!(said(&old), Vec::<String>::new());
     assert_eq!(old, new);
-    // later versions do not know the attributes of version 1.0
+    // in later versions, the attributes of version 1.0 are unknown
     let late =
         read("<sdf version='1.2'><model name='m'><link name='a'><inertial mass='2'/></link></model></sdf>").unwrap();
     assert!(said(&late)[0].contains("unknown attribute `mass`"), "{:?}", said(&late));
@@ -97,7 +97,7 @@ fn unknown_versions() {
     }
 }
 
-/// Old files contain nested models in a flat form: names and frames contain `::`.
+/// Checks old files, in which nested models have a flat form: the names of their links, joints and frames contain `::`.
 #[test]
 fn flat_names() {
     let inside = format!(

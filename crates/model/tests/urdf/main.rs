@@ -1,4 +1,4 @@
-//! Tests of URDF: everything in a file that changes the robot is read or reported.
+//! Tests of URDF: every element and attribute that changes the robot is read, or is reported in a warning or error.
 #![allow(non_snake_case)]
 
 mod mimics;
@@ -54,8 +54,8 @@ fn plain_robots_have_no_warnings() {
     }
 }
 
-/// As in Drake 1.51.1, a link `world` that the file does not contain is the world. The mass is the mass of the moving
-/// link.
+/// Checks joints on a link `world` that the file does not contain: as in Drake 1.51.1, this link is the world. The
+/// robot's mass is the mass of the moving link.
 #[test]
 fn joints_on_the_world() {
     let joint = "<joint name='j' type='revolute'><parent link='world'/><child link='b'/>";
@@ -96,7 +96,8 @@ fn limits_without_a_number() {
     assert_eq!(limits("<limit lower='-1' upper='1' effort='inf' velocity='3'/>"), (3.0, -inf, inf));
 }
 
-/// Robots with such limits exist, and other readers accept them, so each of these limits only causes a warning.
+/// Checks that implausible limits only cause a warning, because existing robots have such limits and other readers
+/// accept them.
 #[test]
 fn implausible_limits() {
     let said = |limit: &str| warnings(&robot("revolute", limit, ""));
@@ -143,7 +144,8 @@ fn limits_warn_in_every_format() {
     assert!(built.with_limits(limits).unwrap().warnings().is_empty());
 }
 
-/// The fields of version 1.2 that a model cannot represent cause warnings.
+/// Checks that the limits of acceleration, deceleration and jerk of version 1.2 cause warnings, because a model cannot
+/// represent them.
 #[test]
 fn limits_of_acceleration() {
     let with = |more: &str| robot("revolute", &LIMIT.replace("/>", &format!(" {more}/>")), "");
@@ -160,8 +162,8 @@ fn limits_of_acceleration() {
     assert!(warnings(&versioned).is_empty());
 }
 
-/// Compares with X_WB in Drake 1.51. The body is moved by 1 m and 2 m along the joint's x and y, and rotated by 0.3
-/// about the joint's axis. The origin of the joint is at (1, 2, 3).
+/// Compares the pose of a body on a planar joint with X_WB in Drake 1.51. The body is moved by 1 m and 2 m along the
+/// joint's x and y, and rotated by 0.3 about the joint's axis. The origin of the joint is at (1, 2, 3).
 #[test]
 fn planes_of_planar_joints() {
     let frame = |axis: &str| {
@@ -178,7 +180,7 @@ fn planes_of_planar_joints() {
     for (axis, expected) in PLANAR {
         close(&frame(axis), expected);
     }
-    // the link keeps its axes, and the inertia keeps its pose in the link
+    // the link's frame and the inertia in this frame do not change
     let tilted = model(&robot("planar", "<axis xyz='1 0 0'/>", ""));
     let link = &tilted.frames()[tilted.frame("b").unwrap()];
     let back = link.placement.inverse();
@@ -194,7 +196,7 @@ fn planes_of_planar_joints() {
     assert_eq!(limited, [format!("3: joint `j`: {unit}")]);
 }
 
-/// Axis of the joint, then the translation and the first and third column of the rotation.
+/// Expected poses: the axis of the joint, then the translation and the first and third column of the rotation.
 const PLANAR: [(&str, &[f64]); 7] = [
     (
         "<axis xyz='1 0 0'/>",
@@ -320,7 +322,7 @@ fn unknown_elements_and_attributes() {
     }
 }
 
-/// Elements without effect on dynamics, kinematics and limits are known, so they cause no warnings.
+/// Checks that known elements without effect on dynamics, kinematics and limits cause no warnings.
 #[test]
 fn elements_without_effect() {
     let joint = "<calibration rising='1'/><safety_controller k_velocity='10' k_position='15' soft_lower_limit='-1' \
@@ -477,10 +479,10 @@ fn implausible_inertias() {
     let said = "body `b`: 100000000000000000000 kg and 1e-1 kg m² are a radius of gyration of 3.2e-11 m, expected at least 1e-7 m";
     assert_eq!(at(1e20, 0.1, Vec3::zero()), [said]);
     assert!(at(1.0, 1e-12, Vec3::zero()).is_empty());
-    assert!(of(1.0, 0.0).is_empty()); // a point mass
+    assert!(of(1.0, 0.0).is_empty()); // a point mass causes no warning
 }
 
-/// Joints and frames that Drake adds to the format are read.
+/// Checks that the joints and frames that Drake adds to the format are read.
 #[test]
 fn extensions_of_drake() {
     let drakes = |kind: &str, inside: &str| {
@@ -497,7 +499,7 @@ fn extensions_of_drake() {
         assert!(found.damping().iter().all(|&x| x == 0.5) && found.friction().iter().all(|&x| x == 0.25), "{kind}");
         assert_eq!(warnings(&text), [""; 0]);
     }
-    // Drake's universal joint turns about x of the joint's frame, then about the new y, whatever the `<axis>` is
+    // Drake's universal joint ignores `<axis>`: it turns about x of the joint's frame, then about the new y
     let universal = model(&drakes("universal", "<origin xyz='1 2 3'/>"));
     let about = |x, y| Joint::Revolute { axis: Vec3::new(x, y, 0.0) };
     let bodies: Vec<_> = universal.bodies()[1..].iter().map(|b| (&*b.name, &*b.joint_name, b.joint)).collect();

@@ -1,4 +1,5 @@
-//! Mimic joints: followers without the option `mimic`, and the limits and losses that a leader gets from its followers.
+//! Tests of mimic joints: followers without the option `mimic`, and the limits, damping and friction that followers add
+//! to their leader.
 
 use super::{INERTIAL, LIMIT, model, robot, warnings};
 use condyle_model::{Inertia, Joint, Mimic, Model, ModelBuilder, SdfOptions, Se3, Sym3, UrdfOptions, Vec3, WORLD};
@@ -38,8 +39,8 @@ fn mimics() {
     assert_eq!(warnings(&followers("joint='x'", "joint='k'"))[0], missing);
 }
 
-/// Limits and losses of a follower act on its leader. With x = −2 q + 0.5, the limits −1 and 1 of x are the limits
-/// −0.25 and 0.75 of q. The damping d of x has the power d ẋ² = 4 d q̇².
+/// Checks that limits, damping and friction of a follower act on its leader. With x = −2 q + 0.5, the limits −1 and 1
+/// of x are the limits −0.25 and 0.75 of q. The damping d of x has the power d ẋ² = 4 d q̇².
 #[test]
 fn limits_and_losses_of_followers() {
     let free = followers("joint='j' multiplier='-2' offset='0.5'", "joint='j' multiplier='0'");
@@ -52,7 +53,7 @@ fn limits_and_losses_of_followers() {
     assert_eq!((limits.lower[0], limits.upper[0], limits.velocity[0]), (-0.25, 0.75, 1.0));
     assert_eq!((limits.effort_lower[0], limits.effort_upper[0]), (-3.0, 3.0));
     assert_eq!((found.damping()[0], found.friction()[0]), (12.5, 8.25));
-    // a copy of the robot is equal to it, and so is the robot in other formats
+    // a copy of the robot is equal to the original, and so is a robot read from another format
     let copied = found.clone().with_gravity(*found.gravity()).unwrap();
     assert_eq!((copied.damping(), copied.limits()), (found.damping(), limits));
     let mut two = ModelBuilder::new("two");
@@ -76,7 +77,7 @@ fn limits_and_losses_of_followers() {
     let found = Model::from_sdf_str(&sdf, &SdfOptions { mimic: true, ..SdfOptions::default() }).unwrap();
     assert_eq!((found.damping(), found.friction()), (&[15.0][..], &[12.0][..]));
     assert_eq!((found.limits().lower[0], found.limits().upper[0], found.limits().velocity[0]), (-0.25, 0.75, 1.0));
-    // limits that would not let the leader move, as in the grippers of many robots, are ignored
+    // limits that leave no range for the leader are ignored; the grippers of many robots have such limits
     let apart = read(&followers("joint='j' offset='5'", "joint='j'").replacen(
         "velocity='2'/><mimic",
         "velocity='0'/><mimic",
@@ -93,7 +94,7 @@ fn limits_and_losses_of_followers() {
     assert_eq!(apart.clone().with_gravity(gravity).unwrap().warnings(), apart.warnings());
 }
 
-/// The time for reading a chain of followers is proportional to the length of the chain.
+/// Checks that a long chain of followers is read quickly, because the time is proportional to its length.
 #[test]
 fn long_chains_of_mimics() {
     let hinge = Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) };

@@ -49,13 +49,13 @@ impl<S: Scalar> From<Mat3<S>> for Matrix3<S> {
 macro_rules! impl_six {
     ($type:ident) => {
         impl<S: Scalar> From<Vector6<S>> for $type<S> {
-            /// Converts from six numbers, the linear part first.
+            /// Converts from a vector of six components, the linear part first.
             fn from(x: Vector6<S>) -> Self {
                 Self::from([x[0], x[1], x[2], x[3], x[4], x[5]])
             }
         }
         impl<S: Scalar> From<$type<S>> for Vector6<S> {
-            /// Converts to six numbers, the linear part first.
+            /// Converts to a vector of six components, the linear part first.
             fn from(x: $type<S>) -> Self {
                 Self::from_column_slice(&x.to_array())
             }
@@ -81,7 +81,8 @@ impl From<Quaternion<f64>> for UnitQuaternion<f64> {
 impl<R: Constant<f64>> From<Se3<R>> for Isometry3<f64> {
     fn from(X: Se3<R>) -> Self {
         let X = X.lift::<f64>();
-        // `UnitQuaternion::from_matrix` is not used: it iterates, and for half turns it stays at its start value.
+        // `UnitQuaternion::from_matrix` is not used, because its iteration does not leave the start value for half
+        // turns.
         let rotation = UnitQuaternion::from(Quaternion::from_rotation(X.rotation));
         Self::from_parts(Vector3::from(X.translation).into(), rotation)
     }

@@ -6,7 +6,7 @@ use crate::algebra::vector::{Mat3, Sym3, Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// Inertia of a rigid body: ten numbers, in which the body's equations of motion are linear.
+/// Inertia of a rigid body: ten parameters. The body's equations of motion are linear in these parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
@@ -52,7 +52,7 @@ impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
     fn act(&self, I: Inertia<S>) -> Inertia<S> {
         let p = self.translation;
         let h = self.rotation * I.mass_com;
-        // The sum of products is −[p]ₓ[h]ₓ − [h]ₓ[p]ₓ − m [p]ₓ[p]ₓ = −[p]ₓ[w]ₓ − [w]ₓ[p]ₓ with w = h + m p / 2.
+        // With w = h + m p / 2, the three products −[p]ₓ[h]ₓ − [h]ₓ[p]ₓ − m [p]ₓ[p]ₓ become two: −[p]ₓ[w]ₓ − [w]ₓ[p]ₓ.
         let w = p.scale_add(I.mass * S::splat(0.5), h);
         let shift = -Sym3::outer_sum(p, w).add_diagonal(-(S::splat(2.0) * p.dot(w)));
         Inertia {
@@ -66,8 +66,8 @@ impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
     }
 }
 
-/// Inertia of an articulated body as felt at its handle, the body to which a force is applied: a symmetric 6×6 matrix
-/// with the blocks [[linear, coupling], [couplingᵀ, rotational]].
+/// Inertia of an articulated body, seen from its handle: the body to which a force is applied. The inertia is a
+/// symmetric 6×6 matrix with the blocks [[linear, coupling], [couplingᵀ, rotational]].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct ArticulatedInertia<S> {

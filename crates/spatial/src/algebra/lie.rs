@@ -1,9 +1,9 @@
 //! Rotations and rigid motions as Lie groups: exponentials, logarithms, Jacobians.
 //!
-//! Results are exact near 0 and near π, on any scalar: functions with a removable singularity are computed from the
-//! entire functions of [`stumpff`]. Rotation vectors are in rad. A twist is a [`Motion`], linear part first. Jacobians
-//! J are *right* Jacobians, exp(x + δ) = exp(x) exp(J δ), because tangent vectors of a configuration are in the body's
-//! frame.
+//! Results are accurate for angles near 0 and near π, with every scalar type: functions with a removable singularity
+//! are computed from the entire functions of [`stumpff`]. Rotation vectors are in rad. A twist is a [`Motion`], linear
+//! part first. Jacobians J are *right* Jacobians, exp(x + δ) = exp(x) exp(J δ), because tangent vectors of a
+//! configuration are in the body's frame.
 
 use crate::algebra::motion::Motion;
 pub use crate::algebra::quaternion::Quaternion;
@@ -28,7 +28,8 @@ pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
     if S::all(small) {
         return stumpff_near(t);
     }
-    // Each branch gets a harmless argument in the lanes for which the other branch is used.
+    // Both formulas are evaluated in every lane. Lanes that do not use the result of a formula get a valid constant, 1
+    // or 0, as its argument.
     let far = stumpff_far(S::select(small, S::one(), t));
     if !S::any(small) {
         return far;
@@ -83,7 +84,7 @@ fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
 /// Computes the exponential of a rotation vector w: the rotation by the angle |w| about the axis w.
 #[inline(always)]
 pub fn exp3<S: Scalar>(w: Vec3<S>) -> Quaternion<S> {
-    let [cos, sinc, ..] = stumpff(w.norm_squared() * S::splat(0.25)); // at half the angle
+    let [cos, sinc, ..] = stumpff(w.norm_squared() * S::splat(0.25)); // Stumpff functions at half the angle
     Quaternion { vector: w.scale(sinc * S::splat(0.5)), scalar: cos }
 }
 

@@ -3,7 +3,8 @@
 use crate::algebra::vector::{Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 
-/// Cross product of spatial algebra; the types select it: v × m for two motions, v ×* f for a motion and a force.
+/// Cross product of spatial algebra: v × m for two motions, and v ×* f for a motion and a force. The type of the second
+/// operand selects the product.
 pub trait Cross<T> {
     /// Returns v × x: the rate of change of x if x is fixed in a body that moves with v.
     fn cross(self, x: T) -> T;
@@ -42,7 +43,7 @@ macro_rules! impl_six {
             pub fn new(linear: Vec3<S>, angular: Vec3<S>) -> Self {
                 Self { linear, angular }
             }
-            /// Returns the six numbers, the linear part first.
+            /// Returns the six components as an array, the linear part first.
             #[inline(always)]
             pub fn to_array(self) -> [S; 6] {
                 let (l, a) = (self.linear, self.angular);

@@ -9,8 +9,8 @@ use crate::scalar::Scalar;
 use core::iter::Sum;
 use core::ops::{Div, DivAssign, Index, IndexMut, Mul, MulAssign};
 
-/// Implements the product with a scalar and the quotient by a scalar, for a struct that has `scale`. A number to the
-/// left of `*` is an `f64`, so that literals need no type.
+/// Implements the product with a scalar and the quotient by a scalar, for a struct with a method `scale`. A factor to
+/// the left of `*` has the type `f64`, so literals need no type suffix.
 macro_rules! impl_scalar_product {
     ($type:ident) => {
         impl<S: Scalar> Mul<S> for $type<S> {
@@ -43,7 +43,7 @@ macro_rules! impl_scalar_product {
         }
         impl Mul<$type<f64>> for f64 {
             type Output = $type<f64>;
-            /// Multiplies each component by the number.
+            /// Multiplies each component by the factor to the left of `*`.
             #[inline(always)]
             fn mul(self, x: $type<f64>) -> $type<f64> {
                 x.scale(self)
@@ -56,7 +56,7 @@ impl_scalar_product!(Mat3);
 impl_scalar_product!(Motion);
 impl_scalar_product!(Force);
 
-/// Implements indices in flattened order, sums, and zero as the default value.
+/// Implements access by index in flattened order, sums of iterators, and zero as the default value.
 macro_rules! impl_components {
     ($type:ident, $n:literal: $($i:literal => $($field:ident).+),*) => {
         impl<S> Index<usize> for $type<S> {

@@ -56,8 +56,8 @@ impl<S: Scalar> Quaternion<S> {
     pub fn from_rotation(R: Mat3<S>) -> Self {
         let (a, b, c) = (R.x.x, R.y.y, R.z.z);
         let one = S::one();
-        // Four times the products of components: `w` is 4w², `xy` is 4xy, and so on. The products of one component with
-        // all four are the quaternion times a factor.
+        // Four times the products of components: `w` is 4w², `xy` is 4xy, and so on. For each component, its products
+        // with all four components are a multiple of the quaternion.
         let (w, x, y, z) = (one + a + b + c, one + a - b - c, one - a + b - c, one - a - b + c);
         let (wx, wy, wz) = (R.y.z - R.z.y, R.z.x - R.x.z, R.x.y - R.y.x);
         let (xy, xz, yz) = (R.x.y + R.y.x, R.x.z + R.z.x, R.y.z + R.z.y);

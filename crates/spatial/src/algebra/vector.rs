@@ -3,8 +3,8 @@
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// Implements `+`, `−`, negation, `+=`, `−=`, the product with a scalar and lifting of constants, for each component.
-/// The fields of the struct must have these operations.
+/// Implements operations for each component: `+`, `−`, negation, `+=`, `−=`, the product with a scalar, and the
+/// conversion of constants to a scalar. The fields of the struct must have these operations.
 macro_rules! impl_linear {
     ($type:ident { $($field:ident),* }) => {
         impl<S: Scalar> core::ops::Add for $type<S> {
@@ -248,7 +248,8 @@ impl<S: Scalar> Mat3<S> {
     }
 }
 
-/// Maximum `rotation_error` of a rotation. It is the rounding error of a file with seven digits.
+/// Maximum `rotation_error` of a matrix that counts as a rotation. A matrix in a file with seven digits has this
+/// rounding error.
 const ROTATION_ROUNDING: f64 = 1e-6;
 
 impl Mat3<f64> {

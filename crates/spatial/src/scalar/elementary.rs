@@ -1,13 +1,13 @@
 //! tanh and exp of a [`Scalar`], computed with the arithmetic of the scalar. So floats, lanes and dual numbers use the
-//! same source code. The logarithm comes from the platform and takes an `f64`.
+//! same source code. The logarithm of an `f64` comes from the platform.
 
 use crate::scalar::Scalar;
 
-/// Smallest |x| from which on tanh x is ±1 to the last bit of a double.
+/// Bound on |x| above which tanh x is ±1 to the last bit of an `f64`.
 const SATURATED: f64 = 20.0;
-/// Binary logarithm of the number by which an argument is divided before a series is summed.
+/// Number of times that an argument is halved before its series is summed.
 const HALVINGS: u32 = 6;
-/// Factor with which an argument is multiplied before a series is summed.
+/// Factor 1/64: an argument is multiplied by this factor before its series is summed.
 const SCALE: f64 = 1.0 / (1u32 << HALVINGS) as f64;
 
 /// Computes tanh x, with an error of a few units in the last place of x. It evaluates a continued fraction at x/64 and

@@ -9,7 +9,8 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// Dual number x + x′ε with ε² = 0, where x and x′ are vectors. Each lane has a value and the derivative of this value.
 ///
 /// num-dual's types cannot be used here. Their components need an order, a conversion into one number, and functions
-/// that branch on this number; lanes have none of these. The rules of differentiation are the same as num-dual's.
+/// that branch on this number. Lanes have no such order, conversion or functions. The rules of differentiation are the
+/// same as num-dual's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct LaneDual<S> {

@@ -18,9 +18,9 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Number type: `f64`, `f32`, a dual number of num-dual, or several numbers in SIMD lanes.
 ///
-/// Scalars have no order, so generic code cannot branch on a value. A branch would be wrong for lanes, because each
-/// lane has its own answer. It would also be wrong for dual numbers, because each branch has its own derivative.
-/// Compare with [`lt`](Self::lt) and choose with [`select`](Self::select) instead.
+/// Scalars have no order, so generic code cannot branch on a value. A branch would be wrong for lanes, because a
+/// comparison can have a different result in each lane. A branch would also be wrong for dual numbers, because each
+/// branch has its own derivative. Compare with [`lt`](Self::lt) and choose with [`select`](Self::select) instead.
 ///
 /// ```
 /// use condyle_spatial::Scalar;
@@ -85,8 +85,8 @@ pub trait Scalar:
     fn atan2(self, x: Self) -> Self;
     /// Returns |self|.
     fn abs(self) -> Self;
-    /// Returns the same number. If it is recorded, for example to generate code, its sign is not moved out of products.
-    /// So equal sums are written in the same way.
+    /// Returns self. If operations are recorded, for example to generate code, the recorder does not move the sign of
+    /// this number out of products. So equal sums are recorded in the same form.
     #[doc(hidden)]
     #[inline(always)]
     fn kept(self) -> Self {
@@ -100,15 +100,15 @@ pub trait Scalar:
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Returns whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Returns whether a mask holds in every lane. Returns `false` if the answer is unknown because a program is being
-    /// recorded.
+    /// Returns whether a mask holds in every lane. Returns `false` while operations are being recorded, because the
+    /// values of the lanes are then unknown.
     #[doc(hidden)]
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         Self::select(mask, Self::one(), Self::zero()) == Self::one()
     }
-    /// Returns whether a mask holds in at least one lane. Returns `true` if the answer is unknown because a program is
-    /// being recorded.
+    /// Returns whether a mask holds in at least one lane. Returns `true` while operations are being recorded, because
+    /// the values of the lanes are then unknown.
     #[doc(hidden)]
     #[inline(always)]
     fn any(mask: Self::Mask) -> bool {

@@ -1,4 +1,4 @@
-//! Numbers that a lane can hold.
+//! Types of the number in one lane: `f64` and `f32`.
 
 use super::Scalar;
 
@@ -10,6 +10,6 @@ pub trait Number: Scalar<Mask = bool> {
     /// Computes (sin x, cos x) of N values with |x| up to `LARGEST`, in the precision of this type. The constants are
     /// loaded once for all N values.
     fn near<S: Scalar, const N: usize>(x: [S; N]) -> ([S; N], [S; N]);
-    /// Computes (sin self, cos self) with the platform's functions, for a number of any size.
+    /// Computes (sin self, cos self) with the platform's functions, for any magnitude of x = self.
     fn far(self) -> (Self, Self);
 }

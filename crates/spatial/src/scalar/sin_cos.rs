@@ -1,5 +1,5 @@
-//! Sine and cosine for every kind of number without derivative. They are one sequence of sums and products without
-//! branches, so a lane and a single number give the same bits.
+//! Sine and cosine of floats and of SIMD lanes. Both use the same sequence of sums and products without branches, so a
+//! lane and a single number give the same bits.
 //!
 //! The argument is split into x = n π/2 + r with |r| ≤ π/4. n π/2 is subtracted in three parts (Cody and Waite,
 //! *Software manual for the elementary functions*, 1980). The product of n with each part except the last is exact,
@@ -14,8 +14,8 @@ use super::platform::Platform;
 struct Precision<const T: usize> {
     /// Three parts whose sum is π/2, the largest first.
     parts: [f64; 3],
-    /// 1.5 times the largest number that can have a fraction. Adding this number and subtracting it again rounds to an
-    /// integer.
+    /// Constant 1.5 · 2ᵐ, where m is the number of fraction bits of the format. Adding this constant to a number and
+    /// subtracting it again rounds the number to an integer.
     magic: f64,
     /// Coefficients of (sin r − r)/r³ as a polynomial in r², highest power first.
     sin: [f64; T],
@@ -81,7 +81,7 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
         let c = (cos[k] * z).mul_add(z, z.mul_add(S::splat(-0.5), one)); // 1 − r²/2 + r⁴ Q(r²)
         // m is the quadrant: n modulo 4, between −2 and 2.
         let m = (n[k].mul_add(S::splat(0.25), magic) - magic).mul_add(S::splat(-4.0), n[k]);
-        // One of cos(m π/2) and sin(m π/2) is 0 and the other is ±1, so products with them are exact.
+        // Of cos(m π/2) and sin(m π/2), one is 0 and the other is ±1. So products with these two values are exact.
         let along = one - m.abs();
         let across = m.mul_add(along, m);
         sin[k] = across.mul_add(c, along * s);

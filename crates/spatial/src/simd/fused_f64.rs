@@ -11,7 +11,7 @@ use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Single `f64` that is rounded in the same way as a number in a lane: products and sums are fused if lanes fuse them.
-/// WebAssembly does not.
+/// WebAssembly does not fuse them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct FusedF64(pub f64);
@@ -27,7 +27,7 @@ impl FusedF64 {
     /// Reinterprets a mutable slice of `f64` as a slice of `FusedF64`.
     #[inline(always)]
     pub fn of_mut(x: &mut [f64]) -> &mut [Self] {
-        // SAFETY: as for `of`.
+        // SAFETY: `FusedF64` is a transparent wrapper of `f64`, and the slice is borrowed mutably.
         unsafe { core::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), x.len()) }
     }
 }
@@ -167,7 +167,7 @@ where
     #[inline(always)]
     pub fn to_fused(self) -> [FusedF64; N] {
         let x = self.to_array();
-        // SAFETY: as for `from_fused`.
+        // SAFETY: `FusedF64` is a transparent wrapper of `f64`.
         unsafe { *core::ptr::from_ref(&x).cast() }
     }
 }

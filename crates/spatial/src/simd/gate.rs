@@ -1,8 +1,8 @@
 //! Gate to vector instructions. It decides in which crate a kernel is compiled, for which scalars, and with which
 //! instructions.
 //!
-//! [`kernel!`](crate::kernel) makes a function of a pass, a tile or a factorization, whose body is generic and always
-//! inlined:
+//! [`kernel!`](crate::kernel) defines a function that runs a pass, a tile or a factorization. The body of the function
+//! is generic and always inlined:
 //!
 //! - For the common scalars, `f64` and its lanes, the function is compiled once, in the crate that defines it, with the
 //!   vector instructions of the scalar. Users of the library call this compiled code.
@@ -14,8 +14,8 @@
 //! - For all other scalars (dual numbers, lanes of `f32`, a user's own type), the function is compiled in the crate
 //!   that uses it.
 //!
-//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the vector registers of the
-//! SIMD level for a single state. [`level_function!`](crate::level_function) is for small functions that are called
+//! [`register_kernel!`](crate::register_kernel) does the same for functions on `f64` that use the vector registers of
+//! the SIMD level for a single state. [`level_function!`](crate::level_function) is for small functions that are called
 //! often, such as the tiles of dense kernels.
 #![allow(unsafe_code)]
 
@@ -95,7 +95,7 @@ macro_rules! kernel {
                 use $crate::simd::gate::{FusedF64, Level, NARROW, assert_supported, level};
 
                 struct Gate;
-                // SAFETY: the code for each scalar is entered after the check that the processor has the scalar's
+                // SAFETY: the code for a scalar runs only after a check that the processor has the scalar's
                 // instructions.
                 unsafe impl $crate::simd::gate::SimdToken for Gate {}
                 type Narrow = $crate::simd::gate::Narrow<Gate>;
@@ -117,8 +117,8 @@ macro_rules! kernel {
             $crate::kernel!(@call f64 [], f64, $S $($R)?, ($($arg: $type),*));
         }
     };
-    // Calls the function that is compiled for one scalar, with its instructions and their level, if `$S` is this
-    // scalar. With `numbers if`, calls it for `f64`, too, if the condition holds.
+    // Compiles the function for the type `$scalar` with the instructions of a SIMD level, and calls the function if
+    // `$chosen` holds. With `numbers if`, also calls the function for `f64` if the condition `$fused` holds.
     (
         @call $scalar:ident [$($instructions:literal $level:expr)?], $chosen:expr, $S:ident $($R:ident)?,
         ($($arg:ident: $type:ty),*) $(, numbers if $fused:expr)?
@@ -181,7 +181,7 @@ macro_rules! register_kernel {
                 use $crate::simd::gate::{Level, NARROW, assert_supported, level};
 
                 struct Gate;
-                // SAFETY: the code for these registers is entered after the check that the processor has their
+                // SAFETY: the code for these registers runs only after a check that the processor has their
                 // instructions.
                 unsafe impl $crate::simd::gate::SimdToken for Gate {}
                 type Narrow = $crate::simd::gate::Narrow<Gate>;
@@ -209,7 +209,7 @@ macro_rules! register_kernel {
                     unsafe { narrow($($arg),*) }
                 }
             } else {
-                // This code is never executed on targets without vectors, but it would be correct.
+                // Targets without vectors never execute this code, but its result would be correct.
                 Work::<_, f64>(($($arg,)*), ::core::marker::PhantomData).run();
             });
         }
@@ -217,8 +217,8 @@ macro_rules! register_kernel {
 }
 
 /// Defines a function that is compiled for each SIMD level in the crate that defines it. `item` is the implementation.
-/// `wide`, `narrow` and `baseline` name the function to call for each kind of register: eight numbers, four numbers,
-/// and the registers that every processor has.
+/// `wide`, `narrow` and `baseline` name the functions to call. `wide` is for registers of eight numbers, `narrow` for
+/// registers of four numbers, and `baseline` for the registers that every processor has.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! level_function {
@@ -256,7 +256,7 @@ macro_rules! level_function {
                     #[cfg(target_arch = "x86_64")]
                     Level::Avx512 => return unsafe { wide($($arg),*) },
                     Level::Baseline => {}
-                    // SAFETY: as above.
+                    // SAFETY: the processor has the SIMD level in use.
                     _ => return unsafe { narrow($($arg),*) },
                 }
             } else {});

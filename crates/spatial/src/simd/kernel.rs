@@ -1,12 +1,12 @@
-//! Work that is compiled for the instructions of a SIMD level, and the functions that enter it.
+//! Trait of functions that are compiled for the instructions of a SIMD level, and the functions that call them.
 #![allow(unsafe_code)]
 
 use crate::simd::level::{NARROW, assert_supported};
 
-/// Work that is compiled for a SIMD level. `run` is always inlined, so it is compiled for the SIMD level of the
-/// function that calls it.
+/// Function, with its arguments, that is compiled for a SIMD level. `run` is always inlined, so `run` is compiled for
+/// the SIMD level of the function that calls it.
 pub trait Kernel: Sized {
-    /// Does the work.
+    /// Runs the function on the arguments that `self` holds.
     fn run(self);
 }
 

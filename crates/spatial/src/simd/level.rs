@@ -4,9 +4,9 @@
 //! processor has. The environment variable `CONDYLE_LEVEL` (`baseline`, `simd128`, `neon`, `avx2`, `avx512`) or [`pin`]
 //! chooses a lower level.
 //!
-//! A level decides where products and sums are fused. With the same level, different machines of one architecture give
-//! the same results to the last bit. (On Arm, products are fused at every level, also at the baseline, if an algorithm
-//! asks for it.)
+//! The level decides which products and sums are fused. At the same level, different machines of one architecture give
+//! the same results to the last bit. (On Arm, every level, including the baseline, fuses the products for which an
+//! algorithm calls `mul_add`.)
 //!
 //! A WebAssembly module cannot query the processor. It has SIMD128 if it was compiled with `-C
 //! target-feature=+simd128`, and then it runs only in browsers with SIMD128: every browser since 2023. A program

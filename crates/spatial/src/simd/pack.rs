@@ -1,8 +1,8 @@
 //! Conversion between rows of numbers and SIMD vectors: one row per lane, one vector per column.
 //!
-//! L rows of L numbers are stored as L vectors, and the result is the transpose. The transposition takes log₂ L steps,
-//! which exchange ever larger parts. In each step, a vector keeps one half of its numbers and takes the other half from
-//! another vector.
+//! With L lanes, L rows of L numbers are loaded into L vectors and transposed. The transposition takes log₂ L steps. In
+//! each step, a vector keeps one half of its numbers and takes the other half from another vector. The exchanged blocks
+//! grow from step to step.
 #![allow(unsafe_code)]
 
 use crate::algebra::motion::Force;
@@ -34,8 +34,8 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     }
     let mut last = [S::Number::zero(); MOST];
     if n < S::LANES && 2 * n >= S::LANES && rows > 0 {
-        // Extends each row to the length of a vector: a row by the beginning of the next row, and the last row by
-        // zeros.
+        // Extends each row to the length of a vector, so that one load reads it. A row is extended by the start of the
+        // next row, and the last row by zeros.
         for (k, row) in each[..rows - 1].iter_mut().enumerate() {
             *row = &from[k * n..][..S::LANES];
         }
@@ -82,10 +82,10 @@ pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number
     S::enter(Scatter(*from, to, stride));
 }
 
-/// Matrix of vectors that is stored with strides, and a sign.
+/// Matrix whose entries are vectors, stored with strides and with a sign.
 #[derive(Clone, Copy, Debug)]
 pub struct Strided<'a, S> {
-    /// Numbers of all entries in memory.
+    /// Slice of vectors that contains all entries.
     pub vectors: &'a [S],
     /// Distance from one row to the next, and distance from one column to the next.
     pub strides: [usize; 2],
@@ -150,12 +150,12 @@ unsafe fn write_tile<S: Block>(mut tile: [S; MOST], negative: bool, to: &mut [&m
     S::transpose(&mut tile[..S::LANES]);
     let write = |to: &mut &mut [S::Number], x: S| {
         debug_assert!(at + S::LANES <= to.len());
-        // SAFETY: by the caller.
+        // SAFETY: the caller guarantees that the slice has `LANES` numbers from index `at` on.
         x.store(unsafe { to.get_unchecked_mut(at..at + S::LANES) });
     };
     if to.len() == S::LANES {
         for k in 0..S::LANES {
-            write(&mut to[k], tile[k]); // writes from registers
+            write(&mut to[k], tile[k]); // writes the vector from its register
         }
     } else {
         let in_memory = tile;
@@ -209,10 +209,10 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             let (mut i, mut first) = (0, 0);
             loop {
                 for k in 0..S::LANES {
-                    // SAFETY: the tile ends at the last entry or before the last entry, and the last entry exists.
+                    // SAFETY: the tile does not reach beyond the last entry, and the last entry exists.
                     block[k] = *unsafe { from.get_unchecked(i * down + tile[k]) };
                 }
-                // SAFETY: as above; the last entry has a slot in each slice of `to`.
+                // SAFETY: the tile does not reach beyond the last entry, which has a slot in each slice of `to`.
                 unsafe { write_tile(block, negative, to, first) };
                 if first + S::LANES >= n {
                     return;
@@ -262,8 +262,7 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
         offsets[k] = k * along;
     }
     // Tiles of a long row begin at a cache line, because a store across two cache lines takes longer. Only the first
-    // tile begins elsewhere and may overlap the next tile. If rows follow each other without gaps, tiles begin
-    // anywhere.
+    // tile may begin elsewhere and overlap the next tile. A matrix of several rows has no such alignment.
     let beyond_line = to[0].as_ptr().addr() / size_of::<S::Number>() % S::LANES;
     let mut shared = if rows == 1 && columns >= 2 * S::LANES { beyond_line } else { 0 };
     for i in 0..rows {
@@ -274,7 +273,7 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
                 // SAFETY: row i < rows, and column j + k < columns.
                 block[k] = *unsafe { vectors.get_unchecked(first + if BESIDE { k } else { offsets[k] }) };
             }
-            // SAFETY: likewise.
+            // SAFETY: entries (i, j) to (i, j + LANES − 1) exist and have slots in each slice of `to`.
             unsafe { write_tile(block, negative, to, i * stride + j) };
             if j + S::LANES >= columns {
                 break;
@@ -344,9 +343,9 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
 }
 
-/// Unsafe marker trait that a type must have to name vector types. Vector operations are instructions that a processor
-/// may lack, and they do not check whether it has them. [`Scalar::enter`], through which code that is generic over its
-/// scalar is entered, does check.
+/// Unsafe marker trait. Vector types have a parameter of this trait, so code without such a type cannot name them. A
+/// processor may lack the instructions of vector operations, and the operations do not check this. [`Scalar::enter`],
+/// which calls code that is generic over the scalar, checks this.
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};

@@ -9,7 +9,7 @@ use crate::algebra::vector::{Mat3, Sym3, Vec3};
 use crate::simd::fused_f64::FusedF64;
 use core::mem::ManuallyDrop;
 
-/// Type whose values in memory may be read and written as values of type `B`.
+/// Type whose values in memory may be read and written as values of type `B`. Two such types are called alike.
 ///
 /// Kernels take only arguments of such types. The compiler accepts an [`Array`](crate::storage::Array) in a workspace.
 /// It rejects a `Vec<S>`, whose layout is not guaranteed. The macro [`same_layout!`](crate::same_layout) implements
@@ -41,7 +41,7 @@ pub unsafe fn same<A, B>(a: A) -> B {
 impl<'a, A: SameLayout<B>, B> Rename<&'a B> for &'a A {
     #[inline(always)]
     fn renamed(self) -> &'a B {
-        // SAFETY: the value is a valid B as well.
+        // SAFETY: a valid A is also a valid B, by `SameLayout`.
         unsafe { &*core::ptr::from_ref(self).cast() }
     }
 }
@@ -50,7 +50,8 @@ impl<'a, A: SameLayout<B>, B> Rename<&'a B> for &'a A {
 impl<'a, A: SameLayout<B>, B> Rename<&'a mut B> for &'a mut A {
     #[inline(always)]
     fn renamed(self) -> &'a mut B {
-        // SAFETY: the value is a valid B as well, and each B that is written through the reference is a valid A.
+        // SAFETY: by `SameLayout`, the value is a valid B, and each B that is written through the reference is a valid
+        // A.
         unsafe { &mut *core::ptr::from_mut(self).cast() }
     }
 }
@@ -59,7 +60,8 @@ impl<'a, A: SameLayout<B>, B> Rename<&'a mut B> for &'a mut A {
 impl<'a, A: SameLayout<B>, B> Rename<&'a [B]> for &'a [A] {
     #[inline(always)]
     fn renamed(self) -> &'a [B] {
-        // SAFETY: as for a reference to one value. The entries have the same size, and so the same distance.
+        // SAFETY: by `SameLayout`, each entry is also a valid entry of the other type, and both types have the same
+        // size.
         unsafe { &*(core::ptr::from_ref(self) as *const [B]) }
     }
 }
@@ -68,7 +70,8 @@ impl<'a, A: SameLayout<B>, B> Rename<&'a [B]> for &'a [A] {
 impl<'a, A: SameLayout<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
     #[inline(always)]
     fn renamed(self) -> &'a mut [B] {
-        // SAFETY: as for a reference to one value. The entries have the same size, and so the same distance.
+        // SAFETY: by `SameLayout`, each entry is also a valid entry of the other type, and both types have the same
+        // size.
         unsafe { &mut *(core::ptr::from_mut(self) as *mut [B]) }
     }
 }
@@ -117,14 +120,14 @@ impl Rename<f64> for FusedF64 {
     }
 }
 
-/// Implements [`SameLayout`] for a struct over a scalar: it declares that the struct over `f64` is alike the struct
-/// over [`FusedF64`].
+/// Implements [`SameLayout`] for a struct over a scalar: it declares that the struct over `f64` and the struct over
+/// [`FusedF64`] are alike, which means that their memory layouts are the same.
 ///
 /// Name first the fields that depend on the scalar and, after `same`, the other fields. The compiler checks three
-/// things: no field is missing, each field is alike or the same, and each field has the same offset in both structs.
-/// Offsets are equal if the struct is `repr(C)`.
+/// conditions. No field is missing. The types of each field in the two structs are alike or the same. Each field has
+/// the same offset in both structs. Offsets are equal if the struct is `repr(C)`.
 ///
-/// A type that does not depend on a scalar is declared to be alike itself.
+/// For a type that does not depend on a scalar, the macro declares that the type is alike to itself.
 ///
 /// ```
 /// use condyle_spatial::{Array, Motion, same_layout};
@@ -152,7 +155,7 @@ impl Rename<f64> for FusedF64 {
 #[doc(hidden)]
 macro_rules! same_layout {
     ($($type:ty),+ $(,)?) => {$(
-        // SAFETY: both types are the same.
+        // SAFETY: the type is compared with itself.
         #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::same_layout::SameLayout<$type> for $type {}
@@ -165,8 +168,8 @@ macro_rules! same_layout {
         }
     )+};
     ($name:ident { $($field:ident),* $(,)? } $(same { $($same:ident),* $(,)? })?) => {
-        // SAFETY: the fields are alike or the same and have equal offsets; otherwise the checks below would not
-        // compile.
+        // SAFETY: the fields have `SameLayout` or the same type, and equal offsets. Otherwise the checks below would
+        // not compile.
         #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::same_layout::SameLayout<$name<$crate::simd::FusedF64>> for $name<f64> {}
@@ -174,7 +177,7 @@ macro_rules! same_layout {
         impl $crate::simd::same_layout::Rename<$name<$crate::simd::FusedF64>> for $name<f64> {
             #[inline(always)]
             fn renamed(self) -> $name<$crate::simd::FusedF64> {
-                // SAFETY: they are alike.
+                // SAFETY: both types have the same layout, by `SameLayout`.
                 #[allow(unsafe_code)]
                 unsafe {
                     $crate::simd::same_layout::same(self)

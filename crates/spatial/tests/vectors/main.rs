@@ -23,7 +23,7 @@ trait Number: Real<Mask = bool> {
     /// Returns self · b + c, rounded once.
     fn fused(self, b: Self, c: Self) -> Self;
     fn bits(self) -> u64;
-    /// Returns special values and ordinary ones. Their count is a multiple of every number of lanes.
+    /// Returns special values and ordinary values. The number of values is a multiple of every number of lanes.
     fn some() -> Vec<Self>;
 }
 
@@ -33,7 +33,7 @@ macro_rules! number {
             fn fused(self, b: Self, c: Self) -> Self {
                 $float::mul_add(self, b, c)
             }
-            /// Returns the bits of the number. The bits are the same for all NaNs.
+            /// Returns the bits of the number; every NaN gives the same bits.
             fn bits(self) -> u64 {
                 if self.is_nan() { u64::MAX } else { self.to_bits().into() }
             }
@@ -96,8 +96,8 @@ impl<S: Block<Number: Number>> Operations<S> {
     }
 }
 
-/// Checks sines and cosines of an odd number of vectors. The bits equal the results for each vector alone, and single
-/// numbers agree up to rounding. The vectors mix small and large angles.
+/// Checks sines and cosines of an odd number of vectors with small and large angles. The bits equal the results for
+/// each vector alone. Single numbers agree up to rounding.
 struct Sines<S>(PhantomData<S>);
 
 impl<S: Block<Number: Number>> Kernel for Sines<S> {

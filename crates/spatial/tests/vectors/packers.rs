@@ -45,7 +45,7 @@ impl<S: Block<Number: From<u16> + PartialEq>> Back<S> {
             scatter(&again, S::LANES, &mut back);
             (0..S::LANES).for_each(|k| assert!(back[k * n..][..n] == rows[k.min(some - 1) * n..][..n]));
         }
-        // as a matrix, and as minus the transpose of the matrix, with fewer or more columns than lanes
+        // the vectors are written as a matrix and as minus its transpose, with fewer or more columns than lanes
         for (columns, more) in [(n, 3), (1, 3), (n, 0), (1, 0), (2, 0), (2, 3)] {
             if !n.is_multiple_of(columns) {
                 continue;

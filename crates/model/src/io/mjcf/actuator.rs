@@ -10,8 +10,8 @@ use std::rc::Rc;
 /// Interval of all real numbers.
 pub(super) const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// Range, and a flag that says whether the range is a limit. Without a flag, the range is a limit if its numbers are in
-/// ascending order.
+/// Range, with a flag that says whether the range is a limit. Without a flag, the range is a limit if its lower bound
+/// is below its upper bound.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Range {
     pub(super) numbers: [f64; 2],
@@ -28,7 +28,7 @@ impl Range {
         Ok(self)
     }
 
-    /// Returns the range if it is a limit. `name` is the name of its attribute.
+    /// Returns the range if it is a limit. `name` is the name of the range's attribute.
     pub(super) fn bounds(&self, e: &Element, name: &str, autolimits: bool) -> Result<Option<[f64; 2]>, Error> {
         let [lower, upper] = self.numbers;
         if self.limited == Some(true) && lower >= upper {
@@ -167,7 +167,7 @@ pub(super) fn scaled([lower, upper]: [f64; 2], by: f64) -> [f64; 2] {
     }
 }
 
-/// Clips the ends of an interval to another interval.
+/// Clips the bounds of an interval to another interval.
 pub(super) fn clipped(of: [f64; 2], [lower, upper]: [f64; 2]) -> [f64; 2] {
     of.map(|x| x.clamp(lower, upper))
 }
@@ -194,7 +194,8 @@ impl Law<'_> {
         scaled(activation, self.gainprm[0]).map(|f| f + bias[0])
     }
 
-    /// Returns gain, bias, kp and kv of f = gain u + bias − kp l − kv l̇, or the reason why the law has another form.
+    /// Returns gain, bias, kp and kv of f = gain u + bias − kp l − kv l̇, or the reason why the actuator's force does
+    /// not have this form.
     pub(super) fn affine(&self) -> Result<[f64; 4], &'static str> {
         let [g, ..] = self.gainprm;
         let [b0, b1, b2, ..] = self.biasprm;

@@ -28,7 +28,7 @@ pub(super) struct Assets<'a> {
 }
 
 impl<'a> Assets<'a> {
-    /// Finds the assets of a file. An asset without a name is named after its file, without folder and extension.
+    /// Collects the assets of a file. An asset without a name gets the name of its file, without folder and extension.
     pub(super) fn read(root: &'a Element) -> Result<Self, Error> {
         let all = |tag: &'static str| root.all("asset").flat_map(move |section| section.all(tag));
         for tag in ["mesh", "hfield"] {
@@ -47,7 +47,8 @@ impl<'a> Assets<'a> {
         Self::find(&self.meshes, a, "mesh")
     }
 
-    /// Returns half the sides of a box (m) that has the mass of a height field: its base, and half of its height.
+    /// Returns half the side lengths (m) of the box that has the mass of a height field. The box contains the base of
+    /// the field and half of its height.
     pub(super) fn field(&self, a: &Attributes) -> Result<Option<[f64; 3]>, Error> {
         let Some(field) = Self::find(&self.fields, a, "hfield")? else { return Ok(None) };
         let size = Attributes::plain(field).array("size")?;
@@ -79,7 +80,7 @@ pub(super) struct Solids {
 
 #[cfg(not(feature = "meshes"))]
 impl Solids {
-    /// Returns the error that this build cannot read meshes.
+    /// Returns an error, because this build cannot read meshes.
     pub(super) fn get<T, U>(&mut self, _: &T, _: &Element, _: &[U]) -> Result<Solid, String> {
         Err("this build reads no meshes (feature `meshes`)".to_owned())
     }
@@ -130,12 +131,13 @@ impl Solids {
         let [w, x, y, z] = a.array("refquat").map_err(said)?.unwrap_or([1.0, 0.0, 0.0, 0.0]);
         let R = Quaternion::new(x, y, z, w).normalize().to_rotation();
         let placed = |p: &[f64; 3]| {
-            let p = R.transpose_mul(Vec3::from(p.map(|x| f64::from(x as f32))) - origin); // MuJoCo reads floats
+            // MuJoCo reads the coordinates in single precision.
+            let p = R.transpose_mul(Vec3::from(p.map(|x| f64::from(x as f32))) - origin);
             Vec3::new(p.x * scale.x, p.y * scale.y, p.z * scale.z)
         };
         let points: Vec<_> = points.iter().map(placed).collect();
         if scale.x * scale.y * scale.z < 0.0 {
-            triangles.iter_mut().for_each(|t| t.swap(1, 2)); // a mirrored mesh has its triangles inside out
+            triangles.iter_mut().for_each(|t| t.swap(1, 2)); // mirroring turns triangles inside out
         }
         let exact = if source.compiler.exact_meshes { "exact" } else { "legacy" };
         let rule = if builtin == Some("plate") { "shell" } else { a.get("inertia").unwrap_or(exact) };
@@ -143,8 +145,7 @@ impl Solids {
         Ok(Solid { lost, ..Solid::new(&points, triangles, rule)? })
     }
 
-    /// Returns the points and triangles in the file of a mesh, and the number of faces with triangles that are left
-    /// out.
+    /// Returns the points and triangles in the file of a mesh, and the number of faces of which triangles are left out.
     fn file(
         &mut self,
         source: &Source,
@@ -177,7 +178,8 @@ impl Solids {
             Some((_, "vnd.mujoco.msh")) => None,
             _ if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) => None,
             _ => {
-                // COLLADA is read only for web pages, because MuJoCo cannot read it.
+                // Accepts only OBJ and STL here: MuJoCo cannot read COLLADA, and Condyle reads COLLADA only for web
+                // pages.
                 let known = Format::of(path).filter(|format| [Format::Obj, Format::Stl].contains(format));
                 Some(known.ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?)
             }

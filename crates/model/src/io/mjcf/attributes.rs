@@ -8,8 +8,8 @@ use condyle_spatial::Vec3;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Attributes of one kind of element in a class. Each attribute has one or more texts. If a text has fewer numbers than
-/// the texts before it, it replaces only their first numbers.
+/// Attributes of one kind of element in a class. Each attribute has one or more texts, the innermost class last. If a
+/// text has fewer numbers than the texts before it, only the first numbers are replaced.
 type Inherited<'a> = HashMap<&'a str, Rc<[&'a str]>>;
 
 /// Attributes of a class, by kind of element.
@@ -24,7 +24,7 @@ pub(super) const MAIN: &str = "main";
 /// Default classes, each with the attributes that it inherits.
 pub(super) struct Defaults<'a> {
     classes: HashMap<&'a str, Class<'a>>,
-    /// Number of attributes and of kinds of elements of all classes.
+    /// Size of all classes: the number of their attribute texts plus the number of their kinds of elements.
     size: usize,
 }
 
@@ -47,7 +47,8 @@ impl<'a> Defaults<'a> {
         for kind in element.children.iter().filter(|c| c.tag != "default") {
             let inherited = class.entry(&kind.tag).or_default();
             if ORIENTATIONS.iter().any(|name| kind.attribute(name).is_some()) {
-                inherited.retain(|name, _| !ORIENTATIONS.contains(name)); // the last orientation counts
+                // A new orientation replaces all inherited orientations.
+                inherited.retain(|name, _| !ORIENTATIONS.contains(name));
             }
             for (name, value) in &kind.attributes {
                 let count = value.split_whitespace().count();
@@ -80,7 +81,7 @@ impl<'a> Defaults<'a> {
         Ok(Attributes { element, class: self.classes[name].get(element.tag.as_str()) })
     }
 
-    /// Returns an element with the defaults that its class has for another kind of element.
+    /// Returns the attributes of an element, with the defaults that its class has for another kind of element.
     pub(super) fn of_kind<'e>(
         &'e self,
         element: &'e Element,
@@ -103,7 +104,7 @@ impl<'a> Defaults<'a> {
     }
 }
 
-/// Attributes of an element. An attribute that the element lacks is taken from its class.
+/// Attributes of an element. An attribute that the element does not have is taken from its class.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
     class: Option<&'a Inherited<'a>>,

@@ -1,5 +1,6 @@
-//! Sections of a file other than the tree of bodies. They are read in the order in which they depend on each other:
-//! tendons and actuators add armature, springs may depend on inertia, and limits of effort are sums over actuators.
+//! Sections of a file other than the tree of bodies. These sections are read in the order of their dependencies.
+//! Tendons and actuators add armature, so they come before springs, which may depend on inertia. Limits of effort come
+//! last, as sums over actuators.
 
 use super::Source;
 use super::keyframe;
@@ -13,7 +14,7 @@ use crate::model::Model;
 use crate::warning::Warning;
 use condyle_spatial::Se3;
 
-/// Adds everything in the file except the tree to the model. Returns warnings about items that are left out. `poses`
+/// Adds all sections of a file except the tree to the model. Returns warnings about items that are left out. `poses`
 /// contains the pose of each body in the world, in the initial configuration of the file.
 pub(super) fn add<'a>(
     model: &mut Model,

@@ -11,7 +11,7 @@ const MAX_POINTS: f64 = (1 << 20) as f64;
 /// points.
 pub(super) fn shape(kind: &str, params: &[f64]) -> Result<Triangles, String> {
     let wrong = || format!("builtin: a {kind} with params {} cannot be", crate::io::xml::words(params));
-    // Converts a number of steps to an integer; decimals are ignored.
+    // Converts a number of steps to an integer and drops its decimals.
     let steps = |x: f64, least: f64, most: f64| {
         let x = x.trunc();
         if x >= least && x <= most { Ok(x as usize) } else { Err(wrong()) }
@@ -80,7 +80,8 @@ fn sphere(divisions: usize) -> Triangles {
     (points.into_iter().map(|p| p.map(f64::from)).collect(), triangles)
 }
 
-/// Returns a unit hemisphere on a disc. Its points are rings of 4, 8, 12, … points, and the centre of the disc.
+/// Returns a unit hemisphere that is closed by a disc. Its points are rings of 4, 8, 12, … points, and the centre of
+/// the disc.
 fn hemisphere(rings: usize) -> Triangles {
     let equator = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
     let (mut points, mut triangles) = (vec![[0.0, 0.0, 1.0]], Vec::new());
@@ -166,7 +167,7 @@ fn supertorus(n: usize, radius: f64, s: f64, t: f64) -> Triangles {
     (points, triangles)
 }
 
-/// Returns directions inside a field of view (degrees). They are denser in the middle.
+/// Returns directions inside a field of view (degrees). The directions are denser in the middle of the field.
 fn wedge(count: [usize; 2], view: [f64; 2], gamma: f64) -> Vec<[f64; 3]> {
     let edge = |axis: usize, i: usize| {
         let x = -1.0 + 2.0 * i as f64 / count[axis] as f64;

@@ -1,11 +1,11 @@
-//! Settings of `<compiler>`, and poses whose meaning depends on these settings.
+//! Settings of `<compiler>`, and the conversion of poses with these settings.
 
 use super::attributes::Attributes;
 use crate::error::Error;
 use crate::io::xml::Element;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 
-/// Rule that says when a body gets its inertia from its geoms.
+/// Rule for when the inertia of a body is computed from its geoms.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum FromGeoms {
     Never,
@@ -30,15 +30,15 @@ pub(super) struct Compiler {
     pub(super) total_mass: Option<f64>,
     /// Whether a free joint is placed at the frame of inertia of its body.
     pub(super) align_free: bool,
-    /// Folder of meshes. The next field says whether only the names of mesh files are used, without the folders in
-    /// their addresses.
+    /// Folder of mesh files.
     pub(super) mesh_folder: String,
+    /// Whether only the names of mesh files are used, without the folders in their addresses.
     pub(super) strip_path: bool,
     /// Whether a primitive is fitted to the bounding box of a mesh. Otherwise, it is fitted to a box with the inertia
     /// of the mesh.
     pub(super) fit_box: bool,
-    /// Whether a mesh without its own rule uses the rule `exact` instead of `legacy`. This is an attribute of MuJoCo
-    /// before 3.2.4.
+    /// Whether a mesh without its own inertia rule uses the rule `exact` instead of `legacy`. Only MuJoCo before
+    /// version 3.2.4 has this attribute.
     pub(super) exact_meshes: bool,
 }
 
@@ -114,7 +114,7 @@ impl Compiler {
         Ok(())
     }
 
-    /// Returns the pose specified by pos and one of quat, axisangle, euler, xyaxes and zaxis.
+    /// Returns the pose given by the attribute pos and one of the attributes quat, axisangle, euler, xyaxes and zaxis.
     pub(super) fn pose(&self, a: &Attributes) -> Result<Se3<f64>, Error> {
         Ok(Se3::new(self.rotation(a)?, a.vector("pos")?.unwrap_or(Vec3::zero())))
     }
@@ -168,7 +168,7 @@ impl Compiler {
             let mut v = [0.0; 3];
             v[usize::from(axis.to_ascii_lowercase() - b'x')] = 1.0;
             let turn = turn(v.into(), angle * self.angle);
-            // A lower-case letter is a rotation about an axis that the earlier rotations have turned.
+            // A lower-case letter stands for a rotation about the moving axis, which the earlier rotations have turned.
             R = if axis.is_ascii_lowercase() { R * turn } else { turn * R };
         }
         R

@@ -38,7 +38,7 @@ impl<'p> Places<'p> {
         }
     }
 
-    /// Returns the pose in the world of a pose in a body's frame, in the initial configuration of the file.
+    /// Converts a pose in a body's frame to a pose in the world, in the initial configuration of the file.
     fn drawn(&self, (BodyId(body), X): At) -> Se3<f64> {
         self.poses[body] * X
     }
@@ -136,8 +136,8 @@ struct Followers {
 }
 
 impl Followers {
-    /// Lets a joint follow another joint. Returns whether this is possible: the follower must not follow a joint
-    /// already, and the leader must not follow it.
+    /// Lets a joint follow another joint. Returns `false` if the follower already follows a joint, or if the leader
+    /// follows this follower.
     fn add(&mut self, follower: usize, leader: usize) -> bool {
         if self.leaders.contains_key(&follower) || self.refused.contains(&follower) {
             return false;
@@ -155,7 +155,8 @@ impl Followers {
     }
 }
 
-/// Returns the two frames that a loop connects, and whether the loop also fixes their relative orientation.
+/// Returns the two frames that a loop constraint connects, and whether the constraint also fixes their relative
+/// orientation.
 fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let a = Attributes::plain(e);
     let rigid = e.tag == "weld" && a.number("torquescale")? != Some(0.0);
@@ -173,7 +174,7 @@ fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let (b2, X2) = places.find(e, "body2")?.unwrap_or(world);
     let [W1, W2] = [places.drawn((b1, X1)), places.drawn((b2, X2))];
     if e.tag == "connect" {
-        // The anchor is a point of body1. It is also the point of body2 that is at the same place in the initial
+        // The anchor is a point of body1. The corresponding point of body2 coincides with the anchor in the initial
         // configuration.
         let anchor = point(anchor.ok_or_else(|| e.lacks("anchor"))?);
         return Ok(([(b1, X1 * anchor), (b2, X2 * (W2.inverse() * W1 * anchor))], rigid));

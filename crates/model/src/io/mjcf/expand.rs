@@ -1,5 +1,5 @@
 //! Expansion of `<replicate>` and `<attach>`: each element is replaced by copies of a part of the tree, with new names.
-//! Elements of other sections that refer only to the copied part are copied, too, as in MuJoCo.
+//! Elements of other sections are copied, too, if they refer only to the copied part. MuJoCo does the same.
 
 use super::attributes::Attributes;
 use super::compiler::Compiler;
@@ -11,7 +11,8 @@ use condyle_spatial::Vec3;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Maximum number of `<attach>` elements of a robot; chosen because the attached file is searched for each of them.
+/// Maximum number of `<attach>` elements of a robot. The number is limited because each element needs a search of the
+/// attached file.
 const MAX_ATTACHMENTS: usize = 256;
 
 /// Replaces each `<replicate>` and `<attach>` of a file by copies. `folder` is the folder of the file.
@@ -44,8 +45,8 @@ fn looks_for(element: &Element, attached: &mut HashSet<Option<Name>>) -> bool {
     element.children.iter().fold(any, |any, child| looks_for(child, attached) || any)
 }
 
-/// Returns the kind and name of the part that an `<attach>` names; `None` if everything in the world of the attached
-/// file is meant.
+/// Returns the kind and name of the part that an `<attach>` names; `None` if the `<attach>` copies everything in the
+/// world of the attached file.
 fn part(attach: &Element) -> Option<(&'static str, &str)> {
     ["body", "frame"].into_iter().find_map(|kind| Some((kind, attach.attribute(kind)?)))
 }
@@ -74,14 +75,14 @@ struct Expansion<'f> {
     compiler: Compiler,
     models: Vec<(String, usize)>,
     sections: Sections,
-    /// Names of the bodies and frames of this file that `<attach>` elements of this file copy.
+    /// Names of the bodies and frames of this file that `<attach>` elements in the same file copy.
     wanted: HashSet<Name>,
-    /// Elements whose names are in `wanted`, each with the class of the element around it.
+    /// Elements whose names are in `wanted`, each with the default class of its parent element.
     found: HashMap<Name, (Element, Option<String>)>,
 }
 
 impl Expansion<'_> {
-    /// Expands the content of an element at this depth. `class` is the class of the element around it.
+    /// Expands the content of an element at the given depth. `class` is the default class of its parent element.
     fn inside(&mut self, element: &mut Element, class: Option<&str>, depth: usize) -> Result<(), Error> {
         let own = element.attribute("childclass").map(str::to_owned);
         let class = own.as_deref().or(class);
@@ -103,7 +104,8 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Stores a copy of an element that is attached elsewhere in the file, with the class of the element around it.
+    /// Stores a copy of an element if an `<attach>` of the same file copies it. Also stores the default class of its
+    /// parent element.
     fn remember(&mut self, element: &Element, class: Option<&str>) -> Result<(), Error> {
         let kind = if element.tag == "body" { "body" } else { "frame" };
         let name = element.attribute("name").map(|name| (kind, name.to_owned()));
@@ -114,8 +116,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Stores the elements inside a copy that are attached elsewhere, as [`remember`](Self::remember) does for one
-    /// element.
+    /// Applies [`remember`](Self::remember) to a copy and to all bodies and frames inside it.
     fn remember_inside(&mut self, copy: &Element, class: Option<&str>) -> Result<(), Error> {
         if self.wanted.is_empty() || !matches!(&*copy.tag, "body" | "frame") {
             return Ok(());
@@ -167,7 +168,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Copies elements of the sections. `referring` lists the elements, which refer to a copied part of the tree.
+    /// Copies elements of the sections. `referring` lists the elements that refer to a copied part of the tree.
     fn copy_referring(&mut self, referring: &[(usize, usize)], rename: &dyn Fn(&str) -> String) -> Result<(), Error> {
         for &at in referring {
             if let Some(copy) = self.sections.get(at).map(|e| copied(e, rename, 3)).transpose()? {
@@ -178,7 +179,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Adds the part that an `<attach>` names. It is in this file or in another one.
+    /// Adds a copy of the part that an `<attach>` names. The part is in this file or in another file.
     fn attach(
         &mut self,
         element: &Element,
@@ -276,7 +277,7 @@ fn with_class(mut element: Element, class: Option<&str>) -> Element {
     element
 }
 
-/// Finds a body or frame inside an element, and returns it with the class of the element around it.
+/// Finds a body or frame inside an element, and returns it with the default class of its parent element.
 fn find<'e>(
     element: &'e Element,
     kind: &str,
@@ -303,7 +304,8 @@ fn names(elements: &[Element]) -> Vec<Name> {
     names
 }
 
-/// Returns a copy of an element for this depth. Names and references to names are changed by `rename`.
+/// Returns a copy of an element for the given depth. `rename` changes the names in the copy and the references to
+/// names.
 fn copied(element: &Element, rename: &dyn Fn(&str) -> String, depth: usize) -> Result<Element, Error> {
     if depth > MAX_DEPTH {
         let what = format!("is at depth {depth}, copies counted: at most {MAX_DEPTH} are allowed");

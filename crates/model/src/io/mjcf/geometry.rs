@@ -31,13 +31,13 @@ impl Weight {
         self.pose.act(Inertia::from_com(self.mass, Vec3::zero(), diagonal(self.moments)))
     }
 
-    /// Returns the same weight in another frame, in which the current frame has the pose X.
+    /// Returns the same inertia in another frame, in which the current frame has the pose X.
     pub(super) fn seen_from(self, X: Se3<f64>) -> Self {
         Self { pose: X * self.pose, ..self }
     }
 
-    /// Returns the sum of weights, and its principal axes. A single weight keeps its axes. The axes of a sum are
-    /// computed by MuJoCo's method.
+    /// Returns the sum of inertias and the principal axes of the sum. A single inertia keeps its axes. The axes of a
+    /// sum are computed by MuJoCo's method.
     pub(super) fn sum(weights: &[Self]) -> Option<(Inertia<f64>, Se3<f64>)> {
         let sum = weights.iter().fold(Inertia::zero(), |sum, w| sum + w.inertia());
         match weights {
@@ -115,8 +115,8 @@ pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Erro
     Ok(heavy && (compiler.groups[0]..=compiler.groups[1]).contains(&group))
 }
 
-/// Returns the weight of a geom that has mass, in the frame in which the pose of the geom is given. `mesh` is the mesh
-/// of the geom. `field` contains half the sides of the box of the geom's height field.
+/// Returns the inertia of a geom that has mass, in the frame in which the pose of the geom is given. `mesh` is the mesh
+/// of the geom. `field` contains half the side lengths of the box that replaces the geom's height field.
 pub(super) fn geom(
     compiler: &Compiler,
     a: &Attributes,
@@ -254,10 +254,12 @@ fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
         }
         _ => {
             let [x, y, z] = [a, size[1], size[2]];
-            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area); // areas of both sides across each axis
+            // Areas of both faces that are normal to each axis.
+            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area);
             let total: f64 = areas.iter().sum();
             let [across_x, across_y, across_z] = areas.map(|area| area / total);
-            // The mean of x² over the sides of the box is x² for the two sides across x, and x²/3 for the other sides.
+            // With the half length x, the mean of the squared coordinate is x² over the two faces perpendicular to the
+            // x axis, and x²/3 over the other faces.
             let square = |half: f64, across: f64| half * half * (across + (1.0 - across) / 3.0);
             let [xx, yy, zz] = [square(x, across_x), square(y, across_y), square(z, across_z)];
             (total, [yy + zz, xx + zz, xx + yy])

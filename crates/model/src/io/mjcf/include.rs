@@ -10,7 +10,7 @@ use crate::warning::Warning;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Known attributes and elements that a model cannot represent, and the effect of each missing feature.
+/// Known attributes and elements that a model cannot represent, and the consequence of each omission.
 const LEFT_OUT: &LeftOut = &[];
 
 /// File with its own settings, in which all `<include>`, `<replicate>` and `<attach>` elements have been replaced.
@@ -47,7 +47,7 @@ impl Files {
         self.read_text(path, &text)
     }
 
-    /// Reads a text instead of the file at `path`; otherwise does the same as [`read`](Self::read).
+    /// Reads a text instead of the file at `path`, in the same way as [`read`](Self::read).
     pub(super) fn read_text(&mut self, path: &Path, text: &str) -> Result<usize, Error> {
         let own = path.canonicalize().unwrap_or(path.to_owned());
         if self.open.contains(&own) {
@@ -60,7 +60,8 @@ impl Files {
         Ok(index)
     }
 
-    /// Reads a text, as [`read`](Self::read) reads a file. Without a folder, the text cannot refer to files.
+    /// Reads a text in the same way as [`read`](Self::read) reads a file. If `folder` is `None`, the text cannot refer
+    /// to files.
     pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
         let root = Element::parse(text, file, &mut self.amount)?;
         self.add(root, folder)
@@ -102,8 +103,8 @@ impl Files {
 /// Attributes whose values may be empty.
 const EMPTY: [&str; 8] = ["class", "childclass", "prefix", "sep", "file", "assetdir", "meshdir", "texturedir"];
 
-/// Marks an element and its content as part of the file with index `source`. Removes attributes with empty numbers and
-/// names, which do not override a default in MuJoCo.
+/// Marks an element and its content as part of the file with index `source`. Removes numbers and names with an empty
+/// value, because in MuJoCo they do not override a default.
 fn belongs_to(element: &mut Element, source: usize) {
     element.source = source;
     element.attributes.retain(|(name, value)| !value.trim().is_empty() || EMPTY.contains(&&**name));
@@ -124,8 +125,7 @@ struct Includes<'a> {
 }
 
 impl Includes<'_> {
-    /// Replaces all `<include>` elements inside an element. The element is at this depth, and its file is in
-    /// `folder`.
+    /// Replaces all `<include>` elements inside an element at the given depth. The file of the element is in `folder`.
     fn resolve(&mut self, element: &mut Element, folder: Option<&Path>, depth: usize) -> Result<(), Error> {
         if depth > MAX_DEPTH {
             let what = format!("is at depth {depth}, files included: at most {MAX_DEPTH} are allowed");

@@ -17,7 +17,7 @@ use std::collections::HashSet;
 const MAX_NUMBERS: usize = 1 << 22;
 
 /// Adds the keyframes of a file. As in MuJoCo, missing positions are taken from the initial configuration of the file,
-/// and missing velocities and controls are 0. `driven` contains, for each actuator of the model, its index in the file.
+/// and missing velocities and controls are 0. `driven` contains the index in the file of each actuator of the model.
 pub(super) fn add(
     model: &mut Model,
     root: &Element,
@@ -93,7 +93,8 @@ pub(super) fn add(
     Ok(())
 }
 
-/// Returns the control of each actuator of the model. The control of an integrator is its activation.
+/// Returns the control of each actuator of the model. If an actuator integrates its control, the control in the model
+/// is the activation in the file.
 fn control(e: &Element, inputs: &[Inputs], driven: &[usize], warnings: &mut Vec<Warning>) -> Result<Vec<f64>, Error> {
     let list = |attribute: &str, expected: Option<usize>| {
         let found = Attributes::plain(e).list(attribute)?.unwrap_or_default();
@@ -130,7 +131,7 @@ fn control(e: &Element, inputs: &[Inputs], driven: &[usize], warnings: &mut Vec<
     Ok(found)
 }
 
-/// Returns the name that the file gives a keyframe.
+/// Returns the name of a keyframe in the file.
 fn own(e: &Element) -> Option<&str> {
     e.attribute("name").filter(|name| !name.is_empty())
 }

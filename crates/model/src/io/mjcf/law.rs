@@ -1,5 +1,6 @@
-//! Laws of actuators: the force as a function of control, length and velocity. All kinds of actuators have the same
-//! general law, and each kind sets other parameters. In a default class, each kind has its own defaults.
+//! Force laws of actuators: the force as a function of control, length and velocity. All kinds of actuators have the
+//! same general force law, and each kind sets other parameters of this law. In a default class, each kind has its own
+//! defaults.
 
 use super::attributes::Attributes;
 use crate::error::Error;
@@ -10,7 +11,7 @@ use std::rc::Rc;
 /// Number of parameters in each of `dynprm`, `gainprm` and `biasprm`.
 const PARAMETERS: usize = 10;
 
-/// Kinds of actuators. They are the tags of elements in `<actuator>` and in a default class.
+/// Kinds of actuators: the tags of elements in `<actuator>` and in a default class.
 pub(super) const KINDS: [&str; 13] = [
     "general",
     "motor",
@@ -27,7 +28,7 @@ pub(super) const KINDS: [&str; 13] = [
     "plugin",
 ];
 
-/// Attributes of a DC motor that a model cannot represent, and the effect of each missing feature.
+/// Attributes of a DC motor that a model cannot represent, and the consequence of each omission.
 const EXTRAS: [(&str, &str); 5] = [
     ("inductance", "inductance: its current follows the voltage at once"),
     ("thermal", "thermal: its resistance does not change with the temperature"),
@@ -36,7 +37,7 @@ const EXTRAS: [(&str, &str); 5] = [
     ("cogging", "cogging: it has no cogging torque"),
 ];
 
-/// Law of an actuator with length l and activation a. The activation follows the control u:
+/// Force law of an actuator with length l and activation a. The activation follows the control u:
 ///
 /// ```text
 /// f = gain(l, l̇) · a + bias(l, l̇)
@@ -51,11 +52,11 @@ pub(super) struct Law<'a> {
     /// Coefficients b of an affine bias b₀ + b₁ l + b₂ l̇. A positive b₂ of a servo is a damping ratio.
     pub(super) biasprm: [f64; PARAMETERS],
     /// Ratio of the control range to the range of the driven joint or tendon; 0 if the control range does not depend on
-    /// that range.
+    /// the range of the joint or tendon.
     pub(super) inherit: f64,
     /// Selected inputs, for a kind of actuator that has several inputs.
     pub(super) input: Option<&'a str>,
-    /// Feature of a DC motor that a model cannot represent, and the effect of the missing feature.
+    /// Attribute of a DC motor that a model cannot represent, and the consequence of the omission.
     pub(super) extra: &'static str,
 }
 
@@ -68,15 +69,15 @@ impl Default for Law<'_> {
     }
 }
 
-/// Law of a default class. It is the law of the last element in the class, of any kind.
+/// Force law of a default class: the force law of the last actuator element in the class.
 struct ClassLaw<'a> {
     kind: &'a str,
     law: Law<'a>,
-    /// Law of the enclosing class.
+    /// Force law of the enclosing class.
     outer: Option<Rc<Self>>,
 }
 
-/// Laws of a default class and of the classes that enclose it.
+/// Force laws of a default class and of the classes that enclose it.
 #[derive(Clone, Default)]
 pub(super) struct Laws<'a> {
     outer: Option<Rc<ClassLaw<'a>>>,
@@ -84,13 +85,13 @@ pub(super) struct Laws<'a> {
 }
 
 impl<'a> Laws<'a> {
-    /// Returns the laws with which a nested class begins, before its elements are read.
+    /// Returns the initial force laws of a nested class, before the elements of the class are read.
     pub(super) fn inner(&self) -> Self {
         Self { outer: self.own.clone().or_else(|| self.outer.clone()), own: None }
     }
 
-    /// Returns the law of an element of `<actuator>`. The law inherits from the innermost class whose last element has
-    /// the same kind or is a `<general>`. A `<general>` inherits from any class.
+    /// Returns the force law of an element of `<actuator>`. Its parameters are inherited from the innermost class whose
+    /// last element has the same kind or is a `<general>`. A `<general>` inherits from any class.
     pub(super) fn of(&self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
         let kind = e.tag.as_str();
         let mut class = self.own.as_ref().or(self.outer.as_ref());
@@ -107,7 +108,7 @@ impl<'a> Laws<'a> {
         Ok(law)
     }
 
-    /// Adds an element of a default class, and returns its law.
+    /// Adds an element of a default class, and returns its force law.
     pub(super) fn add(&mut self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
         let law = self.of(e, viscous)?;
         self.own = Some(Rc::new(ClassLaw { kind: &e.tag, law, outer: self.outer.clone() }));
@@ -116,7 +117,7 @@ impl<'a> Laws<'a> {
 }
 
 impl<'a> Law<'a> {
-    /// Returns the law with which a kind begins, when it inherits from a general law.
+    /// Returns the initial force law of an actuator of one kind that inherits from the general law `self`.
     fn begin(&self, kind: &str) -> Self {
         let mut law = Self::default();
         let [fixed, affine] = ["fixed", "affine"].map(|gain| self.gain == gain);
@@ -251,7 +252,7 @@ impl<'a> Law<'a> {
             torque = K;
         }
         if volts > 0.0 && emf <= 0.0 && free > 0.0 {
-            // The no-load speed satisfies free = volts emf / (emf² + R viscous).
+            // The motor constant emf follows from the no-load speed: free = volts emf / (emf² + R viscous).
             let root = volts * volts - 4.0 * R * viscous * free * free;
             let less = volts / free - if stall > 0.0 { volts * viscous / stall } else { 0.0 };
             emf = match viscous > 0.0 {

@@ -21,9 +21,9 @@ pub(super) struct Solid {
     pub(super) moments: [f64; 3],
     /// Minimum and maximum coordinates of the points along the principal axes (m).
     pub(super) bounds: [[f64; 3]; 2],
-    /// Number of corners of the mesh if the mesh is its convex hull, otherwise `None`.
+    /// Number of corners of the convex hull, if the inertia is computed from the hull; otherwise `None`.
     pub(super) corners: Option<usize>,
-    /// Number of faces in the mesh's file with triangles that are left out.
+    /// Number of faces in the mesh's file of which triangles are left out.
     pub(super) lost: usize,
 }
 
@@ -46,13 +46,13 @@ impl Solid {
 #[cfg(feature = "meshes")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rule {
-    /// Convex hull.
+    /// Volume inside the convex hull.
     Convex,
     /// Volume inside the surface.
     Exact,
-    /// Pyramids from the centroid of the surface to each triangle. The volume of each pyramid is positive.
+    /// Pyramids from the centroid of the surface to each triangle; the volume of every pyramid counts as positive.
     Legacy,
-    /// Surface.
+    /// Surface with mass per area.
     Shell,
 }
 
@@ -97,7 +97,7 @@ impl Solid {
         for t in &triangles {
             let t = corners(t, centroid);
             let v = part(t);
-            // The centre of mass of a pyramid, relative to its tip. MuJoCo uses the same point for a triangle.
+            // Adds the centre of mass of a pyramid, relative to its tip. MuJoCo uses the same point for a triangle.
             (volume, com) = (volume + v, com + (t[0] + t[1] + t[2]).scale(v / 4.0));
         }
         if volume < LEAST {

@@ -6,8 +6,8 @@ use crate::io::xml::Element;
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// Returns gravity (m/s²). Later elements override earlier ones, and a flag overrides all elements. Adds a warning
-/// about a medium.
+/// Returns gravity (m/s²). A later `<option>` overrides an earlier one, and a gravity flag with the value `disable`
+/// sets gravity to 0. Adds a warning if the file specifies a medium.
 pub(super) fn gravity(root: &Element, warnings: &mut Vec<Warning>) -> Result<Vec3<f64>, Error> {
     let mut gravity = Vec3::new(0.0, 0.0, -9.81);
     let mut medium: [(&str, Option<(f64, &Element)>); 2] = [("density", None), ("viscosity", None)];

@@ -1,14 +1,15 @@
-//! Principal axes of inertias, in MuJoCo's order and with MuJoCo's signs. Frames of inertia and fitted geoms depend on
-//! order and signs.
+//! Principal axes of inertias, in MuJoCo's order and with MuJoCo's signs. The order and the signs matter, because
+//! frames of inertia and fitted geoms depend on them.
 
 use condyle_spatial::{Mat3, Quaternion, Sym3};
 
-/// Threshold for off-diagonal entries, relative to the largest moment. Smaller entries are rounding errors. For meshes,
-/// MuJoCo stops at 1e-7.
+/// Threshold for off-diagonal entries, relative to the largest moment. Entries below the threshold are rounding errors.
+/// For meshes, MuJoCo uses the threshold 1e-7.
 const ROUNDING: f64 = 1e-15;
-/// Relative difference of moments below which they are treated as equal and keep their order.
+/// Relative difference of two moments below which the moments count as equal and keep their order.
 const EQUAL: f64 = 1e-12;
-/// Maximum number of rotations, as in MuJoCo. Once the largest off-diagonal entry is small, it converges quadratically.
+/// Maximum number of rotations, as in MuJoCo. The method converges quadratically once the off-diagonal entries are
+/// small.
 const MAX_ROTATIONS: usize = 500;
 
 /// Returns the principal moments, the largest first, and the rotation R with I = R diag(moments) Rᵀ. The method is
@@ -47,7 +48,7 @@ pub(super) fn principal(I: Sym3<f64>) -> ([f64; 3], Mat3<f64>) {
         let [x, y, z] = vector;
         quaternion = (quaternion * Quaternion::new(x, y, z, (1.0 - sin * sin).sqrt())).normalize();
     }
-    // Sorts the moments, the largest first. A quarter turn about the third axis exchanges two axes.
+    // Sorts the moments, the largest first. Two axes are exchanged by a quarter turn about the third axis.
     for first in [0, 1, 0] {
         if moments[first] < moments[first + 1] * (1.0 - EQUAL) {
             moments.swap(first, first + 1);

@@ -1,5 +1,5 @@
-//! Inertia along lengths, such as joint positions, in the initial configuration of a file. Stiffness and damping may be
-//! specified relative to this inertia.
+//! Effective inertia along a joint position or a tendon's length, in the initial configuration of a file. A file may
+//! specify stiffness and damping relative to this inertia.
 
 use crate::body::Frame;
 use crate::joint::Joint;
@@ -42,7 +42,7 @@ impl<'m> Reference<'m> {
     }
 
     /// Returns J M⁻¹ Jᵀ: the acceleration of a length due to a unit force along this length. Its reciprocal is the
-    /// effective mass along the length. The entries of J that are not zero are given, with their columns.
+    /// effective mass along the length. `J` lists the nonzero entries of J as pairs (column, entry).
     pub(super) fn response(&self, J: &[(usize, f64)]) -> f64 {
         let l = Single::<f64, f64>::new(self.model);
         let mut u = vec![0.0; self.S.len()];
@@ -67,8 +67,8 @@ impl<'m> Reference<'m> {
         J.iter().map(|&(k, moment)| moment * u[k]).sum()
     }
 
-    /// Returns the joint efforts of a wrench along the axes of a frame, linear first. They are the entries of J for a
-    /// site.
+    /// Returns the joint efforts of a wrench along the axes of a frame, linear first. For an actuator at a site, these
+    /// efforts are the entries of J.
     pub(super) fn along(&self, frame: &Frame, gear: [f64; 6]) -> Vec<(usize, f64)> {
         if frame.body == 0 {
             return Vec::new();

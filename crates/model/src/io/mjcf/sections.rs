@@ -1,9 +1,10 @@
-//! Tendons, equality constraints and actuators. They are copied together with the part of the tree to which they refer.
+//! Tendons, equality constraints and actuators, which are copied together with the part of the tree to which they
+//! refer.
 
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet};
 
-/// Sections, in an order in which each section refers only to itself and to earlier sections.
+/// Sections. Elements of a section refer only to the same section, to earlier sections, or to the tree.
 const SECTIONS: [&str; 3] = ["tendon", "equality", "actuator"];
 
 /// Kind and name of an element.
@@ -11,7 +12,7 @@ pub(super) type Name = (&'static str, String);
 
 /// Elements of the three `SECTIONS` of a file.
 pub(super) struct Sections {
-    /// Elements of each section. An element becomes `None` when copies replace it.
+    /// Elements of each section, or `None` for an element that was replaced by copies.
     elements: [Vec<Option<Element>>; 3],
     /// Indices of the elements of each section, by the first name to which the element refers.
     by_reference: [HashMap<Name, Vec<usize>>; 3],
@@ -51,8 +52,8 @@ impl Sections {
         self.elements[section].push(Some(element));
     }
 
-    /// Returns the (section, index) of each element that refers to `names` and to nothing else. Tendons found this way
-    /// count as `names`, too.
+    /// Returns the (section, index) of each element that refers to `names` and to nothing else. The names of tendons
+    /// that are found are added to `names`.
     pub(super) fn of(&self, mut names: Vec<Name>) -> Vec<(usize, usize)> {
         let mut known: HashSet<Name> = names.iter().cloned().collect();
         let mut found = Vec::new();

@@ -1,4 +1,5 @@
-//! Joints of an MJCF with their springs and losses, and lengths as linear functions of the model's coordinates.
+//! Joints of an MJCF with their springs, damping and friction, and lengths as linear functions of the model's
+//! coordinates.
 
 use super::attributes::Attributes;
 use super::law::fill;
@@ -66,8 +67,7 @@ pub(super) struct FileJoint<'a> {
     stiffness: [f64; 3],
     /// Position at which the spring of a hinge or slide is at rest.
     rest: f64,
-    /// Time constant (s) and damping ratio, from which stiffness and damping are computed. They are 0 if they are not
-    /// given.
+    /// Time constant (s) and damping ratio, from which stiffness and damping are computed. A missing value is 0.
     spring_damper: [f64; 2],
     damping: [f64; 3],
     friction: f64,
@@ -75,9 +75,9 @@ pub(super) struct FileJoint<'a> {
     /// Minimum and maximum effort of all actuators together.
     pub(super) effort: Option<[f64; 2]>,
     pub(super) range: [f64; 2],
-    /// Whether the spring yields.
+    /// Whether the spring is plastic, so that its rest position changes.
     is_plastic: bool,
-    /// Whether the actuators of the joint carry the weight that gravity compensation carries.
+    /// Whether gravity compensation at this joint is provided by the joint's actuators (`actuatorgravcomp`).
     carries_weight: bool,
 }
 
@@ -120,8 +120,8 @@ impl<'a> FileJoint<'a> {
         })
     }
 
-    /// Returns this joint, after storing the index of its body and the body's pose in the initial configuration of the
-    /// file.
+    /// Stores the index of the joint's body, and the pose of this body in the initial configuration of the file.
+    /// Returns the joint.
     pub(super) fn on(self, body: usize, pose: Se3<f64>) -> Self {
         Self { body, pose, ..self }
     }
@@ -149,7 +149,8 @@ impl<'a> FileJoint<'a> {
     pub(super) fn find_spring(&mut self, columns: Range<usize>, response: &dyn Fn(usize) -> f64) {
         let [time, ratio] = self.spring_damper;
         if time > 0.0 {
-            // Stiffness and damping are those with which the mean inertia along the joint oscillates as specified.
+            // Chooses stiffness and damping such that the mean inertia along the joint has the given time constant and
+            // damping ratio.
             let nv = columns.len() as f64;
             let sum: f64 = columns.map(response).sum();
             let inertia = nv / sum.max(LEAST);
@@ -193,7 +194,7 @@ impl<'a> FileJoint<'a> {
     }
 }
 
-/// Smallest number by which MuJoCo divides.
+/// Minimum divisor in MuJoCo: smaller divisors are replaced by this number.
 const LEAST: f64 = 1e-15;
 
 /// Joints of a file, in MuJoCo's order.
@@ -238,7 +239,7 @@ pub(super) struct Line {
 
 impl Line {
     /// Returns the position of the joint that carries a body, as a function of the joint's coordinate. If the joint
-    /// follows another joint, it is the coordinate of the leader.
+    /// follows another joint, the coordinate is the coordinate of the leader.
     pub(super) fn of(model: &Model, body: usize) -> Self {
         let Body { idx_v: dof, mimic, .. } = model.bodies[body];
         match mimic {
@@ -251,7 +252,7 @@ impl Line {
         }
     }
 
-    /// Returns the length that depends on degree of freedom k of the joint in the same way.
+    /// Returns the same linear function for degree of freedom k of the joint.
     pub(super) fn at(self, k: usize) -> Self {
         Self { dof: self.dof + k, ..self }
     }
@@ -294,8 +295,7 @@ impl Line {
         }
     }
 
-    /// Limits this length, and returns whether this was possible. Limits of the length that contradict the limits of
-    /// the joint are ignored.
+    /// Limits this length. Limits that contradict the limits of the joint are ignored; in this case, returns `false`.
     pub(super) fn limit(self, model: &mut Model, [lower, upper]: [f64; 2]) -> bool {
         if self.slope == 0.0 {
             return true;

@@ -24,7 +24,7 @@ pub(super) struct Tendon<'a> {
     pub(super) damping: [f64; 3],
     friction: f64,
     pub(super) armature: f64,
-    /// Whether the spring yields.
+    /// Whether the spring is plastic, so that its rest length changes.
     is_plastic: bool,
     pub(super) range: [f64; 2],
     limits: Option<[f64; 2]>,
@@ -42,7 +42,7 @@ pub(super) struct Tendons<'a> {
 impl<'a> Tendons<'a> {
     pub(super) fn read(root: &'a Element, sources: &'a [Source<'a>], joints: &Joints) -> Result<Self, Error> {
         let mut tendons = Self::default();
-        // Other elements are reported by the check against the known elements (`elements.txt`).
+        // Other elements are skipped here. The check against `elements.txt` reports them.
         let elements = root.all("tendon").flat_map(|section| &section.children);
         let elements: Vec<_> = elements.filter(|e| matches!(&*e.tag, "fixed" | "spatial")).collect();
         super::names(elements.iter().copied())?;

@@ -1,5 +1,5 @@
-//! Transmissions of MJCF's actuators. They determine the actuators of a model, and the limits of effort, armature and
-//! damping of its joints.
+//! Transmissions of MJCF's actuators. Transmissions determine the actuators of a model, and the effort limits, armature
+//! and damping of its joints.
 
 use super::Source;
 use super::actuator::{ALL, Classes, Mechanics, clipped, scaled};
@@ -27,7 +27,7 @@ enum Target<'a> {
     Tendon(usize),
     /// Name of a site.
     Site(&'a str),
-    /// Reason why a model does not have the item that the actuator drives.
+    /// Reason why a model cannot represent the item that the actuator drives.
     Else(&'static str),
 }
 
@@ -49,8 +49,8 @@ pub(super) struct Drives<'a> {
     all: Vec<Drive<'a>>,
 }
 
-/// Maximum number of actuators whose velocity gain is given by a damping ratio; chosen because each such actuator needs
-/// the acceleration of the whole robot.
+/// Maximum number of actuators whose velocity gain is given by a damping ratio. The number is limited because each such
+/// actuator needs a computation over the whole robot.
 const MAX_RATIOS: usize = 4096;
 
 impl<'a> Drives<'a> {
@@ -98,7 +98,7 @@ impl<'a> Drives<'a> {
         Ok(Self { all })
     }
 
-    /// Returns, for each actuator, the numbers of controls and activations that it has in a keyframe.
+    /// Returns the numbers of controls and activations that each actuator has in a keyframe.
     pub(super) fn inputs(&self) -> Result<Vec<Inputs>, Error> {
         self.all.iter().map(|drive| drive.law.inputs(drive.element)).collect()
     }
@@ -245,7 +245,8 @@ impl<'a> Drives<'a> {
     }
 
     /// Sets the limits of effort of all coordinates. For each joint, the efforts of its actuators are summed and
-    /// clipped to its `actuatorfrcrange`. If several joints depend on a coordinate, their results are summed.
+    /// clipped to its `actuatorfrcrange`. If several joints depend on the same coordinate, the limits of these joints
+    /// are summed.
     pub(super) fn limit(
         &self,
         model: &mut Model,
@@ -286,9 +287,9 @@ impl Drive<'_> {
         on.actuation && !on.groups.contains(&self.mechanics.group)
     }
 
-    /// Returns the force range that the tendon's `actuatorfrcrange` allows for this actuator. `counts` is the number of
-    /// actuators of each tendon. If a tendon has several actuators, its range limits only their sum, and no single
-    /// actuator.
+    /// Returns the force range of this actuator that its tendon's `actuatorfrcrange` allows. `counts` is the number of
+    /// actuators of each tendon. If a tendon has several actuators, its range limits only the sum of their forces, so a
+    /// single actuator has no limit.
     fn share(&self, tendons: &Tendons, counts: &[usize]) -> [f64; 2] {
         match self.target {
             Target::Tendon(t) if counts[t] == 1 => tendons.all[t].effort.unwrap_or(ALL),
@@ -305,8 +306,8 @@ impl Drive<'_> {
             Target::Joint(j) => match joints.all[j].joint {
                 Joint::Spherical | Joint::FreeFlyer if self.in_parent => Vec::new(),
                 Joint::Spherical => (0..3).map(|k| (first(j) + k, gear[k])).filter(|x| x.1 != 0.0).collect(),
-                // Only the torque is constant: the force is along the axes of the world, but v is along the axes of the
-                // body.
+                // Only the torque gives constant efforts. The force is along the axes of the world, but v is along the
+                // axes of the body.
                 Joint::FreeFlyer => (3..6).map(|k| (first(j) + k, gear[k])).filter(|x| x.1 != 0.0).collect(),
                 _ => vec![(first(j), gear[0])],
             },
@@ -323,16 +324,16 @@ impl Drive<'_> {
 pub(super) struct Inputs {
     /// Number of controls.
     pub(super) controls: usize,
-    /// Index, among these controls, of the control that the model has.
+    /// Index of the control that the model has, among the controls in the keyframe.
     pub(super) own: usize,
     /// Number of activations, if it is known.
     pub(super) activations: Option<usize>,
-    /// Whether the control in the model is the activation in the keyframe.
+    /// Whether the actuator integrates its control. The control in the model is then the activation in the keyframe.
     pub(super) is_integrator: bool,
 }
 
 impl Law<'_> {
-    /// Returns the numbers of controls and activations that an actuator with this law has in a keyframe.
+    /// Returns the numbers of controls and activations that an actuator with this force law has in a keyframe.
     fn inputs(&self, e: &Element) -> Result<Inputs, Error> {
         let (default, own) = if self.gain == "pid" { ("pos vel", "pos") } else { ("voltage", "voltage") };
         let several = matches!(self.gain, "pid" | "dcmotor");
@@ -357,7 +358,8 @@ impl Law<'_> {
         matches!(self.affine(), Ok([gain, _, kp, kv]) if gain == kp && kv < 0.0)
     }
 
-    /// Returns the effect that is lost because a model has no activations and only one control for each actuator.
+    /// Returns the effect of this force law that a model cannot represent. A model has no activations, and only one
+    /// control for each actuator.
     fn left_out(&self) -> &'static str {
         let inputs = self.input.unwrap_or(if self.gain == "pid" { "pos vel" } else { "voltage" });
         match self.dynamics {
@@ -396,7 +398,7 @@ fn target<'a>(e: &'a Element, joints: &Joints, tendons: &Tendons) -> Result<Targ
     })
 }
 
-/// Returns the range of the control, which is inherited from the range of the driven joint or tendon.
+/// Returns the control range that an actuator inherits from the range of its joint or tendon.
 fn inherited(e: &Element, law: &Law, target: &Target, joints: &Joints, tendons: &Tendons) -> Result<[f64; 2], Error> {
     let [lower, upper] = match *target {
         Target::Joint(j) if joints.all[j].joint.nv() == 1 => joints.all[j].range,

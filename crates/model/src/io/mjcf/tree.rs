@@ -24,7 +24,7 @@ pub(super) struct Parts<'a> {
     cameras: Vec<(Attributes<'a>, Se3<f64>)>,
     /// `<frame>`s with a name, each with its own pose.
     frames: Vec<(&'a Element, Se3<f64>)>,
-    /// Child bodies, each with its own pose and the class of the element around it.
+    /// Child bodies, each with its own pose and the default class of its parent element.
     bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
 }
 
@@ -34,13 +34,13 @@ struct Waiting<'a> {
     class: &'a str,
     /// Body of the model to which the parent element belongs.
     on: BodyId,
-    /// Pose of the parent element in that body.
+    /// Pose of the parent element in the body `on`.
     placement: Se3<f64>,
     /// Whether the parent element is the world itself.
     top: bool,
 }
 
-/// Frame or camera with a name. It becomes a frame of the model when the names of all sites are known.
+/// Named frame or camera. It is added to the model after all sites, because sites have priority for names.
 pub(super) struct Placed<'a> {
     element: &'a Element,
     body: BodyId,
@@ -73,7 +73,7 @@ impl<'a> Reader<'a> {
         let defaults = |e: &Element| &self.source(e).defaults;
         let own = inside.attribute("childclass").map_or(Ok(class), |c| defaults(inside).known(inside, c))?;
         for e in &inside.children {
-            let around = if e.source == inside.source { own } else { MAIN }; // each file has its own classes
+            let around = if e.source == inside.source { own } else { MAIN }; // each file has its own default classes
             let pose = || Ok::<_, Error>(X * self.compiler(e).pose(&Attributes::plain(e))?);
             match e.tag.as_str() {
                 "joint" => parts.joints.push((self.of(e, around)?, X)),
@@ -98,7 +98,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds a body of the file. Returns its elements, the body of the model to which it belongs, and its pose there.
+    /// Adds a body of the file. Returns its elements, the body of the model that contains it, and its pose in that
+    /// body's frame.
     fn body(&mut self, builder: &mut ModelBuilder, w: &Waiting<'a>) -> Result<(Parts<'a>, BodyId, Se3<f64>), Error> {
         let mut parts = Parts::default();
         self.gather(w.element, Se3::identity(), w.class, &mut parts)?;
@@ -131,7 +132,7 @@ impl<'a> Reader<'a> {
                 if align.unwrap_or(self.compiler(w.element).align_free) && parts.bodies.is_empty() {
                     jXl = axes.inverse(); // the principal axes become the body's frame
                 }
-                Se3::identity() // the joint's q is the body's pose in the world
+                Se3::identity() // q is the pose of the MJCF body
             } else {
                 bXl * lXj
             };
@@ -173,8 +174,8 @@ impl<'a> Reader<'a> {
         Ok((parts, body, bXl))
     }
 
-    /// Adds the sites of a body that have a name, and stores its frames and cameras that have a name for later. Also
-    /// checks the names of its geoms.
+    /// Adds the named sites of a body, and stores its named frames and cameras, which are added later. Also checks the
+    /// names of its geoms.
     fn frames(
         &mut self,
         builder: &mut ModelBuilder,
@@ -223,7 +224,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Returns the body's inertia in the body's frame, and the pose of the principal axes there.
+    /// Returns the body's inertia and the pose of its principal axes, both in the body's frame.
     fn inertia(
         &mut self,
         element: &'a Element,
@@ -257,7 +258,7 @@ impl<'a> Reader<'a> {
         Ok((geometry::corrected(compiler, element, sum)?, axes))
     }
 
-    /// Returns the weight of a geom, in the frame of the body or of the surrounding `<frame>`. Returns `None` if the
+    /// Returns the inertia of a geom, in the frame of the body or of the surrounding `<frame>`. Returns `None` if the
     /// geom has no mass.
     fn weight(&mut self, body: &Element, a: &Attributes<'a>, moves: bool) -> Result<Option<Weight>, Error> {
         let source = self.source(a.element);
@@ -315,7 +316,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Returns whether the weight of at least one body in an element is compensated.
+/// Returns whether a positive `gravcomp` compensates the weight of at least one body in an element.
 pub(super) fn compensates(element: &Element) -> Result<bool, Error> {
     for child in element.children.iter().filter(|child| matches!(&*child.tag, "body" | "frame")) {
         if Attributes::plain(child).number("gravcomp")?.is_some_and(|x| x > 0.0) || compensates(child)? {

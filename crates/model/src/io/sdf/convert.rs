@@ -11,10 +11,10 @@ const VERSIONS: [u32; 12] = [0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
 pub(super) const NEWEST: u32 = VERSIONS[VERSIONS.len() - 1];
 /// Tag of the root element. Versions 1.0 to 1.2 may use `gazebo`.
 const ROOT: &str = "sdf";
-/// Name by which a model's elements refer to the frame of the model.
+/// Name with which the elements of a model refer to the frame of the model.
 pub(super) const MODEL: &str = "__model__";
 
-/// Attributes that became elements in version 1.2, by the tag of the elements that had them.
+/// Attributes that became elements in version 1.2, by the tag of the element that had the attributes.
 const ATTRIBUTES: &[(&str, &[&str])] = &[
     ("model", &["static"]),
     ("link", &["gravity", "self_collide", "kinematic"]),
@@ -26,7 +26,7 @@ const ATTRIBUTES: &[(&str, &[&str])] = &[
     ("limit", &["lower", "upper", "effort", "velocity"]),
 ];
 
-/// Elements with a single attribute, which became the text of the element in version 1.2, with the new tag.
+/// Elements with a single attribute, and their new tags. In version 1.2, the attribute became the text of the element.
 const TEXTS: &[(&str, &str, &str)] = &[
     ("origin", "pose", "pose"),
     ("parent", "link", "parent"),
@@ -79,7 +79,7 @@ fn version(root: &Element) -> Result<u32, Error> {
     found.ok_or_else(|| root.wrong(format!("version `{text}` is unknown; known are {}", known())))
 }
 
-/// Element that says, up to version 1.6, whether an axis is in the frame of the model.
+/// Tag of the element that specifies, up to version 1.6, whether an axis is in the frame of the model.
 const FLAG: &str = "use_parent_model_frame";
 
 /// Returns the models of a root element and of its worlds.
@@ -98,7 +98,7 @@ fn axes(model: &mut Element, change: &mut dyn FnMut(&mut Element)) {
     }
 }
 
-/// Converts attributes into elements (conversion from version 1.0).
+/// Converts attributes of version 1.0 into elements.
 fn attributes_to_elements(element: &mut Element) {
     if let Some((_, names)) = ATTRIBUTES.iter().find(|(tag, _)| *tag == element.tag) {
         for name in *names {
@@ -127,7 +127,7 @@ fn attributes_to_elements(element: &mut Element) {
     }
 }
 
-/// Moves gravity from the physics of a world to the world itself (conversion from version 1.5).
+/// Moves the gravity of version 1.5 from the `<physics>` of a world to the world itself.
 fn gravity_of_physics(world: &mut Element) {
     let physics = world.children.iter_mut().find(|c| c.tag == "physics");
     let gravity = physics.and_then(|p| {
@@ -137,8 +137,8 @@ fn gravity_of_physics(world: &mut Element) {
     world.children.extend(gravity);
 }
 
-/// Renames the attribute `frame` of poses, and converts the flag of axes into `expressed_in` (conversion from version
-/// 1.6).
+/// Converts frames of version 1.6: renames the attribute `frame` of poses, and converts the flag of axes into
+/// `expressed_in`.
 fn frames(element: &mut Element) -> Result<(), Error> {
     if element.tag == "plugin" || element.tag.contains(':') {
         return Ok(());
@@ -173,7 +173,7 @@ fn frames(element: &mut Element) -> Result<(), Error> {
 }
 
 impl Element {
-    /// Returns a new element with a text. Its line number is the line number of this element.
+    /// Returns a new element with a text. The new element has the line number of this element.
     pub(super) fn with(&self, tag: &str, text: &str) -> Self {
         Self {
             tag: tag.to_owned(),

@@ -13,10 +13,10 @@ use crate::io::xml::{Amount, Element, MAX_DEPTH};
 use crate::warning::Warning;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in a folder that lists the model files of this folder, and an older name for it.
+/// Names of the file that lists the model files of its folder: the current name and an older name.
 const CONFIGS: [&str; 2] = ["model.config", "manifest.xml"];
 
-/// Maximum number of included files; chosen because opening more files takes longer than a second.
+/// Maximum number of included files. Opening more files takes longer than a second.
 const MAX_INCLUDES: usize = 16_384;
 
 /// Reader of all files of a robot.
@@ -39,7 +39,7 @@ impl<'o> Includes<'o> {
         Self { amount, known, packages, open: Vec::new(), count: 0, warnings: Vec::new(), missing: None }
     }
 
-    /// Reads a file and all files that it includes. The root element of the file is at this depth.
+    /// Reads a file and all files that it includes. The root element of the file is at the given depth.
     pub(super) fn file(&mut self, path: &Path, depth: usize) -> Result<Element, Error> {
         let text = self.amount.read(path)?;
         let root = Element::parse(&text, &path.display().to_string(), &mut self.amount)?;
@@ -83,7 +83,7 @@ impl<'o> Includes<'o> {
         }
     }
 
-    /// Replaces the includes inside an element at this depth by the included models.
+    /// Replaces the includes inside an element at the given depth by the included models.
     fn children(&mut self, element: &mut Element, folder: Option<&Path>, depth: usize) -> Result<(), Error> {
         if depth > MAX_DEPTH {
             let what = format!("is at depth {depth}, files included: at most {MAX_DEPTH} are allowed");
@@ -192,7 +192,7 @@ impl<'o> Includes<'o> {
     }
 }
 
-/// Fault of an `<include>`.
+/// Reason why an `<include>` fails.
 enum Fault {
     /// The file was not found.
     Missing(String),

@@ -135,7 +135,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
             solid(PI * r * r * l, 0.0, across, across, r * r / 2.0)
         }
         "cone" => {
-            // The centre of mass is above the base, which is at −l/2, by a quarter of the height.
+            // The base is at −l/2, and the centre of mass is a quarter of the height above the base.
             let (r, l) = (length("radius")?, length("length")?);
             let across = 3.0 / 80.0 * (4.0 * r * r + l * l);
             solid(PI * r * r * l / 3.0, -l / 4.0, across, across, 0.3 * r * r)

@@ -1,4 +1,4 @@
-//! Joints of an SDF: their kinds, and the limits, losses and springs of their axes.
+//! Joints of an SDF: their kinds, and the limits, damping, friction and springs of their axes.
 
 use super::scopes::Scopes;
 use super::tree::Edge;
@@ -10,7 +10,7 @@ use crate::joint::Joint;
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// Motion of a joint with one degree of freedom, or motion of a ball joint with three.
+/// Motion of a joint with one degree of freedom, or of a ball joint with three degrees of freedom.
 pub(super) struct Motion {
     pub(super) joint: Joint,
     /// Tag of the element that describes the motion.
@@ -40,7 +40,8 @@ pub(super) fn motions(scopes: &Scopes, edge: &Edge, warnings: &mut Vec<Warning>)
     })
 }
 
-/// Returns the joint that moves the parent link relative to the child link. Its q is the same, except for a ball joint.
+/// Returns the joint that moves the parent link relative to the child link. Its position q is the same as for the given
+/// joint, except for a ball joint.
 pub(super) fn reversed(joint: Joint) -> Joint {
     match joint {
         Joint::Revolute { axis } => Joint::Revolute { axis: -axis },
@@ -64,7 +65,7 @@ fn pitch(joint: &Element, warnings: &mut Vec<Warning>) -> Result<f64, Error> {
     if pitch.is_finite() { Ok(pitch) } else { Err(joint.wrong("has no finite screw_thread_pitch")) }
 }
 
-/// Limits, losses and spring of an axis.
+/// Limits, damping, friction and spring of an axis.
 pub(super) struct Axis {
     pub(super) options: JointOptions,
     /// Stiffness (N m/rad, N/m), and rest position (rad, m).
@@ -72,8 +73,8 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Reads the properties of an axis except its direction. In SDF, a limit with a magnitude of 1e16 or more is not a
-    /// limit, and a negative effort or velocity is not a limit either.
+    /// Reads the properties of an axis except its direction. In SDF, a limit with a magnitude of 1e16 or more means no
+    /// limit. A negative effort or velocity also means no limit.
     pub(super) fn new(element: &Element, tag: &str, kind: Joint, warnings: &mut Vec<Warning>) -> Result<Self, Error> {
         let axis = element.child(tag);
         let (limit, dynamics) = (axis.and_then(|a| a.child("limit")), axis.and_then(|a| a.child("dynamics")));
@@ -106,7 +107,7 @@ impl Axis {
         Ok(Self { options, spring })
     }
 
-    /// Returns the names of the properties of this axis that only a joint of the tree can have.
+    /// Returns the names of the properties of this axis that are lost if its joint closes a loop.
     pub(super) fn extras(&self) -> Vec<&'static str> {
         let (lower, upper) = self.options.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         let has = [
@@ -120,8 +121,8 @@ impl Axis {
     }
 }
 
-/// Returns the inertia of the rotor as seen at a joint: the gear ratio squared times the inertia of the rotor. The
-/// elements for it are specific to Drake, which reads them only for joints with a motor.
+/// Returns the inertia of the rotor, reflected to its joint: the gear ratio squared times the inertia of the rotor.
+/// Only Drake defines the elements for this inertia, and it reads them only for joints with a motor.
 fn rotor(joint: &Element, effort: Option<f64>, kind: Joint) -> Result<f64, Error> {
     if kind.nv() != 1 || effort == Some(0.0) {
         return Ok(0.0);

@@ -142,10 +142,11 @@ impl Reader<'_> {
     }
 }
 
-/// Tolerance for 1 minus the cosine of the angle between parallel axes; chosen because files have six digits.
+/// Tolerance for parallel axes: maximum of 1 minus the cosine of the angle between them. Files often have only six
+/// digits.
 const PARALLEL: f64 = 1e-6;
 
-/// Returns a list of names with the matching verb: `limits, damping are`.
+/// Returns a list of names followed by `is` or `are`, for example `limits, damping are`.
 fn are(names: &[&str]) -> String {
     let verb = if names == ["limits"] || names.len() > 1 { "are" } else { "is" };
     format!("{} {verb}", names.join(", "))

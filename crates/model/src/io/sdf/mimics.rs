@@ -52,7 +52,7 @@ impl<'a> Axes<'a> {
             }
             return Ok(());
         }
-        builder.check_size()?; // must come before chains of followers are traversed
+        builder.check_size()?; // must precede the traversal of chains of followers
         let mut rules: HashMap<usize, (BodyId, Mimic)> = HashMap::new();
         for &(item, mimic, follower) in &self.followers {
             let joint = scopes.items[item].element;
@@ -71,7 +71,7 @@ impl<'a> Axes<'a> {
                 None => number(joint, Some(mimic), tag, otherwise),
             };
             let (ratio, offset) = (read("multiplier", 1.0)?, read("offset", 0.0)?);
-            // follower = multiplier · (leader − reference) + offset
+            // SDF defines: follower = multiplier · (leader − reference) + offset
             let offset = offset - ratio * read("reference", 0.0)?;
             rules.insert(follower.0, (leader, Mimic { ratio, offset }));
         }
@@ -79,7 +79,7 @@ impl<'a> Axes<'a> {
             let (mut leader, mut rule) = rules[&follower.0];
             let mut left = rules.len();
             while let Some(&(next, Mimic { ratio, offset })) = rules.get(&leader.0) {
-                // r (r₂ q + o₂) + o
+                // composition: r (r₂ q + o₂) + o
                 rule = Mimic { ratio: rule.ratio * ratio, offset: rule.ratio * offset + rule.offset };
                 leader = next;
                 left -= 1;

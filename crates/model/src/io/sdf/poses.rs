@@ -19,8 +19,8 @@ impl Scopes<'_> {
         self.find_in(scope, name).ok_or_else(|| element.wrong(self.missing(item, name)))
     }
 
-    /// Returns the frame named by `placement_frame`, and the scope of this frame; `None` if the attribute is missing.
-    /// The pose of the model is the pose of this frame.
+    /// Returns the frame that `placement_frame` names, and the scope of this frame; `None` if the attribute is missing.
+    /// The pose in the file is then the pose of this frame, not the pose of the model's own frame.
     fn placement(&self, item: usize) -> Result<Option<(usize, usize)>, Error> {
         let Item { element, inside, .. } = self.items[item];
         let name = element.attribute("placement_frame").filter(|n| !n.is_empty());
@@ -36,7 +36,7 @@ impl Scopes<'_> {
 
     /// Computes all poses. Each pose is computed after the poses on which it depends.
     pub(super) fn resolve(&mut self) -> Result<(), Error> {
-        // State 0: not visited; 1: being visited; 2: the pose is known.
+        // States of items: 0, not visited; 1, being visited; 2, the pose is known.
         let mut state = vec![0u8; self.items.len()];
         for first in 0..self.items.len() {
             let mut path = if state[first] == 0 { vec![(first, self.begin(first, &mut state)?)] } else { Vec::new() };
@@ -62,7 +62,7 @@ impl Scopes<'_> {
         Ok(())
     }
 
-    /// Marks an item as being visited, and returns the items on whose poses its pose depends.
+    /// Marks an item as being visited. Returns the items whose poses are needed to compute the pose of this item.
     fn begin(&self, item: usize, state: &mut [u8]) -> Result<Vec<usize>, Error> {
         state[item] = 1;
         let mut found = Vec::new();
@@ -86,7 +86,7 @@ impl Scopes<'_> {
         })
     }
 
-    /// Adds the items on whose poses the pose of an item in the frame of a scope depends.
+    /// Adds to `found` the items whose poses are needed to compute the pose of item `at` in the frame of a scope.
     fn chain(&self, at: Place, scope: usize, found: &mut Vec<usize>) {
         if at == self.scopes[scope].own {
             return;
@@ -96,7 +96,7 @@ impl Scopes<'_> {
         self.climb(at, scope, up);
     }
 
-    /// Visits the scopes on the path between the scope of an item and another scope, without their common scope.
+    /// Visits the scopes on the path between the scope of an item and another scope, except their common ancestor.
     /// `visit` receives the index of a scope, and whether this scope contains the item.
     fn climb(&self, at: Place, scope: usize, mut visit: impl FnMut(usize, bool)) {
         let (mut a, mut b) = (at.map_or(WORLD_SCOPE, |item| self.items[item].scope), scope);
@@ -131,8 +131,8 @@ impl Scopes<'_> {
         self.in_scope(Some(item), WORLD_SCOPE)
     }
 
-    /// Returns cXj: the pose of a joint in its child link. If the file specifies this pose, it is returned without
-    /// rounding errors.
+    /// Returns cXj: the pose of a joint in its child link. If the file specifies this pose, the result has no rounding
+    /// errors.
     pub(super) fn joint_in_child(&self, joint: usize, child: usize) -> Result<Se3<f64>, Error> {
         let Item { element, scope, pose: mXj, .. } = self.items[joint];
         match self.reference(joint)? {

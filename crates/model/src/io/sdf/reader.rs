@@ -1,4 +1,5 @@
-//! Conversion of the links and joints of an SDF to bodies. Each link gets a body and a placement in this body.
+//! Conversion of the links and joints of an SDF to bodies. Each link belongs to a body and has a placement in the frame
+//! of this body.
 
 use super::SdfOptions;
 use super::inertia::{flags, inertia};
@@ -28,7 +29,7 @@ pub(super) struct Reader<'a> {
     pub(super) gearboxes: Vec<Edge<'a>>,
     pub(super) axes: Axes<'a>,
     pub(super) warnings: Vec<Warning>,
-    /// Body and placement of each item. They are valid for links that have been placed.
+    /// Body and placement of each item. The entries are valid for links that have been placed.
     placed: Vec<(BodyId, Se3<f64>)>,
 }
 
@@ -57,7 +58,7 @@ impl<'a> Reader<'a> {
         Ok(Self { scopes, edges, gearboxes, axes: Axes::default(), warnings: reader_warnings, placed })
     }
 
-    /// Returns the body to which a link or the world belongs, and the placement in this body.
+    /// Returns the body to which a link or the world belongs, and the placement in the frame of this body.
     pub(super) fn place(&self, link: Place) -> (BodyId, Se3<f64>) {
         link.map_or((WORLD, Se3::identity()), |item| self.placed[item])
     }
@@ -129,7 +130,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Fixes a link to the world at its pose. The inertia of such a link has no effect, so it causes no warnings.
+    /// Fixes a link to the world at its pose. The inertia of such a link has no effect, so faults of the inertia cause
+    /// no warnings.
     fn fix(&mut self, builder: &mut ModelBuilder, link: usize) -> Result<(), Error> {
         let mut unsaid = Vec::new();
         let warnings = if self.scopes.is_static(link) { &mut unsaid } else { &mut self.warnings };
@@ -158,7 +160,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds the joints and links that some links or the world carry, in depth-first order.
+    /// Adds the joints and links that the links in `from` carry, directly or indirectly, in depth-first order.
     fn walk(&mut self, builder: &mut ModelBuilder, tree: &Tree, from: &[Place]) -> Result<(), Error> {
         let on = |at: Place| tree.on.get(&at).into_iter().flatten().rev().copied();
         let mut waiting: Vec<(usize, bool)> = from.iter().rev().flat_map(|&at| on(at)).collect();

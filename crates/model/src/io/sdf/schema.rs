@@ -1,5 +1,5 @@
-//! Known elements and attributes of SDF 1.2 to 1.12, after older versions have been converted, and features that a
-//! model cannot represent.
+//! Known elements and attributes of SDF 1.2 to 1.12, and features that a model cannot represent. Files of older
+//! versions are converted before they are checked.
 
 use crate::io::known::LeftOut;
 
@@ -47,10 +47,10 @@ joint_softness: ; cfm erp
 frame: name attached_to ; pose
 ";
 
-/// Type of a collision that gives its link mass.
+/// Type of a collision from which the inertia of its link is computed.
 pub(super) const HEAVY: &str = "heavy_collision";
 
-/// Features of SDF that a model cannot represent, and the effect of each missing feature.
+/// Features of SDF that a model cannot represent, and the consequence of each omission.
 pub(super) const LEFT_OUT: &LeftOut = &[
     ("world", "population", "the models of a population are left out"),
     ("world", "state", "the positions of a saved state are left out: models stand where their <pose> puts them"),

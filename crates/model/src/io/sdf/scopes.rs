@@ -1,5 +1,5 @@
-//! Names and poses of an SDF. Each model is a scope. Names in a scope are relative to the model, for example
-//! `inner::link` for a link of a nested model. Poses in a scope are in the frame of the model.
+//! Names and poses of an SDF. Each model is a scope. Names in a scope are relative to its model, for example
+//! `inner::link` for a link of a nested model. Poses in a scope are relative to the frame of its model.
 
 use super::convert::MODEL;
 use super::values::{flag, text};
@@ -9,10 +9,10 @@ use crate::names::{near, nearest};
 use condyle_spatial::Se3;
 use std::collections::HashMap;
 
-/// Name by which each scope refers to the world.
+/// Name with which each scope refers to the world.
 pub(super) const WORLD_LINK: &str = "world";
-/// Attribute of a model whose elements belong to the enclosing scope, because it was included with `<include
-/// merge="true">`.
+/// Attribute that marks a model included with `<include merge="true">`. The elements of such a model belong to the
+/// enclosing scope.
 pub(super) const MERGED: &str = "__merge__";
 /// Maximum size of all full names together (bytes). The full name of an item contains the names of all models around
 /// the item.
@@ -27,8 +27,9 @@ pub(super) struct Scope<'a> {
     prefix: String,
     /// Index of the item that is the model of this scope; `None` for the world.
     pub(super) own: Option<usize>,
-    /// Index of the enclosing scope, and number of all scopes around this scope.
+    /// Index of the enclosing scope.
     pub(super) parent: usize,
+    /// Number of scopes around this scope.
     pub(super) depth: usize,
     /// Whether the links of the scope are fixed to the world, because the model or a model around it is static.
     is_static: bool,
@@ -43,7 +44,7 @@ pub(super) struct Item<'a> {
     pub(super) scope: usize,
     /// Full name, which begins with the names of the models around the item.
     name: String,
-    /// Index of the scope that the item opens, if the item is a model.
+    /// Index of the scope of the item itself, if the item is a model.
     pub(super) inside: Option<usize>,
     /// Pose of the item in the frame of its scope.
     pub(super) pose: Se3<f64>,
@@ -56,9 +57,10 @@ pub(super) struct Scopes<'a> {
     names: HashMap<String, usize>,
     joints: HashMap<String, usize>,
     bytes: usize,
-    /// Prefix that is removed from all names. It is the name of the model, if a file has only one model.
+    /// Prefix that is removed from all names: the name of the model, if a file has only one model.
     single: String,
-    /// Links to which items are attached, for items whose link has been computed; `None` is the world.
+    /// Links to which items are attached, by index of the item; `None` is the world. Entries are computed when they are
+    /// first needed.
     attached: HashMap<usize, Option<usize>>,
 }
 
@@ -95,7 +97,7 @@ impl<'a> Scopes<'a> {
         }
         if let [model] = models {
             let single = format!("{}::", model.attribute("name").unwrap_or_default());
-            // The prefix stays if an item of the world has the same name without it.
+            // Keeps the prefix if a name without the prefix would equal the name of an item of the world.
             let mut in_world = scopes.items.iter().filter(|item| item.scope == WORLD_SCOPE && item.inside.is_none());
             if !in_world.any(|item| scopes.names.contains_key(&format!("{single}{}", item.name))) {
                 scopes.single = single;
@@ -222,7 +224,7 @@ impl<'a> Scopes<'a> {
         }
         let full = format!("{}{name}", self.scopes[scope].prefix);
         let get = |name: &str| self.names.get(name).copied();
-        // The name may refer to the frame of a nested model, which older files name `inner::__model__`.
+        // The name may refer to the frame of a nested model: older files write `inner::__model__`.
         let inner = || full.strip_suffix(MODEL).and_then(|n| n.strip_suffix("::")).and_then(get);
         get(&full).or_else(inner).or_else(|| get(&format!("{full}::{MODEL}"))).map(Some)
     }
@@ -243,7 +245,7 @@ impl<'a> Scopes<'a> {
         format!("no link, joint or frame is named `{name}`{near}")
     }
 
-    /// Returns the link to which the parent or child of a joint refers, directly or by way of frames; `None` is the
+    /// Returns the parent link or child link of a joint, which the file names directly or through frames; `None` is the
     /// world.
     pub(super) fn link(&mut self, joint: usize, tag: &str) -> Result<Place, Error> {
         let Item { element, scope, .. } = self.items[joint];

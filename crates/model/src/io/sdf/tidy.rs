@@ -1,24 +1,24 @@
-//! Small faults of an SDF, which the format's own library ignores. Here, each fault causes a warning.
+//! Small faults of an SDF that the format's own library ignores. This reader also ignores them, but with a warning.
 
 use crate::io::xml::{self, Element};
 use crate::warning::Warning;
 
-/// Tags of elements in which such faults change a robot.
+/// Tags of the elements that are searched for small faults, because a fault in them can change the robot.
 const PARENTS: &str = " sdf world model include link inertial inertia joint axis axis2 dynamics limit mimic ";
 
 /// Tags of elements that contain one number.
 const NUMBERS: &str = " mass density ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction spring_stiffness \
   spring_reference multiplier offset reference screw_thread_pitch thread_pitch gearbox_ratio ";
 
-/// Tags of other elements that may occur only once in their parent.
+/// Tags of elements without a number that may occur only once in their parent.
 const SINGLE: &str = " pose static gravity kinematic self_collide enable_wind inertial inertia parent child axis axis2 xyz dynamics \
   limit mimic uri name placement_frame gearbox_reference_body ";
 
 /// Maximum number of characters of a number, if other text follows the number.
 const MAX_NUMBER: usize = 32;
 
-/// Adds warnings about repeated elements, of which only the first counts, and about gravity in the physics of a world.
-/// If other text follows the number in an element, removes this text and adds a warning.
+/// Adds warnings about repeated elements, of which only the first has an effect, and about gravity in the `<physics>`
+/// of a world. If other text follows the number in an element, removes this text and adds a warning.
 pub(super) fn tidy(element: &mut Element, warnings: &mut Vec<Warning>) {
     let is_in = |tag: &str, tags: &str| tags.contains(&format!(" {tag} "));
     let mut seen: Vec<String> = Vec::new();

@@ -5,12 +5,12 @@ use crate::error::Error;
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet, VecDeque};
 
-/// Types of joints. A gearbox is not among them, because it only couples two other joints.
+/// Types of joints that connect two links. A gearbox only couples two other joints, so it is not in this list.
 const KINDS: [&str; 8] = ["fixed", "revolute", "continuous", "prismatic", "screw", "ball", "universal", "revolute2"];
 /// Type of joint that only couples two other joints.
 pub(super) const GEARBOX: &str = "gearbox";
 
-/// Joint, and the links that it connects. A link that is `None` is the world.
+/// Joint, and the two links that it connects. `None` stands for the world.
 #[derive(Clone)]
 pub(super) struct Edge<'a> {
     pub(super) element: &'a Element,
@@ -48,8 +48,8 @@ impl<'a> Edge<'a> {
 pub(super) struct Tree {
     /// Root links, which no joint carries. Each root link is the root of its own tree.
     pub(super) roots: Vec<usize>,
-    /// Joints that each link or the world carries, and whether each joint is reversed. A reversed joint carries its
-    /// parent link, and its child link carries the joint.
+    /// Joints that each link or the world carries, and whether each joint is reversed. A reversed joint is carried by
+    /// its child link and carries its parent link.
     pub(super) on: HashMap<Place, Vec<(usize, bool)>>,
     /// Joints that close loops.
     pub(super) loops: Vec<usize>,
@@ -58,7 +58,7 @@ pub(super) struct Tree {
 impl Tree {
     /// Visits the joints breadth first, in the order of the file: first from the world and the links fixed to it, then
     /// from each link that is not the child of a joint. A joint is visited from its child link only if its parent link
-    /// is not reached otherwise.
+    /// cannot be reached in another way.
     pub(super) fn new(edges: &[Edge], links: &[usize], fixed: &[usize]) -> Self {
         let (mut below, mut above): (HashMap<Place, Vec<usize>>, HashMap<usize, Vec<usize>>) = Default::default();
         for (i, edge) in edges.iter().enumerate() {

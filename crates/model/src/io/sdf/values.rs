@@ -68,7 +68,7 @@ pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     Ok(Se3::new(rotation, Vec3::new(x, y, z)))
 }
 
-/// Returns the frame to which the pose of an element is relative; `None` if the pose does not name one.
+/// Returns the name of the frame to which the pose of an element is relative; `None` if the pose names no frame.
 pub(super) fn relative_to(of: &Element) -> Option<&str> {
     of.child("pose")?.attribute("relative_to").map(str::trim).filter(|n| !n.is_empty())
 }

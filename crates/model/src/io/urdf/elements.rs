@@ -1,5 +1,6 @@
-//! Children and attributes of elements. Error messages name the link or joint (`of`), and the line inside it. If a tag
-//! occurs several times, the first element counts, as in urdfdom; [`check_repeated`] adds warnings about the others.
+//! Children and attributes of elements. Error messages name the link or joint (`of`), and the line number of the
+//! element inside it. If a tag occurs several times, the first element counts, as in urdfdom; [`check_repeated`] adds
+//! warnings about the other elements.
 
 use crate::error::Error;
 use crate::io::xml::{self, Element};

@@ -1,4 +1,4 @@
-//! Joints of a URDF: their kinds, axes, limits and losses.
+//! Joints of a URDF: their kinds, axes, limits, damping and friction.
 
 use super::elements::{array, lacks, read, text, vector};
 use crate::body::JointOptions;
@@ -71,8 +71,9 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
     kind.normalized().map(|joint| Some(Moving { first, joint, rotation })).map_err(|what| joint.wrong(what))
 }
 
-/// Returns the shortest rotation that maps z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. It
-/// is exact if u is x, y or z. The rotation is equal to Drake's, also if u is −z: then it is a half turn about x.
+/// Returns the shortest rotation that maps z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. The
+/// result is exact if u is x, y or z. The rotation is the same as in Drake. If u is −z, the rotation is a half turn
+/// about x.
 fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     let Vec3 { x, y, z } = u;
     let v2 = x * x + y * y; // |v|² = (1 + z)(1 − z)
@@ -84,7 +85,8 @@ fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     Mat3 { x: Vec3::new(1.0 - k * x * x, xy, -x), y: Vec3::new(xy, 1.0 - k * y * y, -y), z: u }
 }
 
-/// Returns the limits and losses of a moving joint. For a universal joint, returns them for each of its two joints.
+/// Returns the limits, damping and friction of a moving joint. For a universal joint, the values apply to each of its
+/// two joints.
 pub(super) fn options(
     joint: &Element,
     Moving { first, joint: kind, .. }: &Moving,
@@ -97,8 +99,8 @@ pub(super) fn options(
         let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));
         (options.damping, options.friction) = (number("damping")?, number("friction")?);
     }
-    // If a joint has several degrees of freedom, units of its numbers are not defined, except for losses of joints that
-    // only turn.
+    // If a joint has several degrees of freedom, its limits, damping and friction have no defined units. Damping and
+    // friction of a joint that only turns are an exception.
     if first.is_some() || kind.nv() > 1 {
         let has = |inside: &Element| {
             inside.attributes.iter().any(|(_, x)| x.split_whitespace().any(|x| x.parse() != Ok(0.0)))

@@ -1,6 +1,6 @@
-//! Known elements and attributes of a URDF. They are defined in its schema, versions 1.0 to 1.2, and by programs that
-//! write or read URDFs (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft limits and
-//! calibrations do not affect a model; they are known and cause no warning.
+//! Known elements and attributes of a URDF. The names come from the schema of URDF, versions 1.0 to 1.2, and from
+//! programs that write or read URDFs (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft
+//! limits and calibrations do not affect a model. They are known, so they cause no warning.
 
 use super::elements::check_repeated;
 use crate::io::known::{Known, LeftOut};
@@ -8,7 +8,7 @@ use crate::io::xml::Element;
 use crate::warning::Warning;
 use std::sync::OnceLock;
 
-/// Table of [`Known`].
+/// Table of known elements and attributes; see [`Known`].
 const KNOWN: &str = "\
 robot: name version ; link joint drake:joint=joint transmission gazebo** material* sensor* mujoco** ros2_control** frame \
     loop_joint** collision_filter_group* force_element** cable** bullet* drake:collision_filter_group** \
@@ -81,7 +81,7 @@ pub(super) fn check(robot: &Element, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Adds warnings about text in links and joints, whose values must be attributes.
+/// Adds warnings about text inside links and joints. In a URDF, all values are attributes, so text has no effect.
 fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
     let text = element.text.trim();
     if !text.is_empty() {
@@ -101,7 +101,7 @@ fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
 }
 
 /// Returns a warning about an entry of `<gazebo>` that changes the robot in Gazebo. Other entries only affect contact,
-/// looks and numerics.
+/// appearance and numerics.
 fn changed_by_gazebo(entry: &Element) -> Option<Warning> {
     let is_on = matches!(entry.text.trim(), "1" | "true" | "True" | "TRUE");
     let what = match &*entry.tag {

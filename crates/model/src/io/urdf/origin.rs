@@ -13,7 +13,7 @@ const UNIT_ROUNDING: f64 = 1e-3;
 /// Rules for the placements of a robot, which depend on the version of the URDF.
 #[derive(Clone, Copy)]
 pub(super) struct Origins {
-    /// Whether `quat_xyzw` is allowed: in versions 1.1 and 1.2 it is, in version 1.0 it is not.
+    /// Whether `quat_xyzw` is allowed: only in versions 1.1 and 1.2, not in version 1.0.
     quaternions: bool,
 }
 

@@ -17,10 +17,10 @@ use crate::warning::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// Name of a link that a joint may have as its parent even if the file does not contain this link.
+/// Name of the link that a joint may name as its parent even if the file does not contain this link.
 const WORLD_LINK: &str = "world";
 
-/// Joint, and the links that it connects.
+/// Joint, and the two links that it connects.
 struct Edge<'a> {
     element: &'a Element,
     parent: &'a str,
@@ -37,7 +37,7 @@ pub(super) struct Reader<'a> {
     joints: HashMap<&'a str, Edge<'a>>,
     /// Name of the root link.
     root: &'a str,
-    /// First joint whose parent is `world`, if the file does not contain such a link.
+    /// First joint whose parent is `world`, if the file contains no link with this name.
     on_world: Option<&'a Element>,
     /// Joints that each link carries, in the order of their names.
     children: HashMap<&'a str, Vec<&'a str>>,
@@ -154,7 +154,7 @@ impl<'a> Reader<'a> {
         wait(&mut waiting, self.root, root, Se3::identity());
         while let Some((name, parent, pXl)) = waiting.pop() {
             let Edge { element, child: link, .. } = self.joints[name];
-            let pXl = pXl * self.origins.pose(element, element)?; // pXl of the child
+            let pXl = pXl * self.origins.pose(element, element)?; // pose of the child link in the body
             let inertia = self.inertia(link, &mut warnings)?;
             let (body, bXl) = match joints::kind(element, &mut warnings)? {
                 None => {
@@ -208,8 +208,8 @@ impl<'a> Reader<'a> {
         self.robot.accepted(model, options.strict, &options.allow)
     }
 
-    /// Returns the name of the joint between the world and the root link. It is `root_joint`, or `root_joint_2`, … if
-    /// the robot has a joint with that name.
+    /// Returns the name of the joint between the world and the root link. The name is `root_joint`. If the robot
+    /// already has a joint with that name, the name is `root_joint_2`, `root_joint_3`, and so on.
     fn root_joint(&self) -> String {
         let mut name = String::from("root_joint");
         for k in 2.. {
@@ -308,7 +308,7 @@ impl<'a> Reader<'a> {
         Ok(self.origins.pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
     }
 
-    /// Adds the line number of the link or joint to an error of the builder.
+    /// Replaces an error of the builder by an error with the line number of the link or joint.
     fn locate(&self, error: Error) -> Error {
         let own = "the name belongs to the library";
         let (link, joint) =

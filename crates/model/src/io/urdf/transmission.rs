@@ -1,4 +1,4 @@
-//! Transmissions of a URDF: the inertia of a rotor, as seen at the joint that it drives.
+//! Transmissions of a URDF: the inertia of a rotor, reflected to the joint that the rotor drives.
 
 use crate::io::xml::{Element, array};
 use crate::warning::Warning;
@@ -42,7 +42,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
                 .map(|n| format!("has a reduction of {n} and no rotor inertia: M has no inertia of the rotor")),
             Some((element, inertia)) => {
                 if element.tag == ROTOR[0] {
-                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // as in Drake
+                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // Drake reads only its own ratio
                 }
                 let why = match (ratio, name) {
                     _ if inertia < 0.0 => Some("which is below 0"),
@@ -61,7 +61,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
     found
 }
 
-/// Returns the number of an element. It is the attribute `value` or the text of the element.
+/// Returns the number in an element: its attribute `value` or its text.
 fn number(element: &Element) -> Option<f64> {
     let [x] = array(element.attribute("value").unwrap_or(&element.text)).ok()?;
     Some(x)

@@ -1,5 +1,5 @@
-//! Conversion of robots that urdf-rs has read. They become elements of a URDF, which the reader of this crate then
-//! reads.
+//! Conversion of robots that urdf-rs has read. Such a robot is converted to XML elements, and the URDF reader of this
+//! crate reads these elements.
 
 use super::UrdfOptions;
 use super::reader::Reader;
@@ -13,11 +13,12 @@ impl Model {
     /// Converts a robot that urdf-rs has read. The result is the same model as [`from_urdf`](Self::from_urdf) reads
     /// from the same file, except for information that `urdf_rs::Robot` lacks:
     ///
-    /// - A missing limit consists of zeros in `urdf_rs::Robot`. Zeros of a continuous joint are treated as no limit.
-    ///   Zeros of a revolute or prismatic joint stay, and cause a warning.
+    /// - In `urdf_rs::Robot`, a missing limit is stored as zeros. For a continuous joint, zeros are treated as no
+    ///   limit. For a revolute or prismatic joint, zeros are kept as limits and cause a warning.
     /// - A planar joint without an axis has the axis 1 0 0, without a warning about this default.
     /// - `urdf_rs::Robot` lacks versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions,
-    ///   frames and joints of Drake, and unknown or unsupported names. They have no effect and cause no warning.
+    ///   frames and joints of Drake, and unknown or unsupported names. So these features have no effect and cause no
+    ///   warning.
     ///
     /// Needs the feature `urdf-rs`.
     ///
@@ -95,7 +96,7 @@ fn link(link: &Link) -> Element {
     element("link", &[("name", &link.name)], vec![inertial])
 }
 
-/// Returns an element whose attributes contain one number each; see [`numbers`].
+/// Returns an element whose attributes each contain one number; see [`numbers`].
 fn element_of_numbers(tag: &str, attributes: &[(&str, f64)]) -> Element {
     let attributes: Vec<(&str, &[f64])> = attributes.iter().map(|(name, x)| (*name, std::slice::from_ref(x))).collect();
     numbers(tag, &attributes)

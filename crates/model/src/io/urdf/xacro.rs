@@ -12,19 +12,21 @@ use std::time::{Duration, Instant};
 /// Programs that expand xacro files, in the order in which they are tried. The first one is part of ROS. The second one
 /// is on PyPI and does not need ROS.
 const PROGRAMS: [&str; 2] = ["xacro", "xacrodoc"];
-/// Words in error messages of `xacro`. They show that `xacro` did not find a package because ROS is missing.
+/// Words in error messages of `xacro`. A message with such a word shows that `xacro` did not find a package because ROS
+/// is missing.
 const ROS: [&str; 4] = ["ament_index_python", "rospkg", "PackageNotFoundError", "$(find"];
 /// Advice in the error message for a file that refers to packages.
 const ADVICE: &str = "\nThe program `xacro` resolves `$(find …)` by ROS only. `pip install xacrodoc` installs a program \
     that finds packages in the folders of `packages`.";
 /// Maximum running time of a program. The expansion of large robots takes a few seconds.
 const MAX_TIME: Duration = Duration::from_secs(60);
-/// Maximum length of a program's output that is read (bytes). It is one more than the limit for a robot's files.
+/// Maximum length of a program's output that is read (bytes): one more than the limit for a robot's files, so that a
+/// longer output is detected.
 const MAX_BYTES: u64 = (64 << 20) + 1;
 /// Maximum number of bytes of a program's message that an error contains.
 const MESSAGE: usize = 2000;
 
-/// Returns whether a path is the path of a xacro file.
+/// Returns whether the name of a file ends in `.xacro`.
 pub(super) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "xacro")
 }
@@ -70,7 +72,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
         _ => Failure::Said(e.to_string()),
     };
     let mut command = Command::new(program);
-    // A path that begins with a dash would be parsed as an option.
+    // Adds `./` to a relative path, because a path that begins with a dash would be parsed as an option.
     command.arg(if path.is_absolute() { path.to_owned() } else { Path::new(".").join(path) });
     if program == PROGRAMS[1] {
         command.args(packages.iter().flat_map(|folder| [OsStr::new("--pkg-dir"), folder.as_os_str()]));
@@ -93,7 +95,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
         let _ = child.wait();
         return Err(Failure::Said(format!("is not done after {} s", MAX_TIME.as_secs())));
     };
-    // A pipe may stay open if another process still holds it.
+    // Waits at most one second, because a pipe stays open as long as another process holds it.
     let text = |from: Receiver<Vec<u8>>| from.recv_timeout(Duration::from_secs(1)).unwrap_or_default();
     if status.success() {
         return String::from_utf8(text(output)).map_err(|e| Failure::Said(e.to_string()));

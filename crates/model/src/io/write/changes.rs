@@ -9,17 +9,17 @@ use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Maximum relative difference that is treated as a rounding error; chosen because inertias are transformed between the
-/// frames of several links.
+/// Maximum relative difference that is treated as a rounding error. Such errors arise when inertias are transformed
+/// between the frames of several links.
 pub(super) const ROUNDING: f64 = 1e-9;
-/// Maximum relative difference that is certainly a rounding error. A larger difference may be the contribution of
-/// another element.
+/// Maximum relative difference that is always a rounding error. A larger difference may be the contribution of another
+/// element of the file.
 pub(super) const NO_SHARE: f64 = 1e-14;
-/// Maximum relative difference up to which numbers are treated as equal and not written; chosen because MuJoCo's
-/// compiler and this crate's reader round differently.
+/// Maximum relative difference of numbers that are treated as equal and not written. MuJoCo's compiler and this crate's
+/// reader may differ by such rounding errors.
 const EQUAL: f64 = 1e-12;
-/// Minimum fraction of a body's mass that a link may keep; chosen because the centre of mass of a lighter link would
-/// have few digits.
+/// Minimum fraction of a body's mass that a link may keep. The centre of mass of a lighter link would have few correct
+/// digits.
 const LEAST_SHARE: f64 = 1e-3;
 
 /// Numbers that must change in a file.
@@ -31,11 +31,11 @@ pub(super) struct Changes {
 /// New inertia of a body, distributed over the links of the body.
 pub(super) struct LinkChange {
     body: usize,
-    /// Name of the link that takes the difference between the body's new and old inertia.
+    /// Name of the link whose inertia changes by the difference between the body's new and old inertia.
     pub(super) link: String,
-    /// Pose, in the body, of the link that takes the difference.
+    /// Pose of the changed link, in the body's frame.
     placement: Se3<f64>,
-    /// New inertia of the link that takes the difference, in the body's frame.
+    /// New inertia of the changed link, in the body's frame.
     inertia: Inertia<f64>,
     /// Names of the body's other links that have an inertia.
     others: Vec<String>,
@@ -47,7 +47,7 @@ pub(super) struct LinkChange {
 pub(super) struct JointChange {
     body: usize,
     pub(super) name: String,
-    /// Whether positions are lengths.
+    /// Whether the joint is prismatic, so that its positions are lengths.
     pub(super) is_prismatic: bool,
     /// Numbers of the joint, in the order of [`NUMBERS`].
     values: [f64; 10],
@@ -55,7 +55,7 @@ pub(super) struct JointChange {
     differs: [bool; 10],
 }
 
-/// Names of the numbers that a file has for each joint. The first two are limits of coordinates in q, the others belong
+/// Names of the numbers that a file has for each joint. The first two are limits of coordinates in q. The others belong
 /// to degrees of freedom in v.
 pub(super) const NUMBERS: [&str; 10] = [
     "lower limit",
@@ -97,7 +97,7 @@ pub(super) fn slots(body: &Body, k: usize) -> Range<usize> {
 }
 
 impl JointChange {
-    /// Returns N numbers, from index `first` on; `None` if none of these numbers differs.
+    /// Returns N numbers of the joint, from index `first` on; `None` if all of them equal the numbers in the file.
     fn some<const N: usize>(&self, first: usize) -> Option<[f64; N]> {
         let differs = self.differs[first..first + N].contains(&true);
         differs.then(|| std::array::from_fn(|k| self.values[first + k]))
@@ -129,7 +129,7 @@ impl JointChange {
         self.some(8).map(|[x]| x)
     }
 
-    /// Returns the inertia of the rotor as seen at the joint (kg m², kg).
+    /// Returns the inertia of the rotor, reflected to the joint (kg m², kg).
     pub(super) fn armature(&self) -> Option<f64> {
         self.some(9).map(|[x]| x)
     }
@@ -160,8 +160,8 @@ impl Changes {
         self.links.is_empty() && self.joints.is_empty()
     }
 
-    /// Subtracts the contributions of other elements. `now` is the model that the changed file describes. Returns
-    /// whether there are changes.
+    /// Subtracts the contributions of other elements from the numbers to write. `now` is the model that the edited text
+    /// describes. Returns whether there are changes.
     pub(super) fn take_shares_off(&mut self, model: &Model, now: &Model) -> bool {
         for change in &mut self.links {
             let (wanted, found) = (model.bodies[change.body].inertia, now.bodies[change.body].inertia);
@@ -184,7 +184,7 @@ impl Changes {
     }
 }
 
-/// Finds the bodies whose inertia differs, and the link of each body that takes the difference.
+/// Finds the bodies whose inertia differs, and the link of each such body that is changed.
 fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Vec<LinkChange>, String> {
     let mut changes = Vec::new();
     for (i, (body, before)) in model.bodies.iter().zip(&was.bodies).enumerate() {
@@ -213,7 +213,7 @@ fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Ve
     Ok(changes)
 }
 
-/// Finds the joints whose limits, losses or armature differ.
+/// Finds the joints whose limits, damping, friction or armature differ.
 fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
     let (new, old, mut changes) = (numbers(model), numbers(was), Vec::new());
     for (i, body) in model.bodies.iter().enumerate().skip(1).filter(|(_, b)| b.mimic.is_none()) {
@@ -242,7 +242,8 @@ pub(super) fn close(a: f64, b: f64, rounding: f64) -> bool {
     a == b || tolerance.is_finite() && (a - b).abs() <= tolerance
 }
 
-/// Returns whether two inertias are equal up to rounding. The scale of m c is its upper bound √(m tr Ī).
+/// Returns whether two inertias are equal up to rounding. The tolerance for m c is relative to its upper bound √(m tr
+/// Ī).
 pub(super) fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
     let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
     let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));

@@ -14,7 +14,7 @@ use condyle_spatial::{Inertia, Se3, Vec3};
 pub(super) struct Difference {
     /// Name of the differing quantity, with both values.
     what: String,
-    /// Attributes that may be the cause: with them, a number depends on other numbers of the file.
+    /// Attributes that may cause the difference, because with them a number depends on other numbers of the file.
     causes: &'static [&'static str],
 }
 
@@ -44,7 +44,7 @@ impl Difference {
     }
 }
 
-/// Returns whether an element, or an element inside it, has a given attribute.
+/// Returns whether an element or one of its descendants has a given attribute.
 fn mentions(element: &Element, name: &str) -> bool {
     element.attribute(name).is_some() || element.children.iter().any(|child| mentions(child, name))
 }
@@ -124,7 +124,7 @@ fn different_springs(model: &Model, file: &Model) -> Option<Difference> {
     })
 }
 
-/// Returns the first difference between ratios of gravity compensation.
+/// Returns the first difference between the compensated fractions of weight.
 fn different_compensation(model: &Model, file: &Model) -> Option<Difference> {
     let of = |m: &Model| m.gravity_compensation.clone();
     let bodies = |m: &Model| of(m).iter().map(|c| m.bodies[c.body].name.clone()).collect::<Vec<_>>();
@@ -193,7 +193,8 @@ fn different_keyframes(model: &Model, file: &Model) -> Option<Difference> {
     })
 }
 
-/// Returns the first difference between constraints. The poses of their frames are compared elsewhere, with all frames.
+/// Returns the first difference between constraints. The poses of their frames are not compared here, because all
+/// frames are compared separately.
 fn different_constraints(model: &Model, file: &Model) -> Option<Difference> {
     let names = |m: &Model| m.constraints.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
     if let Some(what) = different_names("constraints", &names(model), &names(file)) {
@@ -217,7 +218,8 @@ fn different_constraints(model: &Model, file: &Model) -> Option<Difference> {
     })
 }
 
-/// Returns the difference between two lists of names, in the model and in the file. `parts` says what is named.
+/// Returns the difference between two lists of names, in the model and in the file. `parts` describes the named items,
+/// for example `joints`.
 fn different_names(parts: &str, model: &[String], file: &[String]) -> Option<String> {
     let list = |names: &[String]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     let said = |names: &[String]| if names.is_empty() { "none".to_owned() } else { list(names) };
@@ -240,7 +242,8 @@ fn pose(X: Se3<f64>) -> Vec<f64> {
     [X.translation].into_iter().chain(X.rotation.columns()).flat_map(Vec3::to_array).collect()
 }
 
-/// Returns the first difference between a model and the model in a file that is larger than a relative rounding error.
+/// Returns the first difference between a model and the model in a file. Differences up to the relative error
+/// `rounding` are ignored.
 pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<Difference> {
     if let Some(difference) = different_robot(model, file) {
         return Some(difference);

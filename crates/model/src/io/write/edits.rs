@@ -4,7 +4,7 @@ use crate::io::xml::Element;
 use condyle_spatial::{Inertia, Sym3, Vec3};
 use std::ops::Range;
 
-/// Replaced parts of a text: byte ranges, and the new text for each of them.
+/// Edits of a text: byte ranges, and the new text for each range.
 pub(super) struct Edits<'a> {
     text: &'a str,
     pieces: Vec<(Range<usize>, String)>,
@@ -45,7 +45,7 @@ impl<'a> Edits<'a> {
     /// Inserts an element as the first child of another element. The new element is on its own line if the other
     /// children are on their own lines.
     ///
-    /// An element without an end tag gets one. Only one child can be inserted into such an element.
+    /// If an element has no end tag, an end tag is added. Only one child can be inserted into such an element.
     pub(super) fn insert(&mut self, element: &Element, xml: &str) {
         let (tag, own) = (StartTag::new(self.text, element), self.indent(element));
         let child = element.children.first().map(|child| self.indent(child));
@@ -95,7 +95,7 @@ struct StartTag {
 }
 
 impl StartTag {
-    /// Finds the parts of a start tag. The parser must have accepted this tag before.
+    /// Finds the attributes and the end of a start tag. The parser must have accepted this tag before.
     fn new(text: &str, element: &Element) -> Self {
         let (mut at, mut attributes) = (element.at + 1 + element.tag.len(), Vec::new());
         let mut content_end = at;
@@ -131,8 +131,8 @@ pub(super) fn words(numbers: &[f64]) -> String {
     numbers.iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns the mass (kg), the centre of mass (m), and the inertia about the centre of mass (kg m²). This is the form
-/// used in files.
+/// Returns the mass (kg), the centre of mass (m), and the inertia about the centre of mass (kg m²). Files contain an
+/// inertia in this form.
 pub(super) fn about_com(I: Inertia<f64>) -> Result<(f64, [f64; 3], Sym3<f64>), String> {
     if I.mass == 0.0 {
         return match I.mass_com == Vec3::zero() {

@@ -11,7 +11,7 @@ use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// MJCF format, with the path relative to which files are included, and the options of the reader.
+/// MJCF format: the path of the file, relative to which other files are included, and the options of the reader.
 pub(super) struct Mjcf<'a> {
     pub(super) path: &'a Path,
     pub(super) options: MjcfOptions,
@@ -96,7 +96,7 @@ fn name(element: &Element, otherwise: impl Fn() -> String) -> String {
     element.attribute("name").filter(|n| !n.is_empty()).map_or_else(otherwise, str::to_owned)
 }
 
-/// Returns the value of an attribute of `<compiler>`. If it occurs several times, the last one counts.
+/// Returns the value of an attribute of `<compiler>`. If the attribute occurs several times, the last value counts.
 fn compiler<'a>(root: &'a Element, name: &str) -> Option<&'a str> {
     let sections = root.children.iter().filter(|section| section.tag == "compiler");
     sections.rev().find_map(|section| section.attribute(name))
@@ -110,7 +110,7 @@ impl Format for Mjcf<'_> {
     fn masses(&self, root: &Element) -> HashMap<String, f64> {
         let mass = |parts: &Parts| match parts.inertial {
             Some(inertial) => inertial.attribute("mass")?.trim().parse().ok(),
-            None => parts.has_geom.then_some(f64::MIN_POSITIVE), // any positive mass, which an <inertial> replaces
+            None => parts.has_geom.then_some(f64::MIN_POSITIVE), // any positive mass; an <inertial> replaces it
         };
         let bodies = Elements::new(root).bodies.into_iter();
         bodies.filter_map(|(name, parts)| Some((name, mass(&parts)?))).collect()
@@ -163,13 +163,14 @@ fn inertial(edits: &mut Edits, parts: &Parts, I: Inertia<f64>) -> Result<(), Str
     edits.set(inertial, "pos", &com);
     edits.set(inertial, "mass", &[mass]);
     edits.set(inertial, moments, &numbers);
-    // The new inertia is along the axes of that frame, so attributes for other axes are removed.
+    // The new inertia is written along the axes of the surrounding frame, so attributes that specify other axes are
+    // removed.
     let others = ["diaginertia", "fullinertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"];
     others.into_iter().filter(|name| *name != moments).for_each(|name| edits.remove(inertial, name));
     Ok(())
 }
 
-/// Sets the limits, losses and armature of a joint.
+/// Sets the limits, damping, friction and armature of a joint.
 fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange, degrees: bool) -> Result<(), String> {
     if joint.tag == "freejoint" {
         return Err("a <freejoint> has neither limits, losses nor armature: write <joint type=\"free\">".to_owned());

@@ -75,7 +75,7 @@ fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), St
     match inertial.child("origin") {
         Some(origin) => {
             edits.set(origin, "xyz", &com);
-            // The new inertia is along the axes of the link, so other axes are removed.
+            // The new inertia is written along the axes of the link, so attributes that specify other axes are removed.
             let turned = |name: &&str| {
                 let numbers = origin.attribute(name).unwrap_or_default().split_whitespace();
                 numbers.map(str::parse::<f64>).any(|x| x != Ok(0.0))
@@ -92,7 +92,7 @@ fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), St
     Ok(())
 }
 
-/// Sets the limits and losses of a joint.
+/// Sets the limits, damping and friction of a joint.
 fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange) -> Result<(), String> {
     let finite = |name: &'static str, x: f64| match x.is_finite() {
         true => Ok((name, x)),
@@ -143,8 +143,8 @@ const ROTOR: &str = "drake:rotor_inertia";
 /// Tag of the number of turns of the rotor per turn of its joint. The number is 1 if the element is missing.
 const RATIO: &str = "drake:gear_ratio";
 
-/// Sets the armature of a joint. It is written as the rotor inertia J of the joint's transmission, with the armature n²
-/// J.
+/// Sets the armature of a joint. The armature n² J is written as the rotor inertia J of the joint's transmission with
+/// the gear ratio n.
 fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) {
     let drives = |t: &&Element| t.all("joint").map(|j| j.attribute("name")).eq([Some(joint)]);
     let own = robot.all("transmission").filter(drives).find(|t| t.all("actuator").count() == 1);
@@ -157,7 +157,7 @@ fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) 
         (_, Some(old)) => edits.set(old, "value", &[inertia]),
         (Some(actuator), None) => edits.insert(actuator, &rotor),
         (None, None) => {
-            let kind = "<type>transmission_interface/SimpleTransmission</type>"; // without this element, Drake refuses the file
+            let kind = "<type>transmission_interface/SimpleTransmission</type>"; // Drake requires this element
             let inside = format!("{kind}<joint name=\"{joint}\"/><actuator name=\"{joint}\">{rotor}</actuator>");
             edits.insert(robot, &format!("<transmission name=\"{joint}\">{inside}</transmission>"));
         }

@@ -10,7 +10,8 @@ pub(super) fn decode(bytes: Vec<u8>) -> String {
         [b'<', 0, ..] => utf16(&bytes, u16::from_le_bytes),
         [0, b'<', ..] => utf16(&bytes, u16::from_be_bytes),
         _ => match declared(&bytes).map(|name| name.to_ascii_lowercase()).as_deref() {
-            // A file that declares UTF-16 but could be read as bytes up to here is in ASCII or UTF-8.
+            // A file in UTF-16 was recognized above by its first bytes. So a file that reaches this line and declares
+            // UTF-16 is in ASCII or UTF-8.
             None | Some(b"utf-8" | b"utf8" | b"us-ascii" | b"ascii" | b"utf-16" | b"utf16") => utf8(bytes),
             Some(
                 b"iso-8859-1" | b"iso8859-1" | b"iso_8859-1" | b"latin1" | b"latin-1" | b"windows-1252" | b"cp1252",

@@ -1,9 +1,9 @@
-//! Parser of XML, which reads a text in one pass. It accepts the same files as tinyxml2, on which the usual readers of
-//! robots are based: prefixes without a declaration, dashes in comments, and a declaration that is not at the
-//! beginning.
+//! Parser of XML that reads a text in one pass. The parser accepts the same files as tinyxml2, on which most readers of
+//! robot files are based. For example, it accepts prefixes without a declaration, dashes in comments, and an XML
+//! declaration that is not at the beginning.
 //!
-//! Elements inside a document type have no effect. The entities of a document type are not expanded, so a text cannot
-//! grow.
+//! Elements inside a document type have no effect. Entities that a document type defines are not expanded, so a text
+//! cannot grow.
 
 use super::encoding::{INVALID, declared};
 use super::{EXPAND, Element, MAX_ATTRIBUTES, MAX_DEPTH};
@@ -39,7 +39,7 @@ struct Parser<'a> {
 
 /// Parses the root element of a text.
 pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
-    let text = text.trim_end_matches('\0'); // terminating zero of a C string
+    let text = text.trim_end_matches('\0'); // removes the terminating zero of a C string
     let mut parser = Parser {
         text,
         at: if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 },
@@ -234,8 +234,8 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// Stores the description of an item outside of the root element. Other readers of robots accept such items, so it
-    /// is not an error.
+    /// Stores the description of an item outside of the root element. Such an item is not an error, because other
+    /// readers of robot files accept it.
     fn stray(&mut self, what: String) {
         if self.stray.is_none() {
             self.stray = Some(Box::new((self.count_lines(), what)));
@@ -342,8 +342,8 @@ pub(super) fn count(bytes: &[u8], byte: u8) -> usize {
     bytes.iter().filter(|&&b| b == byte).count()
 }
 
-/// Returns whether the text between `&` and `;` is the name of an entity or the number of a character. If it is
-/// neither, the `&` is literal.
+/// Returns whether the text between `&` and `;` is the name of an entity or the number of a character. If the text is
+/// neither, the `&` is a literal character.
 fn is_entity(name: &str) -> bool {
     let name = name.strip_prefix('#').unwrap_or(name);
     !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b))

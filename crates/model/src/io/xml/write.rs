@@ -1,4 +1,4 @@
-//! Text of a robot's file for other XML parsers, without constructs that they refuse.
+//! Conversion of a robot's file to a text that other XML parsers accept.
 
 use super::{Amount, Element};
 use crate::error::Error;
@@ -30,7 +30,7 @@ impl Written {
     /// Writes an element on its line, or on the first later line that is free.
     fn element(&mut self, element: &Element) {
         let name = |name: &str| match name.strip_prefix(':') {
-            Some(rest) => format!("_{}", rest.replace(':', "-")), // no name begins with a dash
+            Some(rest) => format!("_{}", rest.replace(':', "-")), // a name must not begin with a dash
             None => name.replace(':', "-"),
         };
         while self.line < element.line {
@@ -60,7 +60,7 @@ impl Written {
                 '&' => self.text += "&amp;",
                 '<' => self.text += "&lt;",
                 '"' => self.text += "&quot;",
-                '\n' => self.text += "&#10;", // this way, no line is added
+                '\n' => self.text += "&#10;", // adds no line break
                 '\t' => self.text += "&#9;",
                 c if c.is_control() => {}
                 c => self.text.push(c),

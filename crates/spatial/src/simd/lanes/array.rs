@@ -1,5 +1,6 @@
-//! Lanes for processors whose vector instructions this crate does not support. They are arrays, which the compiler may
-//! vectorize. No SIMD level uses these lanes. They exist so that code on lanes needs no second version.
+//! Lanes for processors whose vector instructions this crate does not support. These lanes are arrays, which the
+//! compiler may vectorize. No SIMD level uses them, but with them, code that is written for lanes also compiles on such
+//! processors.
 
 use super::{Element, Lanes, Register};
 use crate::scalar::number::Number;

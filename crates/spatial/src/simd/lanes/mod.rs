@@ -1,4 +1,4 @@
-//! SIMD lanes: several numbers side by side in vector registers.
+//! SIMD lanes: several numbers in one or two vector registers.
 //!
 //! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 with FMA, NEON, or SIMD128. With NEON and SIMD128, each
 //! vector uses two registers. `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`FusedF64`](super::FusedF64) is a
@@ -6,8 +6,8 @@
 //!
 //! Use these types only in code that was entered through a function compiled for their
 //! [`Level`](crate::simd::level::Level). In other code, each operation would be a function call, and an illegal
-//! instruction on a processor without this level. So only a [`SimdToken`](crate::simd::pack::SimdToken) can name these
-//! types.
+//! instruction on a processor without this level. Therefore, code can name these types only with a
+//! [`SimdToken`](crate::simd::pack::SimdToken).
 //!
 //! Every operation treats each lane separately. The content of one lane, even NaN, never affects another lane.
 //!
@@ -58,7 +58,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     /// Returns x in every lane.
     fn splat(x: T) -> Self;
     /// Returns 0 in every lane. Code that is compiled for any processor fills workspaces with this value. In such code,
-    /// an instruction of these registers, as in [`splat`](Self::splat), would be a function call; zero bits need no
+    /// an instruction of these registers would be a function call, as in [`splat`](Self::splat). Zero bits need no such
     /// instruction.
     fn zero() -> Self;
     /// Returns a + b.
@@ -109,15 +109,15 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
 pub struct Lanes<T: Element<N>, const N: usize>(T::Register);
 
 /// Defines functions that consist of vector instructions of the processor.
-#[allow(unused_macros)] // unused without vector instructions
+#[allow(unused_macros)] // unused on targets without vector instructions
 macro_rules! instructions {
     ($($(#[$doc:meta])* fn $name:ident($($x:ident: $type:ty),*) $(-> $out:ty)? { $body:expr })*) => {$(
         $(#[$doc])*
         #[inline(always)]
         #[allow(unused_unsafe)]
         fn $name($($x: $type),*) $(-> $out)? {
-            // SAFETY: the processor has the level: only code that was entered through `Scalar::enter` has these
-            // numbers.
+            // SAFETY: the processor has the SIMD level, because only code entered through `Scalar::enter` holds these
+            // vectors.
             unsafe { $body }
         }
     )*};
@@ -208,8 +208,8 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
     }
 }
 
-/// Second type to which the constant `[T; N]` can be converted. Without it, type inference would select the lane type,
-/// which only a [`SimdToken`](crate::simd::pack::SimdToken) may name.
+/// Second type to which the constant `[T; N]` can be converted. Without a second type, type inference would select the
+/// lane type. Only code with a [`SimdToken`](crate::simd::pack::SimdToken) may name the lane type.
 #[derive(Clone, Copy)]
 pub struct NotALane<T, const N: usize>([T; N]);
 

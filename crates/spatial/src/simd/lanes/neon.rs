@@ -1,5 +1,5 @@
-//! Lanes with NEON, which every 64-bit Arm processor has. A vector is two registers, so it has as many lanes as with
-//! AVX2. So the source code and the assignment of limbs to lanes are the same for both.
+//! Lanes with NEON, which every 64-bit Arm processor has. A vector occupies two registers, so it has as many lanes as a
+//! vector of AVX2. Therefore NEON and AVX2 use the same source code and the same assignment of limbs to lanes.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, narrow};
@@ -109,7 +109,7 @@ pub mod moves {
         /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-            // SAFETY: a vector of this kind exists, so the processor has the level. Two rows of the array have 16
+            // SAFETY: the argument is a vector, so the processor has its SIMD level. Two rows of the array have 16
             // bytes.
             unsafe {
                 let bytes = uint8x16x2_t(vreinterpretq_u8_f64(x.0.0), vreinterpretq_u8_f64(x.0.1));
@@ -123,7 +123,7 @@ pub mod moves {
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-        // SAFETY: a vector of this kind exists, so the processor has the level.
+        // SAFETY: the argument is a vector, so the processor has its SIMD level.
         unsafe {
             let pairs = vaddq_f64(x.0.0, x.0.1);
             let sum = vpaddq_f64(pairs, pairs);

@@ -1,5 +1,5 @@
-//! Lanes with SIMD128 of WebAssembly. A vector is two registers, as with NEON. There are no fused products: `mul_add`
-//! rounds the product before the sum, for lanes and for single numbers.
+//! Lanes with SIMD128 of WebAssembly. A vector occupies two registers, as with NEON. There are no fused products:
+//! `mul_add` rounds the product before the sum, for lanes and for single numbers.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, narrow};
@@ -111,7 +111,7 @@ pub mod moves {
         #[inline(always)]
         pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             let [first, second] = &self.from;
-            // SAFETY: two rows of an array have 16 bytes.
+            // SAFETY: the load reads 16 bytes: two rows of eight bytes.
             let bytes = |rows: &[[u8; 8]]| unsafe { v128_load(rows[..2].as_ptr().cast()) };
             let half = |rows: [&[[u8; 8]]; 2]| {
                 v128_or(u8x16_swizzle(x.0.0, bytes(rows[0])), u8x16_swizzle(x.0.1, bytes(rows[1])))

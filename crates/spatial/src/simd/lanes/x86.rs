@@ -199,7 +199,7 @@ pub mod moves {
         /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-            // SAFETY: a vector of this kind exists, so the processor has the level. Each of the arrays has 32 bytes.
+            // SAFETY: the argument is a vector, so the processor has its SIMD level. Each array has 32 bytes.
             unsafe {
                 let from = _mm256_loadu_si256(self.from.as_ptr().cast());
                 let to = _mm256_loadu_ps(self.to.as_ptr().cast());
@@ -212,7 +212,7 @@ pub mod moves {
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-        // SAFETY: a vector of this kind exists, so the processor has the level.
+        // SAFETY: the argument is a vector, so the processor has its SIMD level.
         unsafe {
             let pairs = _mm256_add_pd(x.0, _mm256_permute2f128_pd::<1>(x.0, x.0));
             Lanes(_mm256_add_pd(pairs, _mm256_permute_pd::<0b0101>(pairs)))

@@ -32,7 +32,7 @@ impl fmt::Display for Refused {
 
 impl core::error::Error for Refused {}
 
-/// List of levels that is displayed in a sentence.
+/// List of SIMD levels. It is displayed as words with commas and "or".
 struct List<'a>(&'a [Level]);
 
 impl fmt::Display for List<'_> {
