@@ -1,14 +1,15 @@
 //! Derivatives of user-defined functions of the state, by dual numbers.
 //!
-//! A state x begins with a position q of nq numbers. A step δ moves q to q ⊕ δ and is added to all other numbers
-//! (velocity, effort, …). So a state of n numbers has n − nq + nv directions. A derivative of f means the derivative of
-//! f(x ⊕ δ) with respect to δ, at δ = 0.
+//! A state x begins with a position q of nq numbers. A step δ changes the state to x ⊕ δ: its first nv numbers move q
+//! in the tangent space, and its other numbers are added to the other numbers of x (velocity, effort, …). So a state of
+//! n numbers has n − nq + nv directions. The derivative of a function f is the derivative of f(x ⊕ δ) with respect to
+//! δ, at δ = 0.
 //!
 //! A function written for any scalar can be evaluated for eight or four directions at once, in vector registers
 //! ([`LaneJacobian`]). A dual number carries one direction, and a hyper-dual number carries two (Fike and Alonso, *The
 //! development of hyper-dual numbers for exact second-derivative calculations*, 2011). Derivatives are exact and cost
-//! one evaluation of f per direction or pair of directions. The analytical derivatives of this crate are many times
-//! faster.
+//! one evaluation of f per direction or pair of directions. The analytical derivatives of this crate's own algorithms
+//! are many times faster.
 
 use crate::data::Data;
 use crate::workspace::{Narrow, Wide};
@@ -25,7 +26,7 @@ use condyle_spatial::{Constant, Scalar};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, HyperDual64};
 
-/// Returns x ⊕ δ, where the numbers of δ carry derivatives.
+/// Returns x ⊕ δ, where the numbers of δ have a dual part.
 fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     let mut out: Vec<S> = x.iter().map(|&x| S::splat(x)).collect();
     let (q, rest) = out.split_at_mut(model.nq());
@@ -94,8 +95,9 @@ pub trait StateFunction {
     fn call<S: Scalar>(&mut self, data: &mut Data<S>, x: &[S], y: &mut [S]);
 }
 
-/// Exact Jacobians of functions of one robot's state. Unlike in [`jacobian`], one evaluation of f computes derivatives
-/// along eight (AVX-512) or four (AVX2, NEON, SIMD128) directions. Only f may allocate.
+/// Exact Jacobians of functions of one robot's state. One evaluation of f computes the derivatives along eight
+/// (AVX-512) or four (AVX2, NEON, SIMD128) directions, whereas [`jacobian`] computes one direction. Apart from f, a
+/// call allocates nothing.
 ///
 /// The last digits of results differ between SIMD levels ([`level`](mod@crate::level)).
 ///
@@ -134,7 +136,7 @@ enum Width {
 
 impl LaneJacobian {
     /// Allocates memory for states of n numbers, which begin with q, and for functions with `results` results. Uses the
-    /// SIMD level that is current now.
+    /// SIMD level that is current at this call.
     ///
     /// # Panics
     /// If n is less than nq.
@@ -164,8 +166,8 @@ impl LaneJacobian {
         self.run(model, x, f, None)
     }
 
-    /// Computes f(x) and some columns of its Jacobian: column k, the derivative along entry k of δ, for each k in
-    /// `directions`. The other columns are not written: they are zero until a call computes them.
+    /// Computes f(x) and the columns of its Jacobian whose indices are in `directions`. Column k is the derivative
+    /// along entry k of δ. The other columns are not overwritten: a column is zero until a call computes it.
     ///
     /// ```
     /// # use condyle_dynamics::{Data, LaneJacobian, Scalar, StateFunction, robots};
@@ -216,13 +218,13 @@ impl LaneJacobian {
     }
 }
 
-/// Scratch for one direction per lane of S.
+/// Scratch of a [`LaneJacobian`]: each lane of S computes one direction.
 #[derive(Debug)]
 struct Directions<S> {
     data: Data<LaneDual<S>>,
-    /// δ. Shape: directions.
+    /// Step δ. Shape: number of directions.
     delta: Vec<LaneDual<S>>,
-    /// x, then x ⊕ δ.
+    /// State x (`x`), and the state x ⊕ δ (`moved`).
     x: Vec<LaneDual<S>>,
     moved: Vec<LaneDual<S>>,
     y: Vec<LaneDual<S>>,

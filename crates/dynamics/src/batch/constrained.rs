@@ -61,7 +61,7 @@ results! {
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
-        /// M, nv × nv.
+        /// Inertia matrix M, nv × nv.
         M: Matrices<'b, T> = [NV, NV];
         /// ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv.
         dtau_dq: Matrices<'b, T> = [NV, NV];
@@ -127,7 +127,7 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// In the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn constrained_dynamics_derivatives(model, data, constraints: BatchConstraints; q, v, tau, f_ext)
     -> BatchConstrainedDerivatives<'_, T> {
         constrained_dynamics_derivatives(model, data, constraints, q, v, tau, f_ext)
@@ -139,7 +139,7 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// In the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn constrained_dynamics_equations(model, data, constraints: BatchConstraints; q, v, tau, f_ext)
     -> BatchConstrainedEquations<'_, T> {
         constrained_dynamics_equations(model, data, constraints, q, v, tau, f_ext)
@@ -150,7 +150,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state; restitution: ε, the same for all states.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// In the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn impulse_dynamics(model, data, constraints: BatchConstraints; q, v; restitution: f64) -> BatchImpulse<'_, T> {
         impulse_dynamics(model, data, constraints, q, v, S::splat(restitution))
     }
@@ -160,7 +160,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state; restitution: ε, the same for all states.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// In the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn impulse_dynamics_derivatives(model, data, constraints: BatchConstraints; q, v; restitution: f64)
     -> BatchImpulseDerivatives<'_, T> {
         impulse_dynamics_derivatives(model, data, constraints, q, v, S::splat(restitution))

@@ -31,7 +31,7 @@ pub struct BatchConstraints<T: Real = f64> {
     pub(super) sets: Sets<T>,
 }
 
-/// Sets of constraints, one per thread, with the number of lanes of the batch.
+/// Constraint sets, one per thread. Their scalars have as many lanes as the scalars of the batch.
 #[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
@@ -43,7 +43,7 @@ impl<T: Real> Batch<T> {
     /// Prepares constraints of a model for use with this batch, and allocates all memory.
     ///
     /// # Errors
-    /// As [`ConstraintSet::new`].
+    /// The same errors as for [`ConstraintSet::new`].
     pub fn constraints(
         &self,
         model: &Model,
@@ -85,7 +85,7 @@ impl<T: Real> BatchConstraints<T> {
         each!(Sets, &self.sets, sets => sets[0].range(k))
     }
 
-    /// Sets how redundant constraints share the constraint forces.
+    /// Changes the settings that determine how redundant constraints share the constraint forces.
     pub fn set_proximal(&mut self, proximal: ProximalSettings) {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
     }

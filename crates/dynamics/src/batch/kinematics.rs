@@ -10,14 +10,14 @@ use crate::passes::frames::ReferenceFrame;
 use condyle_spatial::Matrix;
 use condyle_spatial::block::Real;
 
-/// Derivatives of an acceleration, in the matrices that a single call fills.
+/// Derivatives of the acceleration of a frame or body, in matrices that the function for a single state fills.
 struct AccelerationDerivatives<'s, S> {
     da_dq: &'s Matrix<S>,
     da_dv: &'s Matrix<S>,
 }
 
 results! {
-    /// Derivatives of an acceleration, of many states.
+    /// Derivatives of the acceleration of a frame or body, for many states.
     BatchAccelerationDerivatives of AccelerationDerivatives {
         /// ∂a/∂q in the tangent space, 6 × nv.
         da_dq: Matrices<'b, T> = [6, NV];
@@ -41,7 +41,7 @@ batched! {
     /// ```
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// In the same cases as [`rnea`](Self::rnea).
     fn forward_kinematics(model, data => to; q) -> Poses<'_, T> [[BODIES, 4, 4]] {
         let (placements, n) = (forward_kinematics(model, data, q), model.bodies().len());
         for body in 0..n {

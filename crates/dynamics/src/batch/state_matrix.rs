@@ -1,7 +1,7 @@
 //! Matrix of one state of a batch: borrowed numbers with a shape and two strides.
 //!
-//! The type is not a view of nalgebra, because products with such views are unsafe: if the rows are not adjacent,
-//! nalgebra reads and writes out of bounds (nalgebra's issue 1616). Here every access is checked.
+//! The type is not a view of nalgebra, because products with such views are unsafe: if the rows are not adjacent in
+//! memory, nalgebra reads and writes out of bounds (nalgebra's issue 1616). `StateMatrix` checks every access.
 
 use super::state_matrix_operators::dot;
 use condyle_linalg::check;
@@ -28,7 +28,7 @@ use nalgebra::{DMatrix, Dim, Matrix, RawStorage, RawStorageMut, Scalar};
 /// assert!((M * &x - copy * x).amax() < 1e-14);
 /// ```
 pub struct StateMatrix<'b, T> {
-    /// Numbers of the batch; entry (i, j) of the matrix is number i · `strides[0]` + j · `strides[1]`.
+    /// Numbers that contain the entries; entry (i, j) of the matrix is number i · `strides[0]` + j · `strides[1]`.
     numbers: &'b [T],
     shape: [usize; 2],
     strides: [usize; 2],

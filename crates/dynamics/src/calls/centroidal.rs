@@ -68,7 +68,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
 }
 
 /// Computes all terms of the equations of motion in two passes, in O(n · depth): M, h, Ag, dAg, hg, the centre of mass
-/// and the energies. The result also answers queries for poses and Jacobians of all frames.
+/// and the energies. The result also gives the poses and Jacobians of all frames on request.
 ///
 /// q: nq numbers; v: nv numbers. Up to rounding, the results equal the results of the separate calls
 /// [`crba`](crate::crba), [`nonlinear_effects`](crate::nonlinear_effects),

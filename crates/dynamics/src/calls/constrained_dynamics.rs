@@ -19,12 +19,12 @@ pub struct Constrained<'d, S> {
     /// Joint accelerations q̈, nv numbers (rad/s², m/s²).
     pub a: &'d [S],
     /// Forces λ of the constraints, one number per row of J (N, N m). Each force acts on the body of the constraint's
-    /// frame and is along the axes of the constraint's rows.
+    /// frame and is expressed in the axes of the constraint's rows.
     pub lambda: &'d [S],
     /// Largest absolute value in J q̈ + γ (m/s², rad/s²). It is 0 if the constraints are satisfied exactly.
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force (in f64, J M⁻¹ Jᵀ + μ 1
-    /// is singular to 13 digits). 0 means that the solution is unique.
+    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force. In f64, a row is
+    /// dependent if it makes J M⁻¹ Jᵀ + μ 1 singular to 13 digits. If the number is 0, the solution is unique.
     pub redundant: S,
 }
 
@@ -138,8 +138,8 @@ pub struct ConstrainedEquations<'d, S> {
 /// ```
 ///
 /// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves these equations. The linearised
-/// equations are for callers that eliminate other unknowns: no matrix is inverted, and all blocks keep the sparsity of
-/// the tree.
+/// equations are for callers that eliminate the unknowns themselves: no matrix is inverted, and all blocks keep the
+/// sparsity of the tree.
 ///
 /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with the
 /// body), or empty for no forces. Targets of the constraints are fixed. Costs O(n · depth) in addition to the forward
@@ -237,9 +237,9 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// O((n + rows)² n) for the products with K⁻¹, the inverse of the constrained equations' matrix. The products skip the
 /// zeros of the tree. Allocates nothing.
 ///
-/// If constraints are redundant, the derivatives of q̈ are exact up to the residual. The derivatives of λ then satisfy
-/// the same choice as λ: for μ = 0, redundant rows have no force; for μ > 0, the solution is the smallest one. Source:
-/// Carpentier and Mansard (2018).
+/// If constraints are redundant, the derivatives of q̈ are exact up to the residual. The proximal parameter μ then
+/// selects the derivatives of λ, as it selects λ: for μ = 0, redundant rows have no force; for μ > 0, the solution has
+/// the smallest norm. Source: Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};

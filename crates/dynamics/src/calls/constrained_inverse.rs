@@ -1,5 +1,5 @@
-//! Inverse dynamics under constraints: efforts and accelerations of the constraints for given motions and forces, and
-//! the derivatives of both.
+//! Inverse dynamics under constraints: joint efforts and constraint accelerations for a given motion and given
+//! constraint forces, with the derivatives of these results.
 
 use super::inverse_dynamics;
 use crate::constraints::constrained_dynamics::evaluate;
@@ -144,8 +144,8 @@ pub struct EquationsAt<'d, S> {
     pub dgamma_dv: &'d Matrix<S>,
 }
 
-/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. Used at the knots of an optimal control
-/// problem, because the rollout of the problem has already computed q̈ and λ.
+/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. Optimal control calls this function at
+/// the knots of a trajectory, where the rollout has already computed q̈ and λ.
 #[doc(hidden)]
 #[track_caller]
 pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
@@ -186,7 +186,7 @@ fn differentiate<S: Scalar, R: Constant<S>>(
     differentiate_motion(constraints, world, &id.bodies);
 }
 
-/// Computes the efforts τ, for bodies whose placements are known.
+/// Computes the efforts τ. `data` must contain the placements of the bodies.
 fn inverse<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

@@ -19,8 +19,8 @@ use condyle_linalg::tree_product::neg_products;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 
-/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without external forces it is
-/// the derivative of [`gravity`](crate::gravity).
+/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without external forces,
+/// ∂τ/∂q is the derivative of [`gravity`](crate::gravity).
 ///
 /// q: nq numbers; f_ext: one force per body, in the body's frame (the force moves with the body), or empty for no
 /// forces. Returns the full nv × nv matrix (N m/rad, N/m); entry (i, j) is ∂τᵢ/∂q_j. Allocates nothing. Source: the
@@ -138,15 +138,15 @@ pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
 
-/// Returns a view of the derivatives of inverse dynamics that the last call computed, body by body or with limbs in
-/// parallel lanes.
+/// Returns a view of the derivatives of inverse dynamics that the last call computed. That call ran body by body or
+/// with limbs in parallel lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
     let state = state(model, data, &d.qdd);
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
 }
 
-/// Returns the state of the last derivatives of τ, given its q̈.
+/// Returns the state at which the last call computed the derivatives of τ. `qdd` is q̈ in this state.
 fn state<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>, qdd: &'d [S]) -> State<'d, S, R> {
     let in_limbs = matches!(data.world.placed, PlacementCache::Limbs(_));
     let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
@@ -259,7 +259,7 @@ pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &data.aba.qdd, f_ext, &[]);
     match data.methods.inverse {
         InverseMethod::ArticulatedBodies => {
-            minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
+            minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // factors of `aba`
         }
         method => minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da, method),
     }
@@ -272,7 +272,7 @@ pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes ∂q̈ = −M⁻¹ ∂τ with respect to q and v. Runs after `rnea_derivatives` and `minv`.
+/// Computes ∂q̈/∂x = −M⁻¹ ∂τ/∂x for x = q and x = v. Runs after `rnea_derivatives` and `minv`.
 fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let float_freely = out.float_freely(model);

@@ -18,7 +18,7 @@ pub struct Impulse<'d, S> {
     /// Velocity v⁺ after the impact, nv numbers (rad/s, m/s).
     pub v: &'d [S],
     /// Impulses Λ of the constraints, one number per row of J (N s, N m s). Each impulse acts on the body of the
-    /// constraint's frame and is along the axes of the constraint's rows.
+    /// constraint's frame and is expressed in the axes of the constraint's rows.
     pub lambda: &'d [S],
     /// Largest absolute value in J (v⁺ + ε v), with the restitution ε (m/s, rad/s).
     pub residual: S,

@@ -86,7 +86,7 @@ pub struct RneaSecondDerivatives<S> {
     pub dvdv: Vec<DMatrix<S>>,
     /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
     pub dadq: Vec<DMatrix<S>>,
-    /// Scratch for the unit vector of each effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
+    /// Scratch for the unit vector that selects an effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
     lambda: Array<S>,
 }
 
@@ -103,7 +103,7 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
 ///
 /// q: nq numbers; v, a: nv numbers each; f_ext: one force per body, in the body's frame, or empty for no forces; out:
 /// the tensors, overwritten. Allocates nothing. Solvers usually need only the tensors contracted with a vector, which
-/// [`rnea_hessian`] computes. This function contracts with each unit vector.
+/// [`rnea_hessian`] computes. This function calls the contraction once for each unit vector.
 ///
 /// ```
 /// use condyle_dynamics::{Data, RneaSecondDerivatives, rnea_second_derivatives, robots};
@@ -136,8 +136,8 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     });
 }
 
-/// Computes the matrices of [`rnea_hessian`] for each unit vector, and calls `give` with the index of the unit vector
-/// and the matrices. `lambda` is scratch.
+/// Computes the matrices of [`rnea_hessian`] for λ equal to each unit vector. Calls `give` with the index of the unit
+/// vector and the matrices. `lambda` is scratch.
 #[track_caller]
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

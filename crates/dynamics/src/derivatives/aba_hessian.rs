@@ -19,7 +19,7 @@ use condyle_linalg::tree_product::neg_product;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
 
-/// Computes the transpose Bᵀ of an n × n matrix B.
+/// Writes the transpose Bᵀ of an n × n matrix B to `out`.
 #[inline(always)]
 fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
     for j in 0..n {
@@ -53,7 +53,7 @@ kernel! {
     pub(crate) fn multiply<S>(Minv: &Matrix<S>, lambda: &[S], mu: &mut [S]) {
         let n = mu.len();
         for i in 0..n {
-            let row = &Minv.as_slice()[i * n..(i + 1) * n]; // symmetric: a row is a column
+            let row = &Minv.as_slice()[i * n..(i + 1) * n]; // row i of M⁻¹ equals column i
             let mut sum = S::zero();
             for k in 0..n {
                 sum = row[k].mul_add(lambda[k], sum);
@@ -64,7 +64,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the four matrices λᵀ ∂²q̈ of second derivatives. Runs after `aba_derivatives` and the Hessian of φ.
+    /// Computes the four matrices λᵀ ∂²q̈/∂x∂y, for x and y among q, v and τ. Runs after `aba_derivatives` and the
+    /// Hessian of φ.
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,

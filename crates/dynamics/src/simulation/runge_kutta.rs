@@ -1,13 +1,13 @@
 //! Classical Runge–Kutta method on the joints' Lie groups.
 //!
-//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀ the motion is q₀ ⊕ ξ(t). Since ∂(q₀ ⊕ ξ)/∂ξ
-//! is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹, the motion satisfies
+//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀, the motion is expressed as q₀ ⊕ ξ(t).
+//! Since ∂(q₀ ⊕ ξ)/∂ξ is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹, the motion satisfies
 //!
 //! ```text
 //! ξ̇ = J_log(ξ) v,   v̇ = aba(q₀ ⊕ ξ, v, τ),   ξ(0) = 0
 //! ```
 //!
-//! This is an ordinary differential equation in a vector space, so the classical method has order 4.
+//! These equations form an ordinary differential equation in a vector space, so the classical method has order 4.
 
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
