@@ -1,4 +1,4 @@
-//! Memory that algorithms write: scratch and results.
+//! Memory to which the algorithms write: scratch and results.
 #![allow(unsafe_code)]
 
 use crate::constraints::{constrained_derivatives, constrained_dynamics, impulse_dynamics};

@@ -60,7 +60,7 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, or two evaluations of f give different numbers of results.
+/// Panics if x has fewer than nq numbers, or two evaluations of f give different numbers of results.
 #[track_caller]
 pub fn jacobian<R>(
     model: &Model<R>,
@@ -139,7 +139,7 @@ impl LaneJacobian {
     /// SIMD level that is current at this call.
     ///
     /// # Panics
-    /// If n is less than nq.
+    /// Panics if n is less than nq.
     #[track_caller]
     pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
@@ -154,8 +154,8 @@ impl LaneJacobian {
     /// Computes the m numbers of f(x), and the Jacobian ∂f(x ⊕ δ)/∂δ, a matrix of m × (n − nq + nv).
     ///
     /// # Panics
-    /// If the number of entries of x or of results of f differs from the number given to [`new`](Self::new), or if the
-    /// robot is not the robot given to `new`.
+    /// Panics if the number of entries of x or of results of f differs from the number given to [`new`](Self::new), or
+    /// if the robot is not the robot given to `new`.
     #[track_caller]
     pub fn of<R: Constant<f64>>(
         &mut self,
@@ -183,7 +183,7 @@ impl LaneJacobian {
     /// ```
     ///
     /// # Panics
-    /// In the same cases as [`of`](Self::of), or if a direction is not below n − nq + nv.
+    /// Panics in the same cases as [`of`](Self::of), or if a direction is not below n − nq + nv.
     #[track_caller]
     pub fn along<R: Constant<f64>>(
         &mut self,
@@ -325,7 +325,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers.
+/// Panics if x has fewer than nq numbers.
 #[track_caller]
 pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> Dual64) -> (f64, DVector<f64>) {
     let (value, J) = jacobian(model, x, |x| vec![f(x)]);
@@ -349,7 +349,7 @@ pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> 
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers.
+/// Panics if x has fewer than nq numbers.
 #[track_caller]
 pub fn hessian<R>(
     model: &Model<R>,

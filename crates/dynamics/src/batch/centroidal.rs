@@ -1,4 +1,5 @@
-//! Centre of mass, momentum and energies of many states, and all terms of the equations of motion.
+//! Batch functions for the centre of mass, the momentum, the energies and all terms of the equations of motion of many
+//! states.
 
 use super::places::{Places, Put};
 use super::results::{Matrices, Take, Taken, results};
@@ -63,7 +64,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn com(model, data; q) -> &[T] [[3]] { forward_kinematics(model, data, q).com() }
 
     /// Computes [`Velocities::com_velocity`](crate::Velocities::com_velocity) for each state: the velocity ċ of the
@@ -72,7 +73,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn com_velocity(model, data; q, v) -> &[T] [[3]] { forward_velocities(model, data, q, v).com_velocity() }
 
     /// Computes [`Accelerations::com_acceleration`](crate::Accelerations::com_acceleration) for each state: the
@@ -81,18 +82,18 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn com_acceleration(model, data; q, v, a) -> &[T] [[3]] {
         forward_accelerations(model, data, q, v, a).com_acceleration()
     }
 
-    /// Computes the Jacobian of the centre of mass for each state, 3 × nv. It is one result of
+    /// Computes the Jacobian of the centre of mass for each state, 3 × nv. The Jacobian is one of the results of
     /// [`centroidal_map`](Self::centroidal_map).
     ///
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn com_jacobian(model, data; q) -> Matrices<'_, T> [[3, NV]] { centroidal_map(model, data, q).Jcom }
 
     /// Computes [`centroidal_map`](crate::centroidal_map) for each state.
@@ -100,7 +101,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn centroidal_map(model, data; q) -> BatchCentroidalMap<'_, T> { centroidal_map(model, data, q) }
 
     /// Computes [`centroidal_map_rate`](crate::centroidal_map_rate) for each state.
@@ -108,7 +109,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn centroidal_map_rate(model, data; q, v) -> BatchCentroidalMapRate<'_, T> {
         centroidal_map_rate(model, data, q, v)
     }
@@ -119,7 +120,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn centroidal_momentum(model, data; q, v) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).centroidal_momentum()
     }
@@ -130,7 +131,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn centroidal_momentum_rate(model, data; q, v, a) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).centroidal_momentum_rate()
     }
@@ -140,7 +141,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn kinetic_energy(model, data; q, v) -> &[T] [[]] { forward_velocities(model, data, q, v).kinetic_energy() }
 
     /// Computes [`Placements::potential_energy`](crate::Placements::potential_energy) for each state: the potential
@@ -149,7 +150,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn potential_energy(model, data; q) -> &[T] [[]] { forward_kinematics(model, data, q).potential_energy() }
 
     /// Computes [`Velocities::mechanical_energy`](crate::Velocities::mechanical_energy) for each state: the sum T + V
@@ -158,7 +159,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn mechanical_energy(model, data; q, v) -> &[T] [[]] { forward_velocities(model, data, q, v).mechanical_energy() }
 
     /// Computes [`compute_all_terms`](crate::compute_all_terms()) for each state, except the Jacobians of frames.
@@ -166,6 +167,6 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn compute_all_terms(model, data; q, v) -> BatchAllTerms<'_, T> { compute_all_terms(model, data, q, v) }
 }

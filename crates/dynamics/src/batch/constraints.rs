@@ -43,7 +43,7 @@ impl<T: Real> Batch<T> {
     /// Prepares constraints of a model for use with this batch, and allocates all memory.
     ///
     /// # Errors
-    /// The same errors as for [`ConstraintSet::new`].
+    /// Returns the same errors as [`ConstraintSet::new`].
     pub fn constraints(
         &self,
         model: &Model,
@@ -79,7 +79,7 @@ impl<T: Real> BatchConstraints<T> {
     /// Returns the range of rows of J that belong to constraint k.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
         each!(Sets, &self.sets, sets => sets[0].range(k))
@@ -93,10 +93,11 @@ impl<T: Real> BatchConstraints<T> {
     /// Changes the target of constraint k for all states, from the next call on. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Constraint`] if the target is not finite or has an invalid rotation. The old target is then kept.
+    /// Returns [`Error::Constraint`] if the target is not finite or has an invalid rotation. In this case, the old
+    /// target is kept.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<f64>) -> Result<(), Error> {
         check_index("k", k, each!(Sets, &self.sets, sets => sets[0].len()), "constraints");

@@ -105,7 +105,7 @@ impl<T: Real> Batch<T> {
     /// Allocates a batch for up to `states` states at once, on `threads` threads.
     ///
     /// # Panics
-    /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
+    /// Panics if `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
     /// [`MOST_STATES`](Self::MOST_STATES).
     #[track_caller]
     pub fn new(model: &Model, states: usize, threads: usize) -> Self

@@ -141,7 +141,7 @@ impl<'b, T: Real> Matrices<'b, T> {
     /// Returns the matrix of state k. [`to_owned`](StateMatrix::to_owned) copies it to a matrix of nalgebra.
     ///
     /// # Panics
-    /// If state k does not exist.
+    /// Panics if state k does not exist.
     #[track_caller]
     pub fn at(&self, k: usize) -> StateMatrix<'b, T> {
         check_state(k, self.states);
@@ -165,7 +165,7 @@ impl<'b, T: Real> Matrices<'b, T> {
     /// ```
     ///
     /// # Panics
-    /// If the length of `to` is not the number of entries of all states.
+    /// Panics if the length of `to` is not the number of entries of all states.
     #[track_caller]
     pub fn write_rows(&self, to: &mut [T]) {
         let [m, n] = self.shape;
@@ -206,7 +206,7 @@ impl<T: Real> Poses<'_, T> {
     /// Returns pose i of state k.
     ///
     /// # Panics
-    /// If state k or pose i does not exist.
+    /// Panics if state k or pose i does not exist.
     #[track_caller]
     pub fn at(&self, k: usize, i: usize) -> Se3<T> {
         check_state(k, self.states);

@@ -111,7 +111,7 @@ impl Shared for Input {
     }
 }
 
-/// Writes the result of a pass to the next destinations, unless the pass has written it itself.
+/// Writes the result of a pass to the next destinations, unless the pass has already written the result.
 macro_rules! put {
     ($places:ident, $body:block) => {
         $crate::batch::places::Put::<S>::put($body, $places)
@@ -216,8 +216,8 @@ macro_rules! batched {
             #[doc = concat!("Writes the results of [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ").")]
             ///
             /// # Panics
-            /// In the same cases as the method of [`Batch`](crate::Batch), or if `to` does not have one slice per
-            /// result, with the length of the result.
+            /// Panics in the same cases as the method of [`Batch`](crate::Batch), or if `to` does not have one slice
+            /// per result, with the length of the result.
             #[track_caller]
             pub fn $name(
                 &mut self,

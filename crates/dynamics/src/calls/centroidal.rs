@@ -24,7 +24,7 @@ use condyle_spatial::{Constant, Scalar};
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[inline(always)]
 #[track_caller]
 pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
@@ -54,7 +54,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -87,7 +87,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,

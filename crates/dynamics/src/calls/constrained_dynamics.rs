@@ -56,7 +56,7 @@ pub struct Constrained<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
@@ -119,14 +119,14 @@ pub struct ConstrainedEquations<'d, S> {
     pub redundant: S,
     /// Inertia matrix M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of M q̈ + h − Jᵀ λ per δ when q moves to q
-    /// ⊕ δ.
+    /// Derivative r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of M q̈ + h − Jᵀ λ per δ when q
+    /// moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
-    /// r_v = ∂h/∂v, nv × nv.
+    /// Derivative r_v = ∂h/∂v of the nonlinear effects h, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
-    /// c_q = ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
+    /// Derivative c_q = ∂(J q̈ + γ)/∂q of the constraint accelerations in the tangent space, rows × nv.
     pub dgamma_dq: &'d Matrix<S>,
-    /// c_v = ∂γ/∂v, rows × nv.
+    /// Derivative c_v = ∂γ/∂v of the constraint accelerations, rows × nv.
     pub dgamma_dv: &'d Matrix<S>,
 }
 
@@ -157,7 +157,7 @@ pub struct ConstrainedEquations<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
@@ -213,19 +213,20 @@ pub struct ConstrainedDerivatives<'d, S> {
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space, nv × nv: the change of q̈ per δ when q moves
+    /// to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
-    /// ∂q̈/∂v, nv × nv.
+    /// Derivative ∂q̈/∂v of the joint accelerations, nv × nv.
     pub da_dv: &'d Matrix<S>,
-    /// ∂q̈/∂τ, nv × nv, symmetric.
+    /// Derivative ∂q̈/∂τ of the joint accelerations, nv × nv, symmetric.
     pub da_dtau: &'d Matrix<S>,
-    /// ∂λ/∂q in the tangent space, rows × nv.
+    /// Derivative ∂λ/∂q of the constraint forces in the tangent space, rows × nv.
     pub dlambda_dq: &'d Matrix<S>,
-    /// ∂λ/∂v, rows × nv.
+    /// Derivative ∂λ/∂v of the constraint forces, rows × nv.
     pub dlambda_dv: &'d Matrix<S>,
-    /// ∂λ/∂τ, rows × nv.
+    /// Derivative ∂λ/∂τ of the constraint forces, rows × nv.
     pub dlambda_dtau: &'d Matrix<S>,
-    /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: inertia of the robot along its constraints.
+    /// Inertia Λ = (J M⁻¹ Jᵀ)⁻¹ of the robot along its constraints, rows × rows.
     pub inertia: &'d Matrix<S>,
 }
 
@@ -256,7 +257,7 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(

@@ -35,7 +35,7 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -66,7 +66,7 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -83,11 +83,11 @@ pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
 /// the derivatives with respect to other inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaDerivatives<'d, S, R = f64> {
-    /// ∂τ/∂q in the tangent space: the change of τ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂τ/∂q of the joint efforts in the tangent space: the change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
-    /// ∂τ/∂v.
+    /// Derivative ∂τ/∂v of the joint efforts.
     pub dtau_dv: &'d Matrix<S>,
-    /// ∂τ/∂a = M(q), including armature.
+    /// Derivative ∂τ/∂a = M(q) of the joint efforts, including armature.
     pub dtau_da: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
@@ -108,7 +108,7 @@ pub struct RneaDerivatives<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -157,9 +157,9 @@ fn state<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>, qdd: &'d [S]) -> Stat
 /// Derivatives of the Coriolis product C(q, v) v, each a full nv × nv matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct CoriolisDerivatives<'d, S> {
-    /// ∂(C v)/∂q.
+    /// Derivative ∂(C v)/∂q of the Coriolis efforts.
     pub dq: &'d Matrix<S>,
-    /// ∂(C v)/∂v.
+    /// Derivative ∂(C v)/∂v of the Coriolis efforts.
     pub dv: &'d Matrix<S>,
 }
 
@@ -177,7 +177,7 @@ pub struct CoriolisDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -200,11 +200,11 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
 pub struct AbaDerivatives<'d, S, R = f64> {
     /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// ∂q̈/∂q in the tangent space: the change of q̈ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space: the change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
-    /// ∂q̈/∂v.
+    /// Derivative ∂q̈/∂v of the joint accelerations.
     pub da_dv: &'d Matrix<S>,
-    /// ∂q̈/∂τ = M(q)⁻¹.
+    /// Derivative ∂q̈/∂τ = M(q)⁻¹ of the joint accelerations.
     pub da_dtau: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
@@ -225,7 +225,7 @@ pub struct AbaDerivatives<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
@@ -301,7 +301,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -15,7 +15,7 @@ pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
-    /// Acceleration coordinates.
+    /// Joint accelerations q̈ in this state.
     pub qdd: &'d [S],
     /// Lanes that contain the quantities of the bodies. `None` if the bodies were computed one by one.
     pub limbs: Option<LaneView<'d>>,

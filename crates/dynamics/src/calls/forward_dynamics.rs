@@ -35,8 +35,8 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// this limitation.
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular at every position
-/// ([`Model::singular_joints`]).
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular at every
+/// position ([`Model::singular_joints`]).
 #[track_caller]
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -107,7 +107,7 @@ impl ForwardDynamicsMethod {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(

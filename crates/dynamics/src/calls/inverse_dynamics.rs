@@ -33,7 +33,7 @@ fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, argument
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -68,7 +68,7 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str
 /// q: nq numbers; v: nv numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -100,7 +100,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
@@ -130,7 +130,7 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -163,7 +163,7 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -26,8 +26,8 @@ impl<S: Scalar> Data<S> {
     /// ```
     ///
     /// # Panics
-    /// If this data was made for a model of another tree, or the last call used a model with other placements of joints
-    /// or frames.
+    /// Panics if this data was made for a model of another tree, or the last call used a model with other placements of
+    /// joints or frames.
     #[track_caller]
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);
@@ -69,7 +69,7 @@ fn wrong_geometry(name: &str) -> ! {
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -101,7 +101,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, the frame does not exist, or `J` is not 6 × nv.
+/// Panics if `q` does not have nq numbers, the frame does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -143,7 +143,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, the body does not exist, or `J` is not 6 × nv.
+/// Panics if `q` does not have nq numbers, the body does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -202,7 +202,7 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -234,7 +234,7 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,

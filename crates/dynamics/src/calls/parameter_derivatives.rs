@@ -240,8 +240,8 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `dtau` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the world, or
-    /// the input's smoothing is not positive.
+    /// Panics if `dtau` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the
+    /// world, or the input's smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, dtau: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "dtau", dtau.shape());
@@ -272,8 +272,8 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `da` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the world, or
-    /// the input's smoothing is not positive.
+    /// Panics if `da` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the
+    /// world, or the input's smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, da: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "da", da.shape());

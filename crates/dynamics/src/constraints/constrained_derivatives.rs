@@ -27,9 +27,9 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Sum of all external forces and constraint forces on each body, in the body's frame. Written by: `load`.
         pub forces: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// M⁻¹, then the block P of K⁻¹. Written by: `invert`.
+        /// Matrix M⁻¹, which the block P of K⁻¹ overwrites. Written by: `invert`.
         pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂(M q̈ + h − Jᵀ λ)/∂q. Written by: `turn`.
+        /// Derivative ∂(M q̈ + h − Jᵀ λ)/∂q of the equations of motion. Written by: `turn`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Derivatives of q̈, or of the velocity after an impact. Written by: `constrained_dynamics_derivatives`,
         /// `impulse_dynamics_derivatives`.

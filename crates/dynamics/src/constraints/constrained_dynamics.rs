@@ -40,7 +40,7 @@ workspace! {
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Sparse factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub factor: Ltdl<S> = Ltdl::new(model),
-        /// Bias efforts h, then τ − h. Written by: `bias`, `constrained_dynamics`.
+        /// Bias efforts h, which the difference τ − h overwrites. Written by: `bias`, `constrained_dynamics`.
         pub effort: Array<S> = filled(S::zero, size.nv),
         /// Joint accelerations, or changes of the joint velocities in an impact. Written by: `constrained_dynamics`,
         /// `impulse_dynamics`.
@@ -79,7 +79,7 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Adds J x to y, where x has one number per coordinate and y one per row.
+    /// Adds J x to y, where x has one number per coordinate, and y has one number per row of J.
     #[inline(always)]
     pub(crate) fn add_motion(&self, x: &[S], y: &mut [S]) {
         for plan in &self.plans {
@@ -118,7 +118,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// the body of the frame. The opposite force acts on the other body or the world.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force(&self, k: usize) -> Force<S> {
@@ -166,7 +166,7 @@ kernel! {
 }
 
 kernel! {
-    /// Factorises M.
+    /// Factorises the inertia matrix M.
     pub(crate) fn factorize<S>(d: &mut Workspace<S>) {
         d.factor.factorize(&d.M);
     }

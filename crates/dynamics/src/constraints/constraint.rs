@@ -6,20 +6,22 @@ use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, same_layout};
 use core::any::Any;
 
-/// Kind of constraint: which motions of a frame it prevents.
+/// Kind of a constraint. The kind determines which motions of a frame the constraint prevents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum ConstraintKind {
-    /// The origin of a frame is held: three rows; λ is a force.
+    /// Point constraint: the origin of a frame is held. The constraint has three rows, and λ is a force.
     Point,
-    /// The origin of a frame is held along one axis, the third column of [`axes`](ContactConstraint::axes): one row.
+    /// Line constraint: the origin of a frame is held along one axis, the third column of
+    /// [`axes`](ContactConstraint::axes). The constraint has one row.
     Line,
-    /// The origin of a frame is held along two axes, the first and the third column of
-    /// [`axes`](ContactConstraint::axes): two rows.
+    /// Plane constraint: the origin of a frame is held along two axes, the first and the third column of
+    /// [`axes`](ContactConstraint::axes). The constraint has two rows.
     Plane,
-    /// The whole frame is held: six rows, linear first; λ is a force and a moment.
+    /// Rigid constraint: the whole frame is held. The constraint has six rows, linear first, and λ is a force and a
+    /// moment.
     Rigid,
 }
 
@@ -92,16 +94,17 @@ impl<S: Scalar> Target<S> {
 /// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), the axes of frame 1 applied to p₁ − p₂ (point)
 /// ```
 ///
-/// This is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0. All quantities
-/// are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the world
-/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The force λ of the constraint is expressed in the same
-/// axes. λ acts on the body of `frame`, and −λ acts on the other body or the world.
+/// The equation above is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0.
+/// All quantities are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the
+/// world ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The force λ of the constraint is expressed in the
+/// same axes. λ acts on the body of `frame`, and −λ acts on the other body or the world.
 ///
 /// The acceleration of a point is its classical acceleration, and the acceleration of a rigid frame is its spatial
 /// acceleration. For a rigid loop in `Local`, a is the rate of the six numbers of v. For a rigid loop in
 /// `LocalWorldAligned`, a is the difference of the two spatial accelerations; both definitions agree if v = 0. Signs,
 /// gains and axes agree with Pinocchio's `RigidConstraintModel`, whose second placement is the other frame's placement
-/// times the target. For contacts they also agree with Crocoddyl's `ContactModel3D` and `ContactModel6D`.
+/// times the target. For contacts, signs, gains and axes also agree with Crocoddyl's `ContactModel3D` and
+/// `ContactModel6D`.
 ///
 /// A line or plane contact holds a point only along some columns of `axes`: along e₃ (line), or along e₁ and e₃
 /// (plane). The columns e₁, e₂, e₃ are expressed in the axes of `reference`. The other directions are free. Crocoddyl's

@@ -52,9 +52,10 @@ pub(crate) struct All {
     /// this sum that the joints of these bodies transmit to the root (`rest`). Shape: 6 × stride. Written by: `carry`.
     pub whole: Vec<f64>,
     pub rest: Vec<f64>,
-    /// J q̈ + γ for λ = 0, then λ. Shape: stride. Written by: `carry`, `carry_on`, `constrained.rs`.
+    /// Value of J q̈ + γ for λ = 0, which λ overwrites. Shape: stride. Written by: `carry`, `carry_on`,
+    /// `constrained.rs`.
     pub x: Vec<f64>,
-    /// J, Y and Y D⁻¹ in the columns of the root's joint. Shape: nv × stride. Written by: `carry_on`.
+    /// Matrices J, Y and Y D⁻¹ in the columns of the root's joint. Shape: nv × stride. Written by: `carry_on`.
     pub J: Vec<f64>,
     pub Y: Vec<f64>,
     pub YD: Vec<f64>,
@@ -64,7 +65,8 @@ pub(crate) struct All {
 #[derive(Clone, Debug)]
 pub(crate) struct ConstraintLanes {
     pub(crate) rows: Vec<Rows>,
-    /// Y and Y D⁻¹. Shape: for each constraint, its number of slots × `wide`. Written by: `carry`.
+    /// Matrices Y and Y D⁻¹ in the slots of all constraints. Shape: for each constraint, its number of slots × `wide`.
+    /// Written by: `carry`.
     pub(crate) Y: Vec<f64>,
     pub(crate) YD: Vec<f64>,
     pub(crate) all: All,

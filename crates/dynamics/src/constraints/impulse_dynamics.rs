@@ -8,10 +8,10 @@
 //! M (v⁺ − v) = Jᵀ Λ,   J v⁺ = −ε J v          (A Newtonian restitution: Featherstone 2008, section 11.7)
 //! ```
 //!
-//! These are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ = (1 + ε) J v. The
-//! derivatives follow from the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ Λ)/∂q, w = v⁺ + ε v and
-//! c = ∂(J w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without gravity, with acceleration
-//! Δ:
+//! The equations of an impact are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ
+//! = (1 + ε) J v. The derivatives follow from the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ
+//! Λ)/∂q, w = v⁺ + ε v and c = ∂(J w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without
+//! gravity, with acceleration Δ:
 //!
 //! ```text
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J

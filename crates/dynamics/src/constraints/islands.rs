@@ -23,7 +23,7 @@ pub(crate) struct Island {
     pub rows: Range<usize>,
 }
 
-/// Returns the smallest range that contains the ranges a and b, which may be empty.
+/// Returns the smallest range that contains both a and b. The ranges a and b may be empty.
 fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     match (a.is_empty(), b.is_empty()) {
         (true, _) => b.clone(),

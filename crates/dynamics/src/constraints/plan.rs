@@ -90,7 +90,7 @@ impl Plan {
     /// Makes a plan for each constraint, in order.
     ///
     /// # Errors
-    /// [`Error::Constraint`] for the first constraint that is invalid for the model.
+    /// Returns [`Error::Constraint`] for the first constraint that is invalid for the model.
     pub(crate) fn of_constraints<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Vec<Self>, Error> {
         let tree = EliminationTree::new(model, 1);
         let mut place = vec![0; model.nv()];

@@ -30,9 +30,9 @@ use core::any::Any;
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// ∂q̈/∂q. Written by: `aba_derivatives`.
+        /// Derivative ∂q̈/∂q of the joint accelerations. Written by: `aba_derivatives`.
         pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂q̈/∂v. Written by: `aba_derivatives`.
+        /// Derivative ∂q̈/∂v of the joint accelerations. Written by: `aba_derivatives`.
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub solve: tree_solve::Workspace<S> = tree_solve::Workspace::new(model.columns(), size.nv),
     } same {

@@ -31,19 +31,19 @@ fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// μ = M⁻¹ λ. Written by: `aba_hessian`.
+        /// Vector μ = M⁻¹ λ. Written by: `aba_hessian`.
         pub mu: Array<S> = filled(S::zero, size.nv),
         /// Scratch for the transpose of ∂q̈/∂q, then of ∂q̈/∂v. Written by: `run`.
         pub transpose: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Scratch for the product −(∂q̈/∂q)ᵀ G. Written by: `run`.
         pub product: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// λᵀ ∂²q̈/∂q∂q. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂q∂q of contracted second derivatives. Written by: `run`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// λᵀ ∂²q̈/∂v∂q. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂v∂q of contracted second derivatives. Written by: `run`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// λᵀ ∂²q̈/∂v∂v. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂v∂v of contracted second derivatives. Written by: `run`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// λᵀ ∂²q̈/∂τ∂q. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂τ∂q of contracted second derivatives. Written by: `run`.
         pub dtaudq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }

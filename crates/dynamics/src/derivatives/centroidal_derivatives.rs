@@ -9,8 +9,8 @@
 //! ∂h/∂q_e = S ×* hᶜ + Iᶜ Ψ̇     ∂F/∂q_e = S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇     ∂F/∂q̇_e = Iᶜ Y + 2Bᶜ S     ∂F/∂q̈_e = Iᶜ S
 //! ```
 //!
-//! Shifted to the centre of mass c, a force [f; n] becomes [f; n − c × f], and the derivative of its moment gains −∂c ×
-//! f. The linear rows, divided by the mass, are the derivatives of ċ and c̈.
+//! Shifted to the centre of mass c, a force [f; n] becomes [f; n − c × f], and the derivative of the moment has the
+//! additional term −∂c × f. The linear rows, divided by the mass, are the derivatives of ċ and c̈.
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the
 //! root of the tree.
@@ -45,7 +45,8 @@ impl<S: Scalar> Column<S> {
 }
 
 workspace! {
-    /// Quantities in the world's frame, about the world's origin unless a field says "about the centre of mass".
+    /// Scratch of the centroidal derivatives, in the world's frame. Moments are about the world's origin unless a field
+    /// says "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
         /// Composite inertia Iᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
         /// Written by: `pass`.
@@ -166,7 +167,7 @@ pub struct CentroidalDerivatives<'d, S> {
     pub drate_dv: &'d Matrix<S>,
     /// Derivative ∂dhg/∂a = Ag of the rate of the centroidal momentum, 6 × nv.
     pub drate_da: &'d Matrix<S>,
-    /// ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, the Jacobian of the centre of mass, 3 × nv.
+    /// Jacobian ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a of the centre of mass, 3 × nv.
     pub dcom_dq: &'d Matrix<S>,
     /// Derivative ∂ċ/∂q of the velocity of the centre of mass, 3 × nv.
     pub dvcom_dq: &'d Matrix<S>,

@@ -48,7 +48,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// a frame's velocity.
     ///
     /// # Panics
-    /// If the body does not exist, or `dv_dq` is not 6 × nv.
+    /// Panics if the body does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_velocity_derivative(
@@ -74,7 +74,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or `dv_dq` is not 6 × nv.
+    /// Panics if the frame does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_velocity_derivative(
@@ -138,7 +138,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives) for a frame's acceleration.
     ///
     /// # Panics
-    /// If the body does not exist, or a matrix is not 6 × nv.
+    /// Panics if the body does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_acceleration_derivatives(
@@ -156,7 +156,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// accelerations is the frame's Jacobian.
     ///
     /// # Panics
-    /// If the frame does not exist, or a matrix is not 6 × nv.
+    /// Panics if the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_acceleration_derivatives(
@@ -190,7 +190,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or a matrix is not 6 × nv.
+    /// Panics if the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_classical_acceleration_derivatives(

@@ -30,8 +30,8 @@
 //!
 //! Sources: Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and implementation*
 //! (2024), for the tensors; Nganga and Wensing, *Accelerating second-order differential dynamic programming for
-//! rigid-body systems* (2021), for the contracted form. The sums above are the sums of the first paper, but are
-//! contracted with λ before they are expanded.
+//! rigid-body systems* (2021), for the contracted form. The sums above correspond to the sums of the first paper, but
+//! they are contracted with λ before the expansion.
 
 use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
@@ -48,20 +48,20 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Velocity w of each body when the joints move with velocity λ. Written by: `pass`.
         pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// W = w_λ × S of each column S, with the velocity w_λ of the parent. Written by: `pass`.
+        /// Motion W = w_λ × S of each column S, with the velocity w_λ of the parent. Written by: `pass`.
         pub W: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Momentum P = Σ I w and rate of inertia D, over all bodies that a joint carries. Written by: `pass`.
         pub PD: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
         /// Angular part of the sum Q = Σ 2Bᵀ w over all bodies that a joint carries; the linear part is zero. Written
         /// by: `pass`.
         pub Q: Array<Vec3<S>> = filled(Vec3::zero, size.bodies),
-        /// ∂²φ/∂q∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂q∂q. Written by: `pass`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂²φ/∂v∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂v∂q. Written by: `pass`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂²φ/∂v∂v. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂v∂v. Written by: `pass`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂²φ/∂a∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂a∂q. Written by: `pass`.
         pub dadq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }

@@ -54,11 +54,14 @@ pub(crate) struct ArticulatedPair<S> {
     Y: Matrix<S>,
     /// Acceleration b of the lower handle when the upper handle has no acceleration.
     b: Motion<S>,
-    /// Acceleration of the body at which the two parts of a joined piece meet, per acceleration of the upper handle.
+    /// Matrix N that maps the acceleration of the upper handle to the acceleration of the body at which the two parts
+    /// of a joined piece meet.
     N: Matrix<S>,
-    /// Acceleration of the body at which the two parts of a joined piece meet, per force on this body.
+    /// Matrix G that maps the force on the body at which the two parts of a joined piece meet to the acceleration of
+    /// this body.
     G: Matrix<S>,
-    /// Acceleration of the body at which the two parts of a joined piece meet, when the upper handle is at rest.
+    /// Acceleration e of the body at which the two parts of a joined piece meet, when the upper handle has no
+    /// acceleration.
     e: Motion<S>,
 }
 
@@ -227,7 +230,7 @@ fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
     }
 }
 
-/// Returns A x.
+/// Returns the product A x.
 #[inline(always)]
 fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     let mut y = [S::zero(); 6];
@@ -237,7 +240,7 @@ fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     y
 }
 
-/// Returns Aᵀ x.
+/// Returns the product Aᵀ x.
 #[inline(always)]
 fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     let mut y = [S::zero(); 6];
@@ -249,7 +252,7 @@ fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     y
 }
 
-/// Returns A B.
+/// Returns the product A B.
 #[inline(always)]
 fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     let mut C = zero();
@@ -259,7 +262,7 @@ fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     C
 }
 
-/// Returns Aᵀ B.
+/// Returns the product Aᵀ B.
 #[inline(always)]
 fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     let mut T = zero();

@@ -117,8 +117,8 @@ impl<S: Scalar> DivideConquer<S> {
     /// (mimic), the passes take 1 + z times the work and steps, and the ties take O(n z + z³).
     ///
     /// # Panics
-    /// If an argument has the wrong length, M is singular ([`Model::singular_joints`]), or `model` has joints or frames
-    /// at other placements than the model of the plan.
+    /// Panics if an argument has the wrong length, M is singular ([`Model::singular_joints`]), or `model` has joints or
+    /// frames at other placements than the model of the plan.
     #[track_caller]
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);

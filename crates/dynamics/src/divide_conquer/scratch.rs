@@ -35,7 +35,7 @@ pub(crate) struct Dof<S> {
     pub rotor: S,
     /// Joint column S. Written by: `place`.
     pub S: Motion<S>,
-    /// U = Iᴬ S, with the articulated inertia Iᴬ. Written by: `eliminate`.
+    /// Force U = Iᴬ S, with the articulated inertia Iᴬ. Written by: `eliminate`.
     pub U: Force<S>,
     /// Reciprocal of D = Sᵀ U + armature. Written by: `eliminate`.
     pub D_inv: S,

@@ -1,11 +1,12 @@
 //! Forward dynamics by the articulated-body algorithm.
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. All quantities are in the world's frame,
-//! so a child's inertia and force are added to its parent's without a change of coordinates. A joint with several
-//! degrees of freedom is treated as a chain of joints with one degree of freedom, between massless bodies. The columns
-//! of such a joint are eliminated one by one, beginning with the last column, so no matrix is inverted. The dot
-//! products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. To shorten the chain
-//! of dependent operations, the linear and the angular half of each product are computed independently.
+//! so the inertia and force of a body are added to the inertia and force of its parent without a change of coordinates.
+//! A joint with several degrees of freedom is treated as a chain of joints with one degree of freedom, between massless
+//! bodies. The columns of such a joint are eliminated one by one, beginning with the last column, so no matrix is
+//! inverted. The dot products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. To
+//! shorten the chain of dependent operations, the linear and the angular half of each product are computed
+//! independently.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};
@@ -19,7 +20,7 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Articulated inertia of each body. Written by: `factorize`, `inward`.
         pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.body_depth),
-        /// U = Iᴬ S of each column S, with the articulated inertia Iᴬ. Written by: `factorize`, `inward`.
+        /// Force U = Iᴬ S of each column S, with the articulated inertia Iᴬ. Written by: `factorize`, `inward`.
         pub U: Array<Force<S>> = filled(Force::zero, size.columns),
         /// Reciprocal 1/D of each column, where D = Sᵀ U + armature. Written by: `factorize`, `inward`.
         pub D_inv: Array<S> = filled(S::zero, size.columns),

@@ -155,7 +155,7 @@ answers! {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_drift(of: AllTerms, frame: usize) -> Motion = Motion::zero(); {
         let reference = ReferenceFrame::LocalWorldAligned;
         let origin = reference.pose(of.kinematics.frame(frame));

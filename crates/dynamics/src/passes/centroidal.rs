@@ -20,7 +20,8 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame, about the world's origin unless a field says "about the centre of mass".
+    /// Scratch of the centroidal map, in the world's frame. Moments are about the world's origin unless a field says
+    /// "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
         /// Composite inertia Iᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
         /// Written by: `map`, `map_rate`, all terms.
@@ -38,7 +39,7 @@ workspace! {
         pub dAg: Matrix<S> = zero_matrix(6, size.nv),
         /// Jacobian of the centre of mass. Written by: `shift_map`.
         pub Jcom: Matrix<S> = zero_matrix(3, size.nv),
-        /// Quantities of the whole robot. Written by: `shift_map`, `shift_rate`.
+        /// Quantities of the whole robot as one body. Written by: `shift_map`, `shift_rate`.
         pub whole: Whole<S> = Whole::new(size),
     }
 }
@@ -184,7 +185,7 @@ pub struct CentroidalMap<'d, S> {
 pub struct CentroidalMapRate<'d, S> {
     /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d Matrix<S>,
-    /// Time derivative dAg/dt for the velocity v, 6 × nv.
+    /// Time derivative dAg/dt of the centroidal momentum matrix for the velocity v, 6 × nv.
     pub dAg: &'d Matrix<S>,
     /// Momentum about the centre of mass (kg m/s, kg m²/s).
     pub hg: Force<S>,

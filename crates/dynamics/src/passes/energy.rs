@@ -69,11 +69,11 @@ workspace! {
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// Momentum of all bodies that a joint carries. Written by: `derivatives`.
         pub h: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// ∂T/∂q. Written by: `derivatives`.
+        /// Derivative ∂T/∂q of the kinetic energy. Written by: `derivatives`.
         pub dT_dq: Array<S> = filled(S::zero, size.nv),
-        /// ∂T/∂v. Written by: `derivatives`.
+        /// Derivative ∂T/∂v of the kinetic energy. Written by: `derivatives`.
         pub dT_dv: Array<S> = filled(S::zero, size.nv),
-        /// ∂V/∂q. Written by: `derivatives`.
+        /// Derivative ∂V/∂q of the potential energy. Written by: `derivatives`.
         pub dV_dq: Array<S> = filled(S::zero, size.nv),
     }
 }

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), sections 2.10 (differentiation) and 2.11
-//! (acceleration). A Jacobian costs O(depth + nv), any other query about one body or frame costs O(1). Queries do not
+//! (acceleration). A Jacobian costs O(depth + nv); any other query about one body or frame costs O(1). Queries do not
 //! allocate.
 
 use crate::passes::answers::answers;
@@ -173,7 +173,7 @@ answers! {
     /// Returns oXb, the pose of a body in the world. The body's frame is the link's frame in the URDF.
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body(of: Placements, body: usize) -> Se3 = Se3::identity(); {
         let zXb = Se3::new(of.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
         of.world.oX[body] * zXb.lift()
@@ -182,7 +182,7 @@ answers! {
     /// Returns oXf, the pose of a frame in the world.
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame(of: Placements, frame: usize) -> Se3 = Se3::identity(); {
         let frame = &of.model.frames()[frame];
         of.body(frame.body) * frame.placement.lift()
@@ -192,7 +192,7 @@ answers! {
     /// reference frame (m/s), and the body's angular velocity (rad/s).
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body_velocity(of: Velocities, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.body(body)).act_inv(of.moving.v[body])
     }
@@ -201,7 +201,7 @@ answers! {
     /// the reference frame (m/s), and the angular velocity (rad/s).
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_velocity(of: Velocities, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.frame(frame)).act_inv(of.moving.v[of.model.frames()[frame].body])
     }
@@ -210,7 +210,7 @@ answers! {
     /// body's spatial velocity in the world's frame, expressed in the reference frame.
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body_acceleration(of: Accelerations, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.body(body)).act_inv(of.moving.a[body])
     }
@@ -219,7 +219,7 @@ answers! {
     /// frame's spatial velocity in the world's frame, expressed in the reference frame.
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_acceleration(of: Accelerations, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.frame(frame)).act_inv(of.moving.a[of.model.frames()[frame].body])
     }
@@ -228,7 +228,7 @@ answers! {
     /// (m/s²), and the body's angular acceleration (rad/s²).
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body_classical_acceleration(
         of: Accelerations, body: usize, reference: ReferenceFrame
     ) -> Motion = Motion::zero(); {
@@ -240,7 +240,7 @@ answers! {
     /// the frame's origin. Source: Featherstone (2008), section 2.11.
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_classical_acceleration(
         of: Accelerations, frame: usize, reference: ReferenceFrame
     ) -> Motion = Motion::zero(); {
@@ -287,7 +287,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a body, 6 × nv, linear rows first: the body's velocity is J v. Overwrites J.
     ///
     /// # Panics
-    /// If the body does not exist, or `J` is not 6 × nv.
+    /// Panics if the body does not exist, or `J` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -297,7 +297,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
     ///
     /// # Panics
-    /// If the frame does not exist, or `J` is not 6 × nv.
+    /// Panics if the frame does not exist, or `J` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -317,7 +317,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// for a frame. Overwrites dJ.
     ///
     /// # Panics
-    /// If the body does not exist, or `dJ` is not 6 × nv.
+    /// Panics if the body does not exist, or `dJ` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -345,7 +345,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or `dJ` is not 6 × nv.
+    /// Panics if the frame does not exist, or `dJ` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {

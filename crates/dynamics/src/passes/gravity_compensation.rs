@@ -1,4 +1,4 @@
-//! Gravity compensation: efforts that carry a fraction of the weight of the bodies with gravity compensation.
+//! Gravity compensation: efforts that carry a given fraction of the weight of selected bodies.
 //!
 //! For each compensated body, a force −m g acts at a point c, where m is the carried mass. The joint efforts of these
 //! forces are the gradient of the potential energy of the carried masses. a₀ = −g, and body i is a body on the path to

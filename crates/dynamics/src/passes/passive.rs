@@ -69,7 +69,7 @@ use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Sc
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `smoothing` is not positive.
+/// Panics if an argument has the wrong length, or `smoothing` is not positive.
 #[track_caller]
 pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, tau: &mut [S]) {
     check("q", q.len(), model.nq());
@@ -97,7 +97,7 @@ pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong shape, or `smoothing` is not positive.
+/// Panics if an argument has the wrong shape, or `smoothing` is not positive.
 #[track_caller]
 pub fn passive_torque_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

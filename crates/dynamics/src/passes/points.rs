@@ -38,7 +38,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// [`frame_point_jacobian`](Self::frame_point_jacobian).
     ///
     /// # Panics
-    /// If the body does not exist, or `J` is not 3 × nv.
+    /// Panics if the body does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_jacobian(&self, body: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -68,7 +68,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or `J` is not 3 × nv.
+    /// Panics if the frame does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_jacobian(&self, frame: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -96,7 +96,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force_on_body(&self, body: usize, point: Vec3<S>, force: Vec3<S>) -> Force<S> {
@@ -109,7 +109,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// the frame of the body (m).
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_velocity(&self, body: usize, point: Vec3<S>) -> Vec3<S> {
@@ -121,7 +121,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// the frame (m).
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_velocity(&self, frame: usize, point: Vec3<S>) -> Vec3<S> {

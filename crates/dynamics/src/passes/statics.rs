@@ -26,7 +26,7 @@ workspace! {
         pub tau: Array<S> = filled(S::zero, size.nv),
         /// Inertia of all bodies that a joint carries. Written by: `derivative`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// ∂τ/∂q. Written by: `derivative`.
+        /// Derivative ∂τ/∂q of the joint efforts. Written by: `derivative`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }

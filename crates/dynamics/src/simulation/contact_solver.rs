@@ -65,7 +65,7 @@ pub(super) enum Outcome {
 /// Memory of the solver for up to a given number of points. Matrices are stored by columns.
 #[derive(Clone, Debug)]
 pub(super) struct ContactSolver {
-    /// Delassus matrix G. Shape: 3m × 3m. Written by: the caller.
+    /// Delassus matrix G of m points. Shape: 3m × 3m. Written by: the caller.
     pub G: Vec<f64>,
     /// Velocities b of the points for λ = 0, plus the terms of the gaps (m/s). Shape: 3m. Written by: the caller.
     pub b: Vec<f64>,

@@ -39,7 +39,7 @@ pub(super) struct Contacts {
     axes: [Vec3<f64>; 3],
     /// Impulses of all points in the last step, along `axes` (N s). Shape: 3P. Written by: `advance`.
     pub impulses: Vec<f64>,
-    /// Contacts of the last step. Shape: P. Written by: `advance`.
+    /// Contact of each point in the last step. Shape: P. Written by: `advance`.
     pub results: Vec<GroundContact>,
     /// Velocity w that corrects penetration. It is added to the velocity only for the displacement of the step. Shape:
     /// nv. Written by: `advance`.
@@ -61,7 +61,7 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// Allocates memory for a ground.
+    /// Allocates memory for the contacts with a ground.
     pub(super) fn new(model: &Model, ground: Ground) -> Result<Self, Error> {
         let ground = ground.checked(model)?;
         let (points, nv) = (ground.points.len(), model.nv());

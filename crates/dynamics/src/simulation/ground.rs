@@ -41,7 +41,7 @@ pub struct GroundPoint {
 /// ⊕ h (v⁺ + w). The correction reduces the depth by a fifth per step, at no more than 0.5 m/s. The velocity v⁺ does
 /// not include w, so the correction adds no kinetic energy.
 ///
-/// Limits:
+/// Limits of the model:
 ///
 /// - Errors are O(h), because contact and sliding begin and end only at the ends of steps.
 /// - Contacts do not store energy, and λ never increases the kinetic energy. The exception is restitution (e > 0) at

@@ -41,13 +41,14 @@ workspace! {
         Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Momentum p = M v. Written by: `pass`.
         pub(super) p: Array<S> = filled(S::zero, size.nv),
-        /// ∂L/∂q. Written by: `pass`.
+        /// Slope ∂L/∂q of the Lagrangian. Written by: `pass`.
         pub(super) L_q: Array<S> = filled(S::zero, size.nv),
         /// Inertia matrix M = ∂p/∂v. Written by: `pass`.
         pub(super) M: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Derivative ∂p/∂q, the transpose of ∂²L/∂q∂v. Written by: `pass`.
         pub(super) p_q: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// ∂²L/∂q∂q; row i is the derivative of entry i of ∂L/∂q. Written by: `pass`.
+        /// Second derivatives ∂²L/∂q∂q of the Lagrangian; row i is the derivative of entry i of ∂L/∂q. Written by:
+        /// `pass`.
         pub(super) L_qq: Array<S> = filled(S::zero, size.nv * size.nv),
     }
 }

@@ -157,9 +157,9 @@ impl Simulation<f64> {
     /// The state is kept, even if points are below the ground. Allocates memory for the contacts with the ground.
     ///
     /// # Errors
-    /// [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does
-    /// not exist or is fixed to the world, or the normal does not define a direction. The same error is returned if the
-    /// restitution is not in 0..=1, the friction or the tolerance is negative, or a number is not finite.
+    /// Returns [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame
+    /// does not exist or is fixed to the world, or the normal does not define a direction. The same error is returned
+    /// if the restitution is not in 0..=1, the friction or the tolerance is negative, or a number is not finite.
     pub fn set_ground(&mut self, ground: Ground) -> Result<(), Error> {
         if self.settings.integrator != Integrator::SemiImplicitEuler {
             let what =
@@ -235,11 +235,12 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// q: nq numbers; v: nv numbers. The numbers are checked only if the scalar is `f64`.
     ///
     /// # Errors
-    /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not have
-    /// length 1 up to 1e-3; [`Error::Velocity`] if a number of v is not finite. The old state is then kept.
+    /// Returns [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not
+    /// have length 1 up to 1e-3; [`Error::Velocity`] if a number of v is not finite. In this case, the old state is
+    /// kept.
     ///
     /// # Panics
-    /// If an argument has the wrong length.
+    /// Panics if an argument has the wrong length.
     #[track_caller]
     pub fn set_state(&mut self, q: &[S], v: &[S]) -> Result<(), Error> {
         check("q", q.len(), self.model.nq());
@@ -274,9 +275,9 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// ```
     ///
     /// # Panics
-    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is not a
-    /// finite number above 0. The function also panics if the simulation has a ground and `settings.integrator` is not
-    /// semi-implicit Euler.
+    /// Panics if an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt`
+    /// is not a finite number above 0. The function also panics if the simulation has a ground and
+    /// `settings.integrator` is not semi-implicit Euler.
     #[track_caller]
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
@@ -319,14 +320,14 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         status
     }
 
-    /// Computes several steps and calls a control law before each step. If a step fails, stops at this step and returns
-    /// its status. Otherwise, if a step reported [`ContactsNotConverged`](Status::ContactsNotConverged), returns this
-    /// status with the largest error.
+    /// Computes several steps and calls a control law before each step. If a step fails, the function stops at this
+    /// step and returns the status of this step. Otherwise, if a step reported
+    /// [`ContactsNotConverged`](Status::ContactsNotConverged), the function returns this status with the largest error.
     ///
     /// Allocates nothing, unless the control law allocates.
     ///
     /// # Panics
-    /// In the same cases as [`step`](Self::step).
+    /// Panics in the same cases as [`step`](Self::step).
     #[track_caller]
     pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
         let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));

@@ -36,7 +36,7 @@ workspace! {
 /// Time of each stage as a fraction of the step, and weight of the stage's rates.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
-/// Computes a step.
+/// Computes one step of the Runge–Kutta method.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

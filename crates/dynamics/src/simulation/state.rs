@@ -43,8 +43,8 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// Sets the simulation to a stored state, which must come from a simulation of the same robot on the same ground.
     ///
     /// # Errors
-    /// [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite; other
-    /// errors as for [`set_state`](Self::set_state).
+    /// Returns [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite;
+    /// other errors as for [`set_state`](Self::set_state).
     pub fn restore(&mut self, state: &State<S>) -> Result<(), Error> {
         let impulses = self.ground.as_ref().map_or(0, |ground| ground.impulses.len());
         for (name, expected, found) in [

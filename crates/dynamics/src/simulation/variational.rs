@@ -146,7 +146,7 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
 /// for a robot at rest.
 const STILL: f64 = 1e-30;
 
-/// Computes a step.
+/// Computes one step of the variational integrator.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -35,7 +35,7 @@ use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Vec3};
 use vectorized::Rows;
 
 workspace! {
-    /// Quantities of the bodies and of the columns of their joints, in the world's frame.
+    /// Quantities of the bodies and of the joint columns, in the world's frame.
     pub(crate) struct Bodies<S>(size) {
         /// Velocity of each body. Written by: `pass`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
@@ -67,11 +67,11 @@ workspace! {
         pub qdd: Array<S> = filled(S::zero, size.nv),
         /// Joint accelerations of zero, for derivatives at q̈ = 0. Written by: `new`.
         pub still: Array<S> = filled(S::zero, size.nv),
-        /// ∂τ/∂q. Written by: `pass`.
+        /// Derivative ∂τ/∂q of the joint efforts. Written by: `pass`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂τ/∂v. Written by: `pass`.
+        /// Derivative ∂τ/∂v of the joint efforts. Written by: `pass`.
         pub dtau_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂τ/∂a. Written by: `pass`.
+        /// Derivative ∂τ/∂a of the joint efforts. Written by: `pass`.
         pub dtau_da: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }

@@ -109,7 +109,7 @@ fn add<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, to: &mut Forces
     }
 }
 
-/// Returns fᵀ m.
+/// Returns the product fᵀ m of the force f of each row and the motion m.
 #[inline(always)]
 fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [V; N] {
     let mut sum = [V::zero(); N];

@@ -77,7 +77,7 @@ impl Scratch {
 pub(crate) struct Arguments<'a, S = FusedF64> {
     pub q: &'a [S],
     pub v: &'a [S],
-    /// Accelerations or joint efforts.
+    /// Joint accelerations for inverse dynamics, or joint efforts for forward dynamics.
     pub x: &'a [S],
     pub f_ext: &'a [Force<S>],
 }
@@ -156,7 +156,7 @@ pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [FusedF64]) {
     assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         debug_assert!(at < numbers.len());
-        // SAFETY: the plan's indices are below the number of lanes of all coordinates. This number is checked above..
+        // SAFETY: the plan's indices are below the number of lanes of all coordinates. This number is checked above.
         *to = FusedF64(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
