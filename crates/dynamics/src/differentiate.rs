@@ -218,7 +218,7 @@ impl LaneJacobian {
     }
 }
 
-/// Scratch of a [`LaneJacobian`]: each lane of S computes one direction.
+/// Scratch of a `LaneJacobian`: each lane of S computes one direction.
 #[derive(Debug)]
 struct Directions<S> {
     data: Data<LaneDual<S>>,
