@@ -1,4 +1,4 @@
-//! Memory that algorithms write: scratch and results.
+//! Memory to which the algorithms write: scratch and results.
 #![allow(unsafe_code)]
 
 use crate::constraints::{constrained_derivatives, constrained_dynamics, impulse_dynamics};
@@ -15,8 +15,9 @@ use condyle_model::Model;
 use condyle_spatial::gate::{is, same};
 use condyle_spatial::{Scalar, same_layout};
 
-/// Defines [`Data`] from a list of workspaces and the arguments of each. The macro writes the struct, the constructor,
-/// the clone, and the check that numbers may be read as `f64` or as `FusedF64` ([`same_layout!`]).
+/// Defines [`Data`] from a list of workspaces and their constructor arguments. The macro generates the struct, the
+/// constructor and the copy function. It also checks that the numbers may be read as `f64` or as `FusedF64`
+/// ([`same_layout!`]).
 macro_rules! data {
     (
         $(#[$doc:meta])* ($size:ident, $model:ident, $minv:ident)
@@ -30,7 +31,8 @@ macro_rules! data {
             /// Hash of the tree for which the data was made.
             tree: u64,
             $(pub(crate) $name: $Workspace $(:: $Inner)? <S>,)*
-            /// Scratch of single calls on robots with limbs.
+            /// Scratch of calls that compute limbs in parallel lanes; `None` if the model or the scalar does not allow
+            /// this.
             pub(crate) limbs: Option<Box<Scratch>>,
             pub(crate) methods: Methods,
         }
@@ -58,8 +60,8 @@ data! {
     /// Scratch and results of every algorithm, for one model and one type of scalar.
     ///
     /// Each algorithm has its own workspace, defined in the file of the algorithm, and does not read results of other
-    /// algorithms. So calls may come in any order. A `Data` allocates all memory when it is made. Use one `Data` per
-    /// thread.
+    /// algorithms. So the order of calls does not matter. A `Data` allocates all memory when it is made. Use one `Data`
+    /// per thread.
     ///
     /// ```
     /// use condyle_dynamics::{Data, robots};
@@ -138,8 +140,8 @@ fn clone_wide(data: &Data<Wide>) -> Data<Wide> {
     data.copy()
 }
 
-/// Clones a workspace. Each type of workspace has a separate function; one function for all types would be the largest
-/// function of the library.
+/// Clones a workspace. This function is compiled separately for each workspace type. Inlined into the clone of `Data`,
+/// the copies would form the largest function of the library.
 #[inline(never)]
 fn copied<W: Clone>(workspace: &W) -> W {
     workspace.clone()
@@ -178,8 +180,8 @@ impl<S> Data<S> {
 }
 
 impl Size {
-    /// Panics with the message of [`Data::check`]. The function is not inlined, because every algorithm calls the
-    /// check.
+    /// Panics with the message of [`Data::check`]. The function is not inlined, because `Data::check` is inlined into
+    /// every algorithm.
     #[cold]
     #[inline(never)]
     #[track_caller]

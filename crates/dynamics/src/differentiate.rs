@@ -1,14 +1,15 @@
 //! Derivatives of user-defined functions of the state, by dual numbers.
 //!
-//! A state x begins with a position q of nq numbers. A step δ moves q to q ⊕ δ and is added to all other numbers
-//! (velocity, effort, …). So a state of n numbers has n − nq + nv directions. A derivative of f means the derivative of
-//! f(x ⊕ δ) with respect to δ, at δ = 0.
+//! A state x begins with a position q of nq numbers. A step δ changes the state to x ⊕ δ: its first nv numbers move q
+//! in the tangent space, and its other numbers are added to the other numbers of x (velocity, effort, …). So a state of
+//! n numbers has n − nq + nv directions. The derivative of a function f is the derivative of f(x ⊕ δ) with respect to
+//! δ, at δ = 0.
 //!
 //! A function written for any scalar can be evaluated for eight or four directions at once, in vector registers
 //! ([`LaneJacobian`]). A dual number carries one direction, and a hyper-dual number carries two (Fike and Alonso, *The
 //! development of hyper-dual numbers for exact second-derivative calculations*, 2011). Derivatives are exact and cost
-//! one evaluation of f per direction or pair of directions. The analytical derivatives of this crate are many times
-//! faster.
+//! one evaluation of f per direction or pair of directions. The analytical derivatives of this crate's own algorithms
+//! are many times faster.
 
 use crate::data::Data;
 use crate::workspace::{Narrow, Wide};
@@ -25,7 +26,7 @@ use condyle_spatial::{Constant, Scalar};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, HyperDual64};
 
-/// Returns x ⊕ δ, where the numbers of δ carry derivatives.
+/// Returns x ⊕ δ, where the numbers of δ have a dual part.
 fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     let mut out: Vec<S> = x.iter().map(|&x| S::splat(x)).collect();
     let (q, rest) = out.split_at_mut(model.nq());
@@ -59,7 +60,7 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, or two evaluations of f give different numbers of results.
+/// Panics if x has fewer than nq numbers, or two evaluations of f give different numbers of results.
 #[track_caller]
 pub fn jacobian<R>(
     model: &Model<R>,
@@ -94,8 +95,9 @@ pub trait StateFunction {
     fn call<S: Scalar>(&mut self, data: &mut Data<S>, x: &[S], y: &mut [S]);
 }
 
-/// Exact Jacobians of functions of one robot's state. Unlike in [`jacobian`], one evaluation of f computes derivatives
-/// along eight (AVX-512) or four (AVX2, NEON, SIMD128) directions. Only f may allocate.
+/// Exact Jacobians of functions of one robot's state. One evaluation of f computes the derivatives along eight
+/// (AVX-512) or four (AVX2, NEON, SIMD128) directions, whereas [`jacobian`] computes one direction. Apart from f, a
+/// call allocates nothing.
 ///
 /// The last digits of results differ between SIMD levels ([`level`](mod@crate::level)).
 ///
@@ -134,10 +136,10 @@ enum Width {
 
 impl LaneJacobian {
     /// Allocates memory for states of n numbers, which begin with q, and for functions with `results` results. Uses the
-    /// SIMD level that is current now.
+    /// SIMD level that is current at this call.
     ///
     /// # Panics
-    /// If n is less than nq.
+    /// Panics if n is less than nq.
     #[track_caller]
     pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
@@ -152,8 +154,8 @@ impl LaneJacobian {
     /// Computes the m numbers of f(x), and the Jacobian ∂f(x ⊕ δ)/∂δ, a matrix of m × (n − nq + nv).
     ///
     /// # Panics
-    /// If the number of entries of x or of results of f differs from the number given to [`new`](Self::new), or if the
-    /// robot is not the robot given to `new`.
+    /// Panics if the number of entries of x or of results of f differs from the number given to [`new`](Self::new), or
+    /// if the robot is not the robot given to `new`.
     #[track_caller]
     pub fn of<R: Constant<f64>>(
         &mut self,
@@ -164,8 +166,8 @@ impl LaneJacobian {
         self.run(model, x, f, None)
     }
 
-    /// Computes f(x) and some columns of its Jacobian: column k, the derivative along entry k of δ, for each k in
-    /// `directions`. The other columns are not written: they are zero until a call computes them.
+    /// Computes f(x) and the columns of its Jacobian whose indices are in `directions`. Column k is the derivative
+    /// along entry k of δ. The other columns are not overwritten: a column is zero until a call computes it.
     ///
     /// ```
     /// # use condyle_dynamics::{Data, LaneJacobian, Scalar, StateFunction, robots};
@@ -181,7 +183,7 @@ impl LaneJacobian {
     /// ```
     ///
     /// # Panics
-    /// In the same cases as [`of`](Self::of), or if a direction is not below n − nq + nv.
+    /// Panics in the same cases as [`of`](Self::of), or if a direction is not below n − nq + nv.
     #[track_caller]
     pub fn along<R: Constant<f64>>(
         &mut self,
@@ -216,13 +218,13 @@ impl LaneJacobian {
     }
 }
 
-/// Scratch for one direction per lane of S.
+/// Scratch of a `LaneJacobian`: each lane of S computes one direction.
 #[derive(Debug)]
 struct Directions<S> {
     data: Data<LaneDual<S>>,
-    /// δ. Shape: directions.
+    /// Step δ. Shape: number of directions.
     delta: Vec<LaneDual<S>>,
-    /// x, then x ⊕ δ.
+    /// State x (`x`), and the state x ⊕ δ (`moved`).
     x: Vec<LaneDual<S>>,
     moved: Vec<LaneDual<S>>,
     y: Vec<LaneDual<S>>,
@@ -323,7 +325,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers.
+/// Panics if x has fewer than nq numbers.
 #[track_caller]
 pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> Dual64) -> (f64, DVector<f64>) {
     let (value, J) = jacobian(model, x, |x| vec![f(x)]);
@@ -347,7 +349,7 @@ pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> 
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers.
+/// Panics if x has fewer than nq numbers.
 #[track_caller]
 pub fn hessian<R>(
     model: &Model<R>,

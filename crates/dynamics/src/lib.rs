@@ -12,8 +12,8 @@
 //! assert!((a[2] + 9.81).abs() < 1e-12); // it falls
 //! ```
 //!
-//! Every function is generic over the [`Scalar`] and allocates nothing. Each call writes all of its results, which do
-//! not depend on earlier calls. `CONVENTIONS` below defines frames and the order of numbers.
+//! Every function is generic over the [`Scalar`] and allocates nothing. The results of a call do not depend on earlier
+//! calls. `CONVENTIONS` below defines frames and the order of numbers.
 //!
 //! # Features
 //! All features are on by default.
@@ -25,8 +25,8 @@
 //! - `std`: the standard library, which all other features except `serde` need, and derivatives of user-defined
 //!   functions (`jacobian`, `LaneJacobian`, …).
 //!
-//! Without `std` the crate needs `alloc`, and the feature `libm` for floating-point functions. So it runs without an
-//! operating system (`examples/embedded` in the repository).
+//! Without `std`, the crate needs `alloc`, and the feature `libm` for floating-point functions. The crate then runs
+//! without an operating system (`examples/embedded` in the repository).
 #![doc = include_str!("../CONVENTIONS.md")]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
@@ -119,7 +119,7 @@ pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
 pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
 pub use divide_conquer::assembly::AssemblySize;
-/// Other crates whose types are part of the public interface, in the matching versions.
+/// Crates whose types are part of the public interface, in the versions that this crate uses.
 #[cfg(feature = "std")]
 pub use num_dual;
 pub use {nalgebra, rand};

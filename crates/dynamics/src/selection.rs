@@ -1,7 +1,7 @@
 //! Selection of algorithms: every threshold of this crate, with the measurement on which it is based.
 //!
 //! Choices that depend only on the model and the scalar are made when [`Data`](crate::Data) is created (`Methods`). The
-//! schedule of limbs is made when the model of a robot with limbs is built (`condyle_model::limbs`).
+//! schedule of limbs is planned when the model of a robot with limbs is built (`condyle_model::limbs`).
 
 use crate::passes::factored_dynamics::ForwardDynamicsMethod;
 use condyle_model::Model;
@@ -10,20 +10,21 @@ use condyle_model::tree::Column;
 use condyle_spatial::gate::{FusedF64, Level, is, level};
 use condyle_spatial::{Scalar, same_layout};
 
-/// Maximum mean row length of the factor of M for which M⁻¹ is computed from the factor. Measured by
-/// `benches/factorisation.rs`: on a chain of 24 joints, with mean row length 12.5, both methods are equally fast. The
-/// mean row length is 9.7 for the humanoid and 4 for the arm.
+/// Maximum mean number of entries per row of the factor of M. If the mean is larger, M⁻¹ is not computed from the
+/// factor. Measured by `benches/factorisation.rs`: on a chain of 24 joints, with a mean of 12.5, M⁻¹ takes equally long
+/// with and without the factor. The mean is 9.7 for the humanoid and 4 for the arm.
 const SHORT_ROWS: usize = 12;
 
-/// Minimum mean length of the paths to the root for which −M⁻¹ B is computed by recursions over the articulated bodies,
-/// not as a matrix product. Measured by `benches/peers/dynamics.py` on chains.
+/// Minimum mean length of the paths from the columns to the root for computing −M⁻¹ B by recursions over the
+/// articulated bodies. If the mean is smaller, −M⁻¹ B is computed as a matrix product. Measured by
+/// `benches/peers/dynamics.py` on chains.
 const LONG_WAY: usize = 24;
 
-/// Mean length of the paths to the root above which the derivatives ∂τ are computed four columns at a time, not for one
-/// pair of columns at a time. Measured by `benches/peers/dynamics.py`.
+/// Mean length of the paths from the columns to the root. Above this length, the derivatives ∂τ are computed for four
+/// columns at a time instead of one pair of columns at a time. Measured by `benches/peers/dynamics.py`.
 const LONG_SUPPORT: usize = 4;
 
-/// Methods of the functions that have several, for one model and one type of scalar.
+/// Selected method of each function that has several methods, for one model and one type of scalar.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Methods {
     pub inverse: InverseMethod,
@@ -43,7 +44,8 @@ impl Methods {
 pub(crate) enum InverseMethod {
     /// Gauss–Jordan elimination of M, for short chains.
     GaussJordan,
-    /// Sparse factor of M, or the articulated bodies of limbs in parallel lanes.
+    /// Sparse factor of M. If limbs are computed in parallel lanes, the factors of the articulated bodies are used
+    /// instead.
     SparseFactor,
     /// Factors of the articulated bodies, without M.
     ArticulatedBodies,
@@ -66,11 +68,12 @@ impl InverseMethod {
 /// Method by which the derivatives ∂q̈ = −M⁻¹ ∂τ are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AbaDerivativesMethod {
-    /// ∂τ and M⁻¹ of limbs in parallel lanes, then their product. Where a call cannot use lanes, it does as `Product`.
+    /// Product of M⁻¹ and ∂τ, after both matrices are computed with the limbs in parallel lanes. Calls that cannot use
+    /// lanes use `Product` instead.
     Limbs,
-    /// ∂τ and M⁻¹ body by body, then their product.
+    /// Product of M⁻¹ and ∂τ, after both matrices are computed body by body.
     Product,
-    /// ∂τ body by body, then a solution with the articulated bodies.
+    /// Computation of ∂τ body by body, and of −M⁻¹ ∂τ by recursions over the articulated bodies.
     TreeSolve,
 }
 
@@ -86,7 +89,8 @@ impl AbaDerivativesMethod {
     }
 }
 
-/// Returns the plan of a robot's limbs if single calls with this scalar compute them in parallel lanes.
+/// Returns the plan of a robot's limbs if calls for a single state with this scalar compute the limbs in parallel
+/// lanes.
 pub(crate) fn limbs<S: 'static, R>(model: &Model<R>) -> Option<&Plan> {
     model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)
 }
@@ -97,8 +101,8 @@ pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
 
-/// Largest nv for which a chain's M is inverted by Gauss–Jordan: a column then fits in registers and loops unroll. For
-/// a 7-joint arm the sparse factor takes five times the instructions.
+/// Maximum nv of a chain whose M is inverted by Gauss–Jordan elimination. Up to this size, a column of M fits in
+/// registers and loops are unrolled. For an arm with 7 joints, the sparse factor needs five times as many instructions.
 pub const SHORT_CHAIN: usize = 8;
 
 /// Returns whether a robot is a chain of at most [`SHORT_CHAIN`] coordinates. The inertia matrix M of a chain has no
@@ -108,21 +112,22 @@ pub fn is_short_chain<R>(model: &Model<R>) -> bool {
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
 }
 
-/// Returns whether −M⁻¹ B is computed by recursions over the articulated bodies. Joints must not share coordinates.
+/// Returns whether −M⁻¹ B is computed by recursions over the articulated bodies. The result is false if joints share
+/// coordinates.
 pub(crate) fn solve_by_tree(columns: &[Column], nv: usize) -> bool {
     let depths: usize = columns.iter().map(|c| c.depth).sum();
     columns.len() == nv && depths >= LONG_WAY * nv
 }
 
-/// Returns whether the derivatives ∂τ are computed four columns at a time: only for single states, and only if the
-/// processor has vectors of four numbers.
+/// Returns whether the derivatives ∂τ are computed four columns at a time. The result is true only for single states
+/// and only if the processor has vectors of four numbers.
 #[inline(always)]
 pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
     is::<S, FusedF64>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
 }
 
-/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate. For such joints, the
-/// recursion of ABA is not possible.
+/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate. The recursion of ABA does not
+/// support such joints.
 ///
 /// Measured by `benches/factorisation.rs` on the embedded robots, and on chains, binary trees and stars of 6 to 200
 /// joints. Methods with a factor of M are never faster: h and M alone take nearly as long as ABA on an arm with 7

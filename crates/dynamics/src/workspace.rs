@@ -1,24 +1,24 @@
 //! Arrays that form the workspaces of passes.
 //!
-//! Each pass defines its own workspace by `workspace!`, in the file of the pass. Each field documents the frame, shape
-//! and writer of its numbers. A workspace consists of arrays and matrices that can be read as numbers of type `f64` or
-//! of type `FusedF64`; the compiler checks this.
+//! Each pass defines its own workspace by `workspace!`, in the file of the pass. The comment of each field gives the
+//! frame and shape of its numbers, and the functions that write them. A workspace consists of arrays and matrices whose
+//! numbers can be read as `f64` or as `FusedF64`; the compiler checks this.
 
 use condyle_model::Model;
 use condyle_spatial::gate::{self, SimdToken};
 use condyle_spatial::{Array, Matrix, Scalar, matrix};
 
-/// Marker with which this crate may name vector types.
+/// Marker type that gives this crate access to the vector types of `gate`.
 pub(crate) struct Gate;
 
 // SAFETY: vectors are created and used only in kernels, which are called through their entry functions, and in
-// functions that choose the vectors of the current SIMD level.
+// functions that select the vectors of the current SIMD level.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Gate {}
 
-/// Four numbers in one vector, with AVX2, NEON or SIMD128.
+/// Vector of four numbers, for AVX2, NEON or SIMD128.
 pub(crate) type Narrow = gate::Narrow<Gate>;
-/// Eight numbers in one vector, with AVX-512; otherwise the same as `Narrow`.
+/// Vector of eight numbers, for AVX-512; on other processors the same as `Narrow`.
 pub(crate) type Wide = gate::Wide<Gate>;
 
 /// Sizes of the arrays of a workspace.
@@ -50,7 +50,7 @@ impl Size {
 }
 
 /// Returns an array of n equal entries. The function is not inlined and calls `entry` itself, because a workspace has
-/// dozens of arrays. Each entry is copied as a whole, whereas `vec!` would clone it number by number.
+/// dozens of arrays. The function copies each entry as a whole, whereas `vec!` would clone an entry number by number.
 #[inline(never)]
 pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Array<T> {
     let entry = entry();

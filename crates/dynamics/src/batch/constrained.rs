@@ -1,4 +1,4 @@
-//! Dynamics under constraints and impacts of many states, with their derivatives.
+//! Batch functions for dynamics under constraints and for impacts, with their derivatives.
 
 use super::places::{Places, Put};
 use super::results::{Matrices, Take, Taken, results};
@@ -34,17 +34,17 @@ results! {
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
-        /// ∂q̈/∂q in the tangent space, nv × nv.
+        /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space, nv × nv.
         da_dq: Matrices<'b, T> = [NV, NV];
-        /// ∂q̈/∂v, nv × nv.
+        /// Derivative ∂q̈/∂v of the joint accelerations, nv × nv.
         da_dv: Matrices<'b, T> = [NV, NV];
-        /// ∂q̈/∂τ, nv × nv.
+        /// Derivative ∂q̈/∂τ of the joint accelerations, nv × nv.
         da_dtau: Matrices<'b, T> = [NV, NV];
-        /// ∂λ/∂q in the tangent space, rows × nv.
+        /// Derivative ∂λ/∂q of the constraint forces in the tangent space, rows × nv.
         dlambda_dq: Matrices<'b, T> = [ROWS, NV];
-        /// ∂λ/∂v, rows × nv.
+        /// Derivative ∂λ/∂v of the constraint forces, rows × nv.
         dlambda_dv: Matrices<'b, T> = [ROWS, NV];
-        /// ∂λ/∂τ, rows × nv.
+        /// Derivative ∂λ/∂τ of the constraint forces, rows × nv.
         dlambda_dtau: Matrices<'b, T> = [ROWS, NV];
         /// Inertia of the constraints, Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows.
         inertia: Matrices<'b, T> = [ROWS, ROWS];
@@ -61,15 +61,15 @@ results! {
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
-        /// M, nv × nv.
+        /// Inertia matrix M, nv × nv.
         M: Matrices<'b, T> = [NV, NV];
-        /// ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv.
+        /// Derivative ∂(M q̈ + h − Jᵀ λ)/∂q of the equations of motion in the tangent space, nv × nv.
         dtau_dq: Matrices<'b, T> = [NV, NV];
-        /// ∂h/∂v, nv × nv.
+        /// Derivative ∂h/∂v of the nonlinear effects, nv × nv.
         dtau_dv: Matrices<'b, T> = [NV, NV];
-        /// ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
+        /// Derivative ∂(J q̈ + γ)/∂q of the constraint accelerations in the tangent space, rows × nv.
         dgamma_dq: Matrices<'b, T> = [ROWS, NV];
-        /// ∂γ/∂v, rows × nv.
+        /// Derivative ∂γ/∂v of the constraint accelerations, rows × nv.
         dgamma_dv: Matrices<'b, T> = [ROWS, NV];
     }
 
@@ -95,13 +95,13 @@ results! {
         residual: &'b [T] = [];
         /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
-        /// ∂v⁺/∂q in the tangent space, nv × nv.
+        /// Derivative ∂v⁺/∂q of the velocity after the impact in the tangent space, nv × nv.
         dv_dq: Matrices<'b, T> = [NV, NV];
-        /// ∂v⁺/∂v, nv × nv.
+        /// Derivative ∂v⁺/∂v of the velocity after the impact, nv × nv.
         dv_dv: Matrices<'b, T> = [NV, NV];
-        /// ∂Λ/∂q in the tangent space, rows × nv.
+        /// Derivative ∂Λ/∂q of the impulses in the tangent space, rows × nv.
         dlambda_dq: Matrices<'b, T> = [ROWS, NV];
-        /// ∂Λ/∂v, rows × nv.
+        /// Derivative ∂Λ/∂v of the impulses, rows × nv.
         dlambda_dv: Matrices<'b, T> = [ROWS, NV];
         /// Inertia of the constraints, (J M⁻¹ Jᵀ)⁻¹, rows × rows.
         inertia: Matrices<'b, T> = [ROWS, ROWS];
@@ -115,8 +115,8 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// In the same cases as [`aba`](Self::aba), or if `constraints` were made for another model, or by a batch with
-    /// another number of threads.
+    /// Panics in the same cases as [`aba`](Self::aba), or if `constraints` were made for another model, or by a batch
+    /// with another number of threads.
     fn constrained_dynamics(model, data, constraints: BatchConstraints; q, v, tau, f_ext) -> BatchConstrained<'_, T> {
         constrained_dynamics(model, data, constraints, q, v, tau, f_ext)
     }
@@ -127,7 +127,7 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// Panics in the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn constrained_dynamics_derivatives(model, data, constraints: BatchConstraints; q, v, tau, f_ext)
     -> BatchConstrainedDerivatives<'_, T> {
         constrained_dynamics_derivatives(model, data, constraints, q, v, tau, f_ext)
@@ -139,7 +139,7 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// Panics in the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn constrained_dynamics_equations(model, data, constraints: BatchConstraints; q, v, tau, f_ext)
     -> BatchConstrainedEquations<'_, T> {
         constrained_dynamics_equations(model, data, constraints, q, v, tau, f_ext)
@@ -150,7 +150,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state; restitution: ε, the same for all states.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// Panics in the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn impulse_dynamics(model, data, constraints: BatchConstraints; q, v; restitution: f64) -> BatchImpulse<'_, T> {
         impulse_dynamics(model, data, constraints, q, v, S::splat(restitution))
     }
@@ -160,7 +160,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state; restitution: ε, the same for all states.
     ///
     /// # Panics
-    /// As [`constrained_dynamics`](Self::constrained_dynamics).
+    /// Panics in the same cases as [`constrained_dynamics`](Self::constrained_dynamics).
     fn impulse_dynamics_derivatives(model, data, constraints: BatchConstraints; q, v; restitution: f64)
     -> BatchImpulseDerivatives<'_, T> {
         impulse_dynamics_derivatives(model, data, constraints, q, v, S::splat(restitution))

@@ -31,7 +31,7 @@ pub struct BatchConstraints<T: Real = f64> {
     pub(super) sets: Sets<T>,
 }
 
-/// Sets of constraints, one per thread, with the number of lanes of the batch.
+/// Constraint sets, one per thread. Their scalars have as many lanes as the scalars of the batch.
 #[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
@@ -43,7 +43,7 @@ impl<T: Real> Batch<T> {
     /// Prepares constraints of a model for use with this batch, and allocates all memory.
     ///
     /// # Errors
-    /// As [`ConstraintSet::new`].
+    /// Returns the same errors as [`ConstraintSet::new`].
     pub fn constraints(
         &self,
         model: &Model,
@@ -79,13 +79,13 @@ impl<T: Real> BatchConstraints<T> {
     /// Returns the range of rows of J that belong to constraint k.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
         each!(Sets, &self.sets, sets => sets[0].range(k))
     }
 
-    /// Sets how redundant constraints share the constraint forces.
+    /// Changes the settings that determine how redundant constraints share the constraint forces.
     pub fn set_proximal(&mut self, proximal: ProximalSettings) {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
     }
@@ -93,10 +93,11 @@ impl<T: Real> BatchConstraints<T> {
     /// Changes the target of constraint k for all states, from the next call on. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Constraint`] if the target is not finite or has an invalid rotation. The old target is then kept.
+    /// Returns [`Error::Constraint`] if the target is not finite or has an invalid rotation. In this case, the old
+    /// target is kept.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<f64>) -> Result<(), Error> {
         check_index("k", k, each!(Sets, &self.sets, sets => sets[0].len()), "constraints");

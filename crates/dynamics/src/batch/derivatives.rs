@@ -1,4 +1,4 @@
-//! Derivatives of many states.
+//! Batch functions for the derivatives of dynamics at many states.
 
 use super::group::{DA, DTAU, MINV};
 use super::places::{Places, Put};
@@ -20,11 +20,11 @@ use condyle_spatial::block::Real;
 results! {
     /// Derivatives of τ = rnea(q, v, a), of many states: see [`RneaDerivatives`](crate::RneaDerivatives).
     BatchRneaDerivatives of RneaDerivatives {
-        /// ∂τ/∂q in the tangent space.
+        /// Derivative ∂τ/∂q of the joint efforts in the tangent space.
         dtau_dq: Matrices<'b, T> = [NV, NV];
-        /// ∂τ/∂v.
+        /// Derivative ∂τ/∂v of the joint efforts.
         dtau_dv: Matrices<'b, T> = [NV, NV];
-        /// ∂τ/∂a = M(q), including armature.
+        /// Derivative ∂τ/∂a = M(q) of the joint efforts, including armature.
         dtau_da: Matrices<'b, T> = [NV, NV];
     }
 
@@ -32,85 +32,85 @@ results! {
     BatchAbaDerivatives of AbaDerivatives {
         /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// ∂q̈/∂q in the tangent space.
+        /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space.
         da_dq: Matrices<'b, T> = [NV, NV];
-        /// ∂q̈/∂v.
+        /// Derivative ∂q̈/∂v of the joint accelerations.
         da_dv: Matrices<'b, T> = [NV, NV];
-        /// ∂q̈/∂τ = M(q)⁻¹.
+        /// Derivative ∂q̈/∂τ = M(q)⁻¹ of the joint accelerations.
         da_dtau: Matrices<'b, T> = [NV, NV];
     }
 
     /// Derivatives of C(q, v) v, of many states: see [`CoriolisDerivatives`](crate::CoriolisDerivatives).
     BatchCoriolisDerivatives of CoriolisDerivatives {
-        /// ∂(C v)/∂q, nv × nv.
+        /// Derivative ∂(C v)/∂q of the Coriolis efforts, nv × nv.
         dq: Matrices<'b, T> = [NV, NV];
-        /// ∂(C v)/∂v, nv × nv.
+        /// Derivative ∂(C v)/∂v of the Coriolis efforts, nv × nv.
         dv: Matrices<'b, T> = [NV, NV];
     }
 
     /// Derivatives of passive efforts, of many states: see
     /// [`passive_torque_derivatives`](crate::passive_torque_derivatives()).
     BatchPassiveDerivatives of PassiveDerivatives {
-        /// ∂τ/∂q in the tangent space, nv × nv.
+        /// Derivative ∂τ/∂q of the joint efforts in the tangent space, nv × nv.
         dtau_dq: Matrices<'b, T> = [NV, NV];
-        /// ∂τ/∂v, nv × nv.
+        /// Derivative ∂τ/∂v of the joint efforts, nv × nv.
         dtau_dv: Matrices<'b, T> = [NV, NV];
     }
 
     /// Derivatives of the energies, of many states: see [`EnergyDerivatives`](crate::EnergyDerivatives).
     BatchEnergyDerivatives of EnergyDerivatives {
-        /// ∂T/∂q, nv numbers per state.
+        /// Derivative ∂T/∂q of the kinetic energy, nv numbers per state.
         dT_dq: &'b [T] = [NV];
-        /// ∂T/∂v, nv numbers per state.
+        /// Derivative ∂T/∂v of the kinetic energy, nv numbers per state.
         dT_dv: &'b [T] = [NV];
-        /// ∂V/∂q, nv numbers per state.
+        /// Derivative ∂V/∂q of the potential energy, nv numbers per state.
         dV_dq: &'b [T] = [NV];
     }
 
     /// Second derivatives of φ = λᵀ rnea(q, v, a), of many states: see [`RneaHessian`](crate::RneaHessian).
     BatchRneaHessian of RneaHessian {
-        /// ∂²φ/∂q∂q, nv × nv.
+        /// Second derivatives ∂²φ/∂q∂q, nv × nv.
         dqdq: Matrices<'b, T> = [NV, NV];
-        /// ∂²φ/∂v∂q, nv × nv.
+        /// Second derivatives ∂²φ/∂v∂q, nv × nv.
         dvdq: Matrices<'b, T> = [NV, NV];
-        /// ∂²φ/∂v∂v, nv × nv.
+        /// Second derivatives ∂²φ/∂v∂v, nv × nv.
         dvdv: Matrices<'b, T> = [NV, NV];
-        /// ∂²φ/∂a∂q, nv × nv.
+        /// Second derivatives ∂²φ/∂a∂q, nv × nv.
         dadq: Matrices<'b, T> = [NV, NV];
     }
 
     /// Second derivatives of ψ = λᵀ aba(q, v, τ), of many states: see [`AbaHessian`](crate::AbaHessian).
     BatchAbaHessian of AbaHessian {
-        /// ∂²ψ/∂q∂q, nv × nv.
+        /// Second derivatives ∂²ψ/∂q∂q, nv × nv.
         dqdq: Matrices<'b, T> = [NV, NV];
-        /// ∂²ψ/∂v∂q, nv × nv.
+        /// Second derivatives ∂²ψ/∂v∂q, nv × nv.
         dvdq: Matrices<'b, T> = [NV, NV];
-        /// ∂²ψ/∂v∂v, nv × nv.
+        /// Second derivatives ∂²ψ/∂v∂v, nv × nv.
         dvdv: Matrices<'b, T> = [NV, NV];
-        /// ∂²ψ/∂τ∂q, nv × nv.
+        /// Second derivatives ∂²ψ/∂τ∂q, nv × nv.
         dtaudq: Matrices<'b, T> = [NV, NV];
     }
 
     /// Derivatives of the centroidal momentum, of its rate, and of the centre of mass, of many states: see
     /// [`CentroidalDerivatives`](crate::CentroidalDerivatives).
     BatchCentroidalDerivatives of CentroidalDerivatives {
-        /// ∂hg/∂q, 6 × nv.
+        /// Derivative ∂hg/∂q of the centroidal momentum, 6 × nv.
         dh_dq: Matrices<'b, T> = [6, NV];
-        /// ∂hg/∂v, 6 × nv.
+        /// Derivative ∂hg/∂v of the centroidal momentum, 6 × nv.
         dh_dv: Matrices<'b, T> = [6, NV];
-        /// ∂dhg/∂q, 6 × nv.
+        /// Derivative ∂dhg/∂q of the rate dhg of the centroidal momentum, 6 × nv.
         drate_dq: Matrices<'b, T> = [6, NV];
-        /// ∂dhg/∂v, 6 × nv.
+        /// Derivative ∂dhg/∂v of the rate dhg of the centroidal momentum, 6 × nv.
         drate_dv: Matrices<'b, T> = [6, NV];
-        /// ∂dhg/∂a, 6 × nv.
+        /// Derivative ∂dhg/∂a of the rate dhg of the centroidal momentum, 6 × nv.
         drate_da: Matrices<'b, T> = [6, NV];
-        /// ∂c/∂q, 3 × nv.
+        /// Derivative ∂c/∂q of the centre of mass, 3 × nv.
         dcom_dq: Matrices<'b, T> = [3, NV];
-        /// ∂ċ/∂q, 3 × nv.
+        /// Derivative ∂ċ/∂q of the velocity of the centre of mass, 3 × nv.
         dvcom_dq: Matrices<'b, T> = [3, NV];
-        /// ∂c̈/∂q, 3 × nv.
+        /// Derivative ∂c̈/∂q of the acceleration of the centre of mass, 3 × nv.
         dacom_dq: Matrices<'b, T> = [3, NV];
-        /// ∂c̈/∂v, 3 × nv.
+        /// Derivative ∂c̈/∂v of the acceleration of the centre of mass, 3 × nv.
         dacom_dv: Matrices<'b, T> = [3, NV];
     }
 }
@@ -122,7 +122,7 @@ batched! {
     /// frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn rnea_derivatives(model, data => to; q, v, a, f_ext)
     keeps [
         rnea_derivatives.dtau_dq: DTAU[0], rnea_derivatives.dtau_dv: DTAU[1], rnea_derivatives.dtau_da: DTAU[2]
@@ -136,7 +136,7 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`aba`](Self::aba).
+    /// Panics in the same cases as [`aba`](Self::aba).
     fn aba_derivatives(model, data; q, v, tau, f_ext)
     keeps [aba_derivatives.da_dq: DA[0], aba_derivatives.da_dv: DA[1], minv.Minv: MINV] -> BatchAbaDerivatives<'_, T> {
         aba_derivatives(model, data, q, v, tau, f_ext).a
@@ -147,7 +147,7 @@ batched! {
     /// q: nq numbers per state; f_ext: for each state, one force per body in the body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn static_torque_derivative(model, data; q, f_ext) -> Matrices<'_, T> [[NV, NV]] {
         static_torque_derivative(model, data, q, f_ext)
     }
@@ -157,7 +157,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn coriolis_derivatives(model, data; q, v) -> BatchCoriolisDerivatives<'_, T> {
         coriolis_derivatives(model, data, q, v)
     }
@@ -168,7 +168,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state; smoothing: ε > 0, the same for all states.
     ///
     /// # Panics
-    /// As [`passive_torque`](Self::passive_torque).
+    /// Panics in the same cases as [`passive_torque`](Self::passive_torque).
     fn passive_torque_derivatives(model, data; q, v; smoothing: f64) -> BatchPassiveDerivatives<'_, T> {
         let Workspace { dtau_dq, dtau_dv, .. } = &mut data.rnea_derivatives;
         slopes(model, q, v, smoothing, dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice());
@@ -180,7 +180,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn energy_derivatives(model, data; q, v) -> BatchEnergyDerivatives<'_, T> { energy_derivatives(model, data, q, v) }
 
     /// Computes [`centroidal_derivatives`](crate::centroidal_derivatives()) for each state: matrices of 6 × nv and 3 ×
@@ -189,7 +189,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn centroidal_derivatives(model, data; q, v, a) -> BatchCentroidalDerivatives<'_, T> {
         centroidal_derivatives(model, data, q, v, a)
     }
@@ -200,7 +200,7 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn rnea_hessian(model, data; q, v, a, f_ext, lambda) -> BatchRneaHessian<'_, T> {
         rnea_hessian(model, data, q, v, a, f_ext, lambda)
     }
@@ -211,7 +211,7 @@ batched! {
     /// the body's frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`aba`](Self::aba).
+    /// Panics in the same cases as [`aba`](Self::aba).
     fn aba_hessian(model, data; q, v, tau, f_ext, lambda) -> BatchAbaHessian<'_, T> {
         aba_hessian(model, data, q, v, tau, f_ext, lambda)
     }
@@ -223,7 +223,7 @@ batched! {
     /// frame; empty for no forces.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn rnea_second_derivatives(model, data => to; q, v, a, f_ext)
     with wide -> BatchRneaHessian<'_, T> [[NV, NV, NV], [NV, NV, NV], [NV, NV, NV], [NV, NV, NV]] {
         let nv = model.nv();
@@ -241,8 +241,8 @@ batched! {
     /// frame; empty for no forces.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the input names a body that does not move, or if the smoothing
-    /// of the input is not positive.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the input names a body that does not move, or if the
+    /// smoothing of the input is not positive.
     fn rnea_input_derivative(model, data => to; q, v, a, f_ext; input: Input)
     with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));
@@ -258,8 +258,8 @@ batched! {
     /// body's frame; empty for no forces.
     ///
     /// # Panics
-    /// In the same cases as [`aba`](Self::aba), or if the input names a body that does not move, or if the smoothing of
-    /// the input is not positive.
+    /// Panics in the same cases as [`aba`](Self::aba), or if the input names a body that does not move, or if the
+    /// smoothing of the input is not positive.
     fn aba_input_derivative(model, data => to; q, v, tau, f_ext; input: Input)
     with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));

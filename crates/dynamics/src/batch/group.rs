@@ -1,4 +1,4 @@
-//! Distribution of a batch's work: groups of states, with one state per lane, are distributed over threads.
+//! Distribution of a batch over threads. Threads compute groups of states, with one state per SIMD lane.
 
 use super::places::Places;
 use super::state_matrix::StateMatrix;
@@ -12,20 +12,20 @@ use condyle_spatial::block::{Block, MOST, Real, Strided, flat_mut, gather, lanes
 use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Array, Force, Matrix};
 
-/// Groups of states, each with one state per lane of the scalar, and the workers that compute them.
+/// Groups of states and the workers that compute the groups. A group has one state per lane of the scalar `S`.
 #[derive(Clone, Debug)]
 pub(super) struct Group<S: Block> {
     /// Workers, one per thread.
     workers: Vec<Worker<S>>,
     /// Maximum number of groups.
     groups: usize,
-    /// Matrices of each group, one per kind. Memory exists for the kinds that passes have requested so far. Written by:
-    /// `keep`.
+    /// Matrices of each group, one per matrix kind (`M`, `MINV`, …). A matrix is empty until a pass requests its kind.
+    /// Written by: `keep`.
     matrices: Vec<[Matrix<S>; KINDS]>,
 }
 
-/// Kinds of matrices that a group of states keeps in lanes, as indices; each matrix is nv × nv. Only one pass writes a
-/// matrix, so that the zeros of the matrix stay zero.
+/// Indices of the matrix kinds that a group of states keeps in lanes. Each matrix is nv × nv. Only one pass writes each
+/// kind, so entries that are zero for every state stay zero.
 pub(super) const M: usize = 0;
 
 pub(super) const MINV: usize = 1;
@@ -34,12 +34,13 @@ pub(super) const DTAU: [usize; 3] = [2, 3, 4];
 
 pub(super) const DA: [usize; 2] = [5, 6];
 
-/// Kinds of symmetric matrices. Entries (i, j) and (j, i) differ at most by rounding, so either may be used for both.
+/// Kinds of the symmetric matrices. Entries (i, j) and (j, i) differ at most by rounding, so one of the two may replace
+/// the other.
 pub(super) const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
 
 pub(super) const KINDS: usize = 7;
 
-/// Number of arguments of a pass for a state. The slots of arguments are, in order: q; v; an acceleration or an effort;
+/// Number of arguments of a pass for one state. The argument slots are, in order: q; v; an acceleration or an effort;
 /// the factor λ of a contraction; external forces.
 pub(super) const ARGUMENTS: usize = 5;
 
@@ -49,13 +50,14 @@ pub(super) const FORCES: usize = ARGUMENTS - 1;
 #[derive(Debug)]
 struct Worker<S: Block> {
     data: Data<S>,
-    /// Arguments, one state per lane. Shape: nq, nv, nv, nv. Written by: `run_serially`.
+    /// Arguments except external forces, one state per lane. Shape: nq, nv, nv, nv. Written by: `run_serially`.
     numbers: [Array<S>; FORCES],
-    /// External forces. Shape: bodies, or empty. Written by: `run_serially`.
+    /// External forces, one state per lane. Shape: number of bodies, or empty without forces. Written by:
+    /// `run_serially`.
     f_ext: Vec<Force<S>>,
-    /// Scratch of passes. Shape: 6 × nv.
+    /// Two scratch matrices for passes. Shape: 6 × nv each.
     six: [Matrix<S>; 2],
-    /// Scratch of passes. Shape: nv × max(nv, 10).
+    /// Scratch vector for passes. Shape: nv × max(nv, 10).
     wide: Array<S>,
 }
 
@@ -82,29 +84,29 @@ impl<S: Block> Clone for Worker<S> {
     }
 }
 
-/// Group of states, as passed to a pass.
+/// Arguments and scratch that a pass receives for one group of states.
 pub(super) struct States<'w, S: Block> {
     pub model: &'w Model,
     pub data: &'w mut Data<S>,
     pub q: &'w [S],
     pub v: &'w [S],
     pub a: &'w [S],
-    /// Same slice as `a`; a pass uses either `a` or `tau`.
+    /// Efforts τ. This is the same slice as `a`, because a pass takes either accelerations or efforts.
     pub tau: &'w [S],
     pub lambda: &'w [S],
     pub f_ext: &'w [Force<S>],
     pub constraints: Option<&'w mut ConstraintSet<S>>,
-    /// Scratch. Shape: 6 × nv.
+    /// Two scratch matrices. Shape: 6 × nv each.
     pub six: &'w mut [Matrix<S>; 2],
-    /// Scratch. Shape: nv × max(nv, 10).
+    /// Scratch vector. Shape: nv × max(nv, 10).
     pub wide: &'w mut [S],
     /// Matrices that stay in lanes; `None` if the pass has no such matrices.
     pub kept: Option<&'w mut [Matrix<S>; KINDS]>,
 }
 
-/// Work on a group of states: a call of a function of this crate, whose results are written to destinations.
+/// Computation on a group of states. A pass calls a function of this crate and writes the results to destinations.
 pub(super) trait Pass<T: Real>: Copy + Sync {
-    /// Kinds of matrices that the pass leaves in lanes.
+    /// Kinds of the matrices that the pass keeps in lanes.
     const KINDS: &'static [usize];
 
     /// Runs the pass. Implementations must be inlined into the code of the SIMD level.
@@ -163,7 +165,7 @@ struct Team<'a, S: Block> {
     sets: &'a mut [ConstraintSet<S>],
 }
 
-/// Runs the work on all states, distributed over all threads.
+/// Runs `work` on all states, distributed over all threads.
 fn spread<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
@@ -187,7 +189,7 @@ fn spread<T: Real, S: Block<Number = T>>(
     );
 }
 
-/// Runs the work on all groups, on one thread.
+/// Runs `work` on all groups of states, on one thread.
 fn run_serially<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
@@ -252,7 +254,7 @@ impl<S: Block> Group<S> {
         }
     }
 
-    /// Runs a pass over all states. `has_matrices`: whether the pass leaves matrices in lanes.
+    /// Runs a pass over all states. `has_matrices`: whether the pass keeps matrices in lanes.
     pub(super) fn run<T: Real>(
         &mut self,
         work: &Work<'_, T, S>,
@@ -268,7 +270,7 @@ impl<S: Block> Group<S> {
         spread(work, model, team, states, from, Results { numbers, matrices });
     }
 
-    /// Returns a matrix of state k, as a view of its lane.
+    /// Returns the matrix of state k of the given kind. The matrix is a view of the state's lane.
     pub(super) fn matrix(&self, kind: usize, k: usize) -> StateMatrix<'_, S::Number> {
         let matrix = &self.matrices[k / S::LANES][kind];
         let n = matrix.nrows();
@@ -290,7 +292,7 @@ impl<S: Block> Group<S> {
                 states += 1;
             }
             let (strides, shape) = match SYMMETRIC.contains(&kind) {
-                true => ([n * n, 1], [1, n * n]), // the columns of a symmetric matrix are its rows
+                true => ([n * n, 1], [1, n * n]), // for a symmetric matrix, the columns equal the rows
                 false => ([1, n], [n, n]),
             };
             scatter_matrix(&Strided { vectors, strides, shape, negative: false }, &mut each[..states], n);

@@ -1,4 +1,4 @@
-//! Placements and motions of bodies and frames of many states.
+//! Batch functions for the placements and motions of bodies and frames in many states.
 
 use super::places::{Places, Put};
 use super::results::{Matrices, Poses, Take, Taken, results};
@@ -10,18 +10,18 @@ use crate::passes::frames::ReferenceFrame;
 use condyle_spatial::Matrix;
 use condyle_spatial::block::Real;
 
-/// Derivatives of an acceleration, in the matrices that a single call fills.
+/// Derivatives of the acceleration of a frame or body, in matrices that the function for a single state fills.
 struct AccelerationDerivatives<'s, S> {
     da_dq: &'s Matrix<S>,
     da_dv: &'s Matrix<S>,
 }
 
 results! {
-    /// Derivatives of an acceleration, of many states.
+    /// Derivatives of the acceleration of a frame or body, for many states.
     BatchAccelerationDerivatives of AccelerationDerivatives {
-        /// ∂a/∂q in the tangent space, 6 × nv.
+        /// Derivative ∂a/∂q of the acceleration in the tangent space, 6 × nv.
         da_dq: Matrices<'b, T> = [6, NV];
-        /// ∂a/∂v, 6 × nv.
+        /// Derivative ∂a/∂v of the acceleration, 6 × nv.
         da_dv: Matrices<'b, T> = [6, NV];
     }
 }
@@ -41,7 +41,7 @@ batched! {
     /// ```
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea).
+    /// Panics in the same cases as [`rnea`](Self::rnea).
     fn forward_kinematics(model, data => to; q) -> Poses<'_, T> [[BODIES, 4, 4]] {
         let (placements, n) = (forward_kinematics(model, data, q), model.bodies().len());
         for body in 0..n {
@@ -55,7 +55,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_placement(model, data => to; q; frame: usize) -> Poses<'_, T> [[4, 4]] {
         to.pose(0, [0, 1], forward_kinematics(model, data, q).frame(frame));
     }
@@ -65,7 +65,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_jacobian(model, data; q; frame: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         frame_jacobian(model, q, frame, reference, &mut six[0]);
         &six[0]
@@ -76,7 +76,7 @@ batched! {
     /// q: nq numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_jacobian(model, data; q; body: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         body_jacobian(model, q, body, reference, &mut six[0]);
         &six[0]
@@ -87,7 +87,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_velocity(model, data; q, v; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).frame_velocity(frame, reference)
     }
@@ -97,7 +97,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_velocity(model, data; q, v; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).body_velocity(body, reference)
     }
@@ -108,7 +108,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference)
     }
@@ -119,7 +119,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).body_acceleration(body, reference)
     }
@@ -130,7 +130,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_classical_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference)
     }
@@ -141,7 +141,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_classical_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference)
     }
@@ -152,7 +152,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_jacobian_rate(model, data; q, v; frame: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_jacobian_rate(frame, reference, &mut six[0]);
@@ -165,7 +165,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_jacobian_rate(model, data; q, v; body: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_jacobian_rate(body, reference, &mut six[0]);
@@ -178,7 +178,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_velocity_derivative(model, data; q, v; frame: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_velocity_derivative(frame, reference, &mut six[0]);
@@ -191,7 +191,7 @@ batched! {
     /// q: nq numbers per state; v: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_velocity_derivative(model, data; q, v; body: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_velocity_derivative(body, reference, &mut six[0]);
@@ -204,7 +204,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
@@ -218,7 +218,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the body does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the body does not exist.
     fn body_acceleration_derivatives(model, data; q, v, a; body: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
@@ -233,7 +233,7 @@ batched! {
     /// q: nq numbers per state; v and a: nv numbers per state.
     ///
     /// # Panics
-    /// In the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
+    /// Panics in the same cases as [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_classical_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;

@@ -3,14 +3,14 @@
 //! A pass (a recursion over the bodies) computes one state per lane of a vector register. The number of lanes depends
 //! on the SIMD level: eight or four in `f64`, sixteen or eight in `f32`, and one at the baseline level. Groups of
 //! states are distributed over threads. Arguments and results are stored state by state. The matrices of RNEA, CRBA,
-//! ABA and M⁻¹ keep the layout of the passes: entry by entry, each entry for all states of a group. Lanes are
-//! independent, and each lane computes like a single call at the same SIMD level. So the results of a state have the
-//! same bits at any index, for any batch size and any number of threads.
+//! ABA and M⁻¹ keep the layout of the passes: each entry is stored for all states of a group before the next entry.
+//! Lanes are independent, and each lane computes like a call for a single state at the same SIMD level. So the results
+//! of a state are bit-identical at any index, for any batch size and any number of threads.
 //!
-//! Each function is an entry of a table (`table.rs`). The entry calls the function for a single state, with lanes as
-//! its numbers.
+//! Each function is an entry of a table (`table.rs`). The entry calls the function for a single state, with a vector of
+//! lanes as its scalar type.
 
-/// Evaluates an expression for the variant of an `InLanes` or `Sets`; the expression is the same for all variants.
+/// Matches a value of `InLanes` or `Sets`, and evaluates the same expression for the content of any variant.
 macro_rules! each {
     ($Of:ident, $of:expr, $some:ident => $body:expr) => {
         match $of {
@@ -49,10 +49,10 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 
 /// Scratch and results for the computation of up to N states in one call, on one or several threads.
 ///
-/// Every function takes the arguments of the function of the same name for a single state, concatenated over all
-/// states: q has `states` · nq numbers. The number of states may change from call to call. Results are valid until the
-/// next call. `T` is `f64`, or `f32` with the feature `f32`. If a robot has no coordinates, the number of forces
-/// determines the number of states; without forces, the number of states is the capacity.
+/// Every function takes the arguments of the function of the same name for a single state, with the numbers of all
+/// states one after the other: q has `states` · nq numbers. The number of states may change from call to call. Results
+/// are valid until the next call. `T` is `f64`, or `f32` with the feature `f32`. If a robot has no coordinates, the
+/// number of forces determines the number of states; without forces, the number of states is the capacity.
 ///
 /// [`new`](Self::new) allocates the scratch of each thread, and a vector of nv numbers per state. A call allocates if
 /// its results need more memory than the results of all earlier calls. With more than one thread, rayon allocates too.
@@ -73,8 +73,8 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
-    /// Results that do not stay in lanes, one state after the other. Shape: states × shape of the result. Written by:
-    /// all functions.
+    /// Results that do not stay in lanes, stored one state after the other. Shape: states × shape of the result.
+    /// Written by: all functions.
     slots: [Vec<T>; MOST_RESULTS],
     last: Last,
 }
@@ -87,7 +87,7 @@ impl BatchNumber for f64 {}
 #[cfg(feature = "f32")]
 impl BatchNumber for f32 {}
 
-/// Groups of states, with the number of lanes that the vectors of the SIMD level have.
+/// Groups of states. The variant gives the number of lanes, which depends on the SIMD level.
 #[derive(Clone, Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
@@ -105,7 +105,7 @@ impl<T: Real> Batch<T> {
     /// Allocates a batch for up to `states` states at once, on `threads` threads.
     ///
     /// # Panics
-    /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
+    /// Panics if `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
     /// [`MOST_STATES`](Self::MOST_STATES).
     #[track_caller]
     pub fn new(model: &Model, states: usize, threads: usize) -> Self
@@ -128,12 +128,13 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// Returns a writer: its functions are the functions of a batch, but write the results to the caller's memory.
+    /// Returns a writer. It has the same functions as the batch, but these functions write the results to the caller's
+    /// memory.
     ///
-    /// `to` has one slice for each result of the function that is called, in the order of the fields of the result's
-    /// struct. Each slice holds the numbers of all states one after the other, matrices by rows. Results that are
-    /// written directly are not copied afterwards. If no argument determines the number of states, the length of the
-    /// slices determines it.
+    /// `to` has one slice for each result of the called function, in the order of the fields of the result struct. Each
+    /// slice receives the numbers of all states one after the other, matrices by rows. The passes write directly to
+    /// these slices, so results need no copy. If no argument determines the number of states, the length of the slices
+    /// determines this number.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -206,7 +207,7 @@ impl<T: Real> Batch<T> {
         }
         let inverse = P::KINDS.contains(&MINV) || given.iter().any(|one| one.name == "tau");
         if inverse || constraints.is_some() {
-            model.check_regular(); // before the lanes are entered, so that the panic names the caller's line
+            model.check_regular(); // before the code of the SIMD level runs, so that the panic names the caller's line
         }
         let rows = constraints.as_ref().map_or(0, |constraints| constraints.rows());
         let size = |&size: &usize| match size {

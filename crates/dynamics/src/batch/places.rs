@@ -47,20 +47,20 @@ impl<'a, T> Places<'a, T> {
 }
 
 impl<T> Places<'_, T> {
-    /// Writes a vector of each state.
+    /// Writes one vector per state to the next destination.
     #[inline(never)]
     pub(super) fn numbers<S: Block<Number = T>>(&mut self, x: &[S]) {
         scatter(x, self.states, &mut self.to[self.next][self.first * x.len()..][..self.states * x.len()]);
         self.next += 1;
     }
 
-    /// Writes a matrix of each state by rows, for a matrix with the given number of columns.
+    /// Writes one matrix per state by rows to the next destination. `columns` is the number of columns of each matrix.
     pub(super) fn columns<S: Block<Number = T>>(&mut self, x: &[S], columns: usize) {
         self.part(self.next, [0, 1], x, columns);
         self.next += 1;
     }
 
-    /// Writes a matrix of each state by rows. Matrices of this kind could also have stayed in lanes.
+    /// Writes one matrix per state by rows to the next destination, for a kind of matrix that could also stay in lanes.
     pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &Matrix<S>) {
         // The columns of a symmetric matrix equal its rows, so the numbers are copied in order.
         let columns = if SYMMETRIC.contains(&kind) { x.len() } else { x.ncols() };
@@ -93,7 +93,7 @@ impl<T> Places<'_, T> {
     }
 }
 
-/// Result of a single call, which can be written to the next destinations.
+/// Result of a function for a single state, which can be written to the next destinations.
 pub(super) trait Put<S: Block> {
     fn put(self, to: &mut Places<'_, S::Number>);
 }

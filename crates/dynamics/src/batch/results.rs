@@ -76,13 +76,13 @@ impl Last {
     }
 }
 
-/// Results of a batch, which are taken one after the other.
+/// Cursor over the results of a batch: each result is taken once, in order.
 pub(super) struct Taken<'b, T: Real> {
     pub batch: &'b Batch<T>,
     pub next: usize,
 }
 
-/// Type of results.
+/// Result type that can be taken from a batch.
 pub(super) trait Take<'b, T: Real> {
     /// Shapes of the results, if the type determines them. Otherwise, the function's entry in `table.rs` gives the
     /// shapes.
@@ -91,7 +91,7 @@ pub(super) trait Take<'b, T: Real> {
     fn take(from: &mut Taken<'b, T>) -> Self;
 }
 
-/// Numbers of each state, one state after the other.
+/// Vectors of all states, stored one state after the other.
 impl<'b, T: Real> Take<'b, T> for &'b [T] {
     fn take(from: &mut Taken<'b, T>) -> Self {
         let (k, Batch { slots, last, .. }) = (from.next, from.batch);
@@ -131,7 +131,7 @@ pub struct Matrices<'b, T: Real> {
 
 #[derive(Clone, Copy, Debug)]
 enum Stored<'b, T: Real> {
-    /// Matrices of the given kind, in the lanes in which the passes wrote them.
+    /// Matrices of the given kind, in the lanes to which the passes wrote these matrices.
     InLanes(&'b InLanes<T>, usize),
     /// Matrices of all states, one after the other, each by rows.
     ByRows(&'b [T]),
@@ -141,7 +141,7 @@ impl<'b, T: Real> Matrices<'b, T> {
     /// Returns the matrix of state k. [`to_owned`](StateMatrix::to_owned) copies it to a matrix of nalgebra.
     ///
     /// # Panics
-    /// If state k does not exist.
+    /// Panics if state k does not exist.
     #[track_caller]
     pub fn at(&self, k: usize) -> StateMatrix<'b, T> {
         check_state(k, self.states);
@@ -165,7 +165,7 @@ impl<'b, T: Real> Matrices<'b, T> {
     /// ```
     ///
     /// # Panics
-    /// If the length of `to` is not the number of entries of all states.
+    /// Panics if the length of `to` is not the number of entries of all states.
     #[track_caller]
     pub fn write_rows(&self, to: &mut [T]) {
         let [m, n] = self.shape;
@@ -206,7 +206,7 @@ impl<T: Real> Poses<'_, T> {
     /// Returns pose i of state k.
     ///
     /// # Panics
-    /// If state k or pose i does not exist.
+    /// Panics if state k or pose i does not exist.
     #[track_caller]
     pub fn at(&self, k: usize, i: usize) -> Se3<T> {
         check_state(k, self.states);
@@ -222,8 +222,8 @@ fn check_state(k: usize, states: usize) {
     check_index("k", k, states, "states");
 }
 
-/// Defines structs with the results of a batch, each from the struct of the function for a single state. The fields
-/// with the given names are written one after the other, to destinations with the shapes in brackets.
+/// Defines structs with the results of a batch. Each struct corresponds to the result struct of the function for a
+/// single state. The named fields are written one after the other, to destinations with the shapes in brackets.
 macro_rules! results {
     ($(
         $(#[$doc:meta])*

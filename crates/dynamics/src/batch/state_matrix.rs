@@ -1,7 +1,7 @@
 //! Matrix of one state of a batch: borrowed numbers with a shape and two strides.
 //!
-//! The type is not a view of nalgebra, because products with such views are unsafe: if the rows are not adjacent,
-//! nalgebra reads and writes out of bounds (nalgebra's issue 1616). Here every access is checked.
+//! The type is not a view of nalgebra, because products with such views are unsafe: if the rows are not adjacent in
+//! memory, nalgebra reads and writes out of bounds (nalgebra's issue 1616). `StateMatrix` checks every access.
 
 use super::state_matrix_operators::dot;
 use condyle_linalg::check;
@@ -28,7 +28,7 @@ use nalgebra::{DMatrix, Dim, Matrix, RawStorage, RawStorageMut, Scalar};
 /// assert!((M * &x - copy * x).amax() < 1e-14);
 /// ```
 pub struct StateMatrix<'b, T> {
-    /// Numbers of the batch; entry (i, j) of the matrix is number i · `strides[0]` + j · `strides[1]`.
+    /// Numbers that contain the entries; entry (i, j) of the matrix is number i · `strides[0]` + j · `strides[1]`.
     numbers: &'b [T],
     shape: [usize; 2],
     strides: [usize; 2],
@@ -48,7 +48,7 @@ impl<'b, T> StateMatrix<'b, T> {
     /// `numbers`.
     ///
     /// # Panics
-    /// If `numbers` is too short.
+    /// Panics if `numbers` is too short.
     #[track_caller]
     pub(super) fn new(numbers: &'b [T], shape: [usize; 2], strides: [usize; 2]) -> Self {
         let strides = strides.map(|stride| stride.max(1)); // 0 is possible for an empty matrix
@@ -110,7 +110,7 @@ impl<'b, T> StateMatrix<'b, T> {
     /// Returns row i, a matrix of one row.
     ///
     /// # Panics
-    /// If row i does not exist.
+    /// Panics if row i does not exist.
     #[track_caller]
     #[inline]
     pub fn row(&self, i: usize) -> Self {
@@ -120,7 +120,7 @@ impl<'b, T> StateMatrix<'b, T> {
     /// Returns column j, a matrix of one column.
     ///
     /// # Panics
-    /// If column j does not exist.
+    /// Panics if column j does not exist.
     #[track_caller]
     #[inline]
     pub fn column(&self, j: usize) -> Self {
@@ -130,7 +130,7 @@ impl<'b, T> StateMatrix<'b, T> {
     /// Returns `count` rows, starting with row `first`.
     ///
     /// # Panics
-    /// If one of these rows does not exist.
+    /// Panics if one of these rows does not exist.
     #[track_caller]
     #[inline]
     pub fn rows(&self, first: usize, count: usize) -> Self {
@@ -140,7 +140,7 @@ impl<'b, T> StateMatrix<'b, T> {
     /// Returns `count` columns, starting with column `first`.
     ///
     /// # Panics
-    /// If one of these columns does not exist.
+    /// Panics if one of these columns does not exist.
     #[track_caller]
     #[inline]
     pub fn columns(&self, first: usize, count: usize) -> Self {
@@ -150,7 +150,7 @@ impl<'b, T> StateMatrix<'b, T> {
     /// Returns the block of m × n entries whose first entry is (i, j).
     ///
     /// # Panics
-    /// If the block is not inside the matrix.
+    /// Panics if the block is not inside the matrix.
     #[track_caller]
     pub fn view(&self, (i, j): (usize, usize), (m, n): (usize, usize)) -> Self {
         let fits = |first: usize, count: usize, size: usize| first <= size && count <= size - first;
@@ -211,7 +211,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
     /// ```
     ///
     /// # Panics
-    /// If `to` has another shape.
+    /// Panics if `to` has another shape.
     #[track_caller]
     pub fn copy_to<R: Dim, C: Dim>(&self, to: &mut Matrix<T, R, C, impl RawStorageMut<T, R, C>>) {
         self.check_shape("to", to.shape());
@@ -223,7 +223,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
     /// Writes the entries by rows. Allocates nothing.
     ///
     /// # Panics
-    /// If the length of `to` is not the number of entries.
+    /// Panics if the length of `to` is not the number of entries.
     #[track_caller]
     pub fn write_rows(&self, to: &mut [T]) {
         check("to", to.len(), self.len());
@@ -244,7 +244,7 @@ impl<T: Real> StateMatrix<'_, T> {
     /// ```
     ///
     /// # Panics
-    /// If the number of rows of `x` is not the number of columns of M, or `out` does not have the shape of M x.
+    /// Panics if the number of rows of `x` is not the number of columns of M, or `out` does not have the shape of M x.
     #[track_caller]
     pub fn mul_to<R: Dim, C: Dim, P: Dim, Q: Dim>(
         &self,
@@ -265,7 +265,7 @@ impl<T: Real> StateMatrix<'_, T> {
     /// per row. Allocates nothing.
     ///
     /// # Panics
-    /// If `x` or `out` has the wrong length.
+    /// Panics if `x` or `out` has the wrong length.
     #[track_caller]
     pub fn mul_vector_to(&self, x: &[T], out: &mut [T]) {
         self.check_factor(x.len());
@@ -308,7 +308,7 @@ impl<T> Index<(usize, usize)> for StateMatrix<'_, T> {
     /// Returns the entry in row i and column j.
     ///
     /// # Panics
-    /// If the entry does not exist.
+    /// Panics if the entry does not exist.
     #[track_caller]
     #[inline]
     fn index(&self, (i, j): (usize, usize)) -> &T {

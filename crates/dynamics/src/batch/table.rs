@@ -5,14 +5,14 @@
 //! fn coriolis_matrix(model, data; q, v) -> Matrices<'_, T> [[NV, NV]] { coriolis_matrix(model, data, q, v) }
 //! ```
 //!
-//! into methods of that name for `Batch` and `BatchWriter`. The methods take and check the arguments of all states, and
-//! run the body on groups of states, one state per lane.
+//! into methods `coriolis_matrix` of `Batch` and `BatchWriter`. The methods take and check the arguments of all states,
+//! and run the body on groups of states, one state per lane.
 //!
 //! - The result of the body is written to destinations that have the shapes in brackets. The macro `results!` defines
 //!   the shapes of structs.
 //! - With `data => to`, the body writes to the destinations itself.
 //! - After the arguments of each state, an entry may list arguments that all states share, with types.
-//! - `with` names further scratch that the pass uses.
+//! - `with` names the scratch that the pass needs besides `Data`.
 //! - `columns` gives the value of `COLUMNS` in a shape.
 //! - `keeps` names matrices of `Data` that stay in lanes and are not copied to destinations. The last shapes in
 //!   brackets belong to these matrices. `BatchWriter` writes these matrices too.
@@ -24,21 +24,21 @@ use crate::passes::frames::{ReferenceFrame, check_body, check_frame};
 use crate::passes::passive::check_smoothing;
 use condyle_model::Model;
 
-/// Markers in shapes for sizes that depend on the robot.
+/// Placeholders in shapes for sizes that depend on the robot.
 pub(super) const NV: usize = usize::MAX;
 pub(super) const BODIES: usize = usize::MAX - 1;
 /// Number of inertial parameters: ten per body, except the world.
 pub(super) const PARAMETERS: usize = usize::MAX - 2;
 /// Number of constraint rows.
 pub(super) const ROWS: usize = usize::MAX - 3;
-/// Number of columns that an entry of `batched!` gives.
+/// Number of columns that the entry of the function gives with `columns`.
 pub(super) const COLUMNS: usize = usize::MAX - 4;
 
-/// Argument of a call, for all states.
+/// One argument of a call, with the numbers of all states.
 #[derive(Clone, Copy)]
 pub(super) struct Given<'a, T> {
     pub name: &'static str,
-    /// Index of the slot among the arguments of a pass.
+    /// Index of the argument's slot among the arguments of a pass.
     pub at: usize,
     pub numbers: &'a [T],
 }
@@ -111,7 +111,7 @@ impl Shared for Input {
     }
 }
 
-/// Writes the result of a pass to the next destinations, unless the pass has written it itself.
+/// Writes the result of a pass to the next destinations, unless the pass has already written the result.
 macro_rules! put {
     ($places:ident, $body:block) => {
         $crate::batch::places::Put::<S>::put($body, $places)
@@ -123,7 +123,7 @@ macro_rules! put {
 }
 pub(super) use put;
 
-/// Expands to the shapes of results. They are given by the entry of the function, or by the struct that the function
+/// Expands to the shapes of results. The function's entry gives the shapes, or else the struct that the function
 /// returns.
 macro_rules! shapes {
     ($Out:ty, [$([$($size:expr),*]),*]) => { &[$(&[$($size),*]),*] };
@@ -151,7 +151,7 @@ macro_rules! batched {
                 const KINDS: &'static [usize] = &[$($($kind),+)?];
 
                 #[inline(always)]
-                #[allow(unused_variables)] // some passes need no `Data` or keep their results
+                #[allow(unused_variables)] // some passes do not use `Data` or the destinations
                 fn run<S: condyle_spatial::block::Block<Number = T>>(self, s: States<'_, S>, to: &mut Places<'_, T>) {
                     let Self { $($($shared),*)? } = self;
                     let ($model, $data) = (s.model, s.data);
@@ -174,7 +174,7 @@ macro_rules! batched {
 
             /// Computes all states. If `written` is `None`, the results stay in the batch; otherwise they go to the
             /// caller's memory `written`.
-            #[allow(clippy::too_many_arguments)] // the arguments are those that the entry lists
+            #[allow(clippy::too_many_arguments)] // the entry of the function determines the number of arguments
             #[track_caller]
             pub(super) fn compute<T: condyle_spatial::block::Real>(
                 batch: &mut $crate::batch::Batch<T>,
@@ -216,8 +216,8 @@ macro_rules! batched {
             #[doc = concat!("Writes the results of [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ").")]
             ///
             /// # Panics
-            /// In the same cases as the method of [`Batch`](crate::Batch), or if `to` does not have one slice per
-            /// result, with the length of the result.
+            /// Panics in the same cases as the method of [`Batch`](crate::Batch), or if `to` does not have one slice
+            /// per result, with the length of the result.
             #[track_caller]
             pub fn $name(
                 &mut self,

@@ -24,7 +24,7 @@ use condyle_spatial::{Constant, Scalar};
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[inline(always)]
 #[track_caller]
 pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
@@ -54,7 +54,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -68,7 +68,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
 }
 
 /// Computes all terms of the equations of motion in two passes, in O(n · depth): M, h, Ag, dAg, hg, the centre of mass
-/// and the energies. The result also answers queries for poses and Jacobians of all frames.
+/// and the energies. The result also gives the poses and Jacobians of all frames on request.
 ///
 /// q: nq numbers; v: nv numbers. Up to rounding, the results equal the results of the separate calls
 /// [`crba`](crate::crba), [`nonlinear_effects`](crate::nonlinear_effects),
@@ -87,7 +87,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,

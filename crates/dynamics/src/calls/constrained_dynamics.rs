@@ -19,12 +19,12 @@ pub struct Constrained<'d, S> {
     /// Joint accelerations q̈, nv numbers (rad/s², m/s²).
     pub a: &'d [S],
     /// Forces λ of the constraints, one number per row of J (N, N m). Each force acts on the body of the constraint's
-    /// frame and is along the axes of the constraint's rows.
+    /// frame and is expressed in the axes of the constraint's rows.
     pub lambda: &'d [S],
     /// Largest absolute value in J q̈ + γ (m/s², rad/s²). It is 0 if the constraints are satisfied exactly.
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force (in f64, J M⁻¹ Jᵀ + μ 1
-    /// is singular to 13 digits). 0 means that the solution is unique.
+    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force. In f64, a row is
+    /// dependent if it makes J M⁻¹ Jᵀ + μ 1 singular to 13 digits. If the number is 0, the solution is unique.
     pub redundant: S,
 }
 
@@ -56,7 +56,7 @@ pub struct Constrained<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
@@ -119,14 +119,14 @@ pub struct ConstrainedEquations<'d, S> {
     pub redundant: S,
     /// Inertia matrix M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of M q̈ + h − Jᵀ λ per δ when q moves to q
-    /// ⊕ δ.
+    /// Derivative r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of M q̈ + h − Jᵀ λ per δ when q
+    /// moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
-    /// r_v = ∂h/∂v, nv × nv.
+    /// Derivative r_v = ∂h/∂v of the nonlinear effects h, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
-    /// c_q = ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
+    /// Derivative c_q = ∂(J q̈ + γ)/∂q of the constraint accelerations in the tangent space, rows × nv.
     pub dgamma_dq: &'d Matrix<S>,
-    /// c_v = ∂γ/∂v, rows × nv.
+    /// Derivative c_v = ∂γ/∂v of the constraint accelerations, rows × nv.
     pub dgamma_dv: &'d Matrix<S>,
 }
 
@@ -138,8 +138,8 @@ pub struct ConstrainedEquations<'d, S> {
 /// ```
 ///
 /// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves these equations. The linearised
-/// equations are for callers that eliminate other unknowns: no matrix is inverted, and all blocks keep the sparsity of
-/// the tree.
+/// equations are for callers that eliminate the unknowns themselves: no matrix is inverted, and all blocks keep the
+/// sparsity of the tree.
 ///
 /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (the force moves with the
 /// body), or empty for no forces. Targets of the constraints are fixed. Costs O(n · depth) in addition to the forward
@@ -157,7 +157,7 @@ pub struct ConstrainedEquations<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
@@ -213,19 +213,20 @@ pub struct ConstrainedDerivatives<'d, S> {
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space, nv × nv: the change of q̈ per δ when q moves
+    /// to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
-    /// ∂q̈/∂v, nv × nv.
+    /// Derivative ∂q̈/∂v of the joint accelerations, nv × nv.
     pub da_dv: &'d Matrix<S>,
-    /// ∂q̈/∂τ, nv × nv, symmetric.
+    /// Derivative ∂q̈/∂τ of the joint accelerations, nv × nv, symmetric.
     pub da_dtau: &'d Matrix<S>,
-    /// ∂λ/∂q in the tangent space, rows × nv.
+    /// Derivative ∂λ/∂q of the constraint forces in the tangent space, rows × nv.
     pub dlambda_dq: &'d Matrix<S>,
-    /// ∂λ/∂v, rows × nv.
+    /// Derivative ∂λ/∂v of the constraint forces, rows × nv.
     pub dlambda_dv: &'d Matrix<S>,
-    /// ∂λ/∂τ, rows × nv.
+    /// Derivative ∂λ/∂τ of the constraint forces, rows × nv.
     pub dlambda_dtau: &'d Matrix<S>,
-    /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: inertia of the robot along its constraints.
+    /// Inertia Λ = (J M⁻¹ Jᵀ)⁻¹ of the robot along its constraints, rows × rows.
     pub inertia: &'d Matrix<S>,
 }
 
@@ -237,9 +238,9 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// O((n + rows)² n) for the products with K⁻¹, the inverse of the constrained equations' matrix. The products skip the
 /// zeros of the tree. Allocates nothing.
 ///
-/// If constraints are redundant, the derivatives of q̈ are exact up to the residual. The derivatives of λ then satisfy
-/// the same choice as λ: for μ = 0, redundant rows have no force; for μ > 0, the solution is the smallest one. Source:
-/// Carpentier and Mansard (2018).
+/// If constraints are redundant, the derivatives of q̈ are exact up to the residual. The proximal parameter μ then
+/// selects the derivatives of λ, as it selects λ: for μ = 0, redundant rows have no force; for μ > 0, the solution has
+/// the smallest norm. Source: Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};
@@ -256,7 +257,7 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(

@@ -1,5 +1,5 @@
-//! Inverse dynamics under constraints: efforts and accelerations of the constraints for given motions and forces, and
-//! the derivatives of both.
+//! Inverse dynamics under constraints: joint efforts and constraint accelerations for a given motion and given
+//! constraint forces, with the derivatives of these results.
 
 use super::inverse_dynamics;
 use crate::constraints::constrained_dynamics::evaluate;
@@ -47,7 +47,7 @@ pub struct ConstrainedInverse<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` or `constraints` were made for another model.
+/// Panics if an argument has the wrong length, or `data` or `constraints` were made for another model.
 #[track_caller]
 pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -75,15 +75,16 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
     pub tau: &'d [S],
     /// Accelerations J q̈ + γ of the constraints, one number per row.
     pub acceleration: &'d [S],
-    /// ∂τ/∂q̈ = M, nv × nv, including armature.
+    /// Derivative ∂τ/∂q̈ = M of the joint efforts, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// ∂τ/∂q in the tangent space, nv × nv: the change of τ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂τ/∂q of the joint efforts in the tangent space, nv × nv: the change of τ per δ when q moves to q ⊕
+    /// δ.
     pub dtau_dq: &'d Matrix<S>,
-    /// ∂τ/∂v, nv × nv.
+    /// Derivative ∂τ/∂v of the joint efforts, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
-    /// ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
+    /// Derivative ∂(J q̈ + γ)/∂q of the constraint accelerations in the tangent space, rows × nv.
     pub dacceleration_dq: &'d Matrix<S>,
-    /// ∂(J q̈ + γ)/∂v, rows × nv.
+    /// Derivative ∂(J q̈ + γ)/∂v of the constraint accelerations, rows × nv.
     pub dacceleration_dv: &'d Matrix<S>,
 }
 
@@ -107,7 +108,7 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// Under the same conditions as [`constrained_inverse_dynamics`].
+/// Panics under the same conditions as [`constrained_inverse_dynamics`].
 #[track_caller]
 pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -144,8 +145,8 @@ pub struct EquationsAt<'d, S> {
     pub dgamma_dv: &'d Matrix<S>,
 }
 
-/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. Used at the knots of an optimal control
-/// problem, because the rollout of the problem has already computed q̈ and λ.
+/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. Optimal control calls this function at
+/// the knots of a trajectory, where the rollout has already computed q̈ and λ.
 #[doc(hidden)]
 #[track_caller]
 pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
@@ -186,7 +187,7 @@ fn differentiate<S: Scalar, R: Constant<S>>(
     differentiate_motion(constraints, world, &id.bodies);
 }
 
-/// Computes the efforts τ, for bodies whose placements are known.
+/// Computes the efforts τ. `data` must contain the placements of the bodies.
 fn inverse<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

@@ -19,8 +19,8 @@ use condyle_linalg::tree_product::neg_products;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 
-/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without external forces it is
-/// the derivative of [`gravity`](crate::gravity).
+/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without external forces,
+/// ∂τ/∂q is the derivative of [`gravity`](crate::gravity).
 ///
 /// q: nq numbers; f_ext: one force per body, in the body's frame (the force moves with the body), or empty for no
 /// forces. Returns the full nv × nv matrix (N m/rad, N/m); entry (i, j) is ∂τᵢ/∂q_j. Allocates nothing. Source: the
@@ -35,7 +35,7 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -66,7 +66,7 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -83,11 +83,11 @@ pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
 /// the derivatives with respect to other inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaDerivatives<'d, S, R = f64> {
-    /// ∂τ/∂q in the tangent space: the change of τ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂τ/∂q of the joint efforts in the tangent space: the change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
-    /// ∂τ/∂v.
+    /// Derivative ∂τ/∂v of the joint efforts.
     pub dtau_dv: &'d Matrix<S>,
-    /// ∂τ/∂a = M(q), including armature.
+    /// Derivative ∂τ/∂a = M(q) of the joint efforts, including armature.
     pub dtau_da: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
@@ -108,7 +108,7 @@ pub struct RneaDerivatives<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -138,15 +138,15 @@ pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
 
-/// Returns a view of the derivatives of inverse dynamics that the last call computed, body by body or with limbs in
-/// parallel lanes.
+/// Returns a view of the derivatives of inverse dynamics that the last call computed. That call ran body by body or
+/// with limbs in parallel lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
     let state = state(model, data, &d.qdd);
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
 }
 
-/// Returns the state of the last derivatives of τ, given its q̈.
+/// Returns the state at which the last call computed the derivatives of τ. `qdd` is q̈ in this state.
 fn state<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>, qdd: &'d [S]) -> State<'d, S, R> {
     let in_limbs = matches!(data.world.placed, PlacementCache::Limbs(_));
     let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
@@ -157,9 +157,9 @@ fn state<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>, qdd: &'d [S]) -> Stat
 /// Derivatives of the Coriolis product C(q, v) v, each a full nv × nv matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct CoriolisDerivatives<'d, S> {
-    /// ∂(C v)/∂q.
+    /// Derivative ∂(C v)/∂q of the Coriolis efforts.
     pub dq: &'d Matrix<S>,
-    /// ∂(C v)/∂v.
+    /// Derivative ∂(C v)/∂v of the Coriolis efforts.
     pub dv: &'d Matrix<S>,
 }
 
@@ -177,7 +177,7 @@ pub struct CoriolisDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -200,11 +200,11 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
 pub struct AbaDerivatives<'d, S, R = f64> {
     /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// ∂q̈/∂q in the tangent space: the change of q̈ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space: the change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
-    /// ∂q̈/∂v.
+    /// Derivative ∂q̈/∂v of the joint accelerations.
     pub da_dv: &'d Matrix<S>,
-    /// ∂q̈/∂τ = M(q)⁻¹.
+    /// Derivative ∂q̈/∂τ = M(q)⁻¹ of the joint accelerations.
     pub da_dtau: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
@@ -225,7 +225,7 @@ pub struct AbaDerivatives<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
@@ -259,7 +259,7 @@ pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &data.aba.qdd, f_ext, &[]);
     match data.methods.inverse {
         InverseMethod::ArticulatedBodies => {
-            minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
+            minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // factors of `aba`
         }
         method => minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da, method),
     }
@@ -272,7 +272,7 @@ pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes ∂q̈ = −M⁻¹ ∂τ with respect to q and v. Runs after `rnea_derivatives` and `minv`.
+/// Computes ∂q̈/∂x = −M⁻¹ ∂τ/∂x for x = q and x = v. Runs after `rnea_derivatives` and `minv`.
 fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let float_freely = out.float_freely(model);
@@ -301,7 +301,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another size.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another size.
 #[track_caller]
 pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -1,5 +1,5 @@
-//! State at which inverse dynamics was differentiated, with all quantities of the bodies that were computed for the
-//! derivatives.
+//! State at which inverse dynamics was differentiated. It includes all quantities of the bodies that the computation of
+//! the derivatives has left in `Data`.
 
 use crate::derivatives::rnea_derivatives::Workspace;
 use crate::lanes::limbs::LaneView;
@@ -9,13 +9,13 @@ use condyle_model::Model;
 use condyle_spatial::gate::{FusedF64, Rename};
 use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
 
-/// State at which inverse dynamics was differentiated, and the quantities of the bodies in this state.
+/// State at which inverse dynamics was differentiated, with the quantities of all bodies in this state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
-    /// Acceleration coordinates.
+    /// Joint accelerations q̈ in this state.
     pub qdd: &'d [S],
     /// Lanes that contain the quantities of the bodies. `None` if the bodies were computed one by one.
     pub limbs: Option<LaneView<'d>>,
@@ -30,7 +30,7 @@ impl<'d> Rename<State<'d, FusedF64, f64>> for State<'d, f64, f64> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Returns oXb, the pose of body b in the world. The body's frame is the frame that the URDF gives it.
+    /// Returns oXb, the pose of body b in the world. The body's frame is the link's frame in the URDF.
     #[inline(always)]
     pub(crate) fn pose(&self, b: usize) -> Se3<S> {
         if let Some(limbs) = self.limbs {
@@ -39,7 +39,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         Placements { model: self.model, world: self.world }.body(b)
     }
 
-    /// Returns column k of the matrix S of joint i.
+    /// Returns column k of the motion subspace S of joint i, in the world's frame.
     #[inline(always)]
     pub(crate) fn column(&self, i: usize, k: usize) -> Motion<S> {
         if let Some(limbs) = self.limbs {
@@ -58,7 +58,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         (self.pass.bodies.v[b], self.pass.bodies.a[b])
     }
 
-    /// Returns the inertia Iᶜ of all bodies that joint i carries.
+    /// Returns the composite inertia Iᶜ of all bodies that joint i carries.
     #[inline(always)]
     pub(crate) fn carried(&self, i: usize) -> Inertia<S> {
         if let Some(limbs) = self.limbs {

@@ -17,8 +17,8 @@ use condyle_spatial::{Constant, Force, Scalar};
 ///
 /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body (N, N m), at the body's origin and in the body's
 /// frame, or empty for no forces; index 0 is the world. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
-/// Featherstone (2008), table 7.1. If joints share a coordinate (mimic), the call uses a sparse factor of M, as
-/// [`forward_dynamics`] does with [`ForwardDynamicsMethod::Sparse`].
+/// Featherstone (2008), table 7.1. If joints share a coordinate (mimic), the function solves with a sparse factor of M,
+/// like [`ForwardDynamicsMethod::Sparse`].
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba, robots, rnea};
@@ -30,13 +30,13 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// assert!(back.iter().all(|&tau| f64::abs(tau - 1.0) < 1e-10));
 /// ```
 ///
-/// M may be singular at some positions only, for example if a point mass lies on the axis about which it turns. Such
-/// positions are not detected: the accelerations are then not finite, or mostly rounding errors. The same is true of
-/// all functions that need M⁻¹.
+/// M may be singular at some positions only, for example if a point mass lies on its joint's axis. Such positions are
+/// not detected: the accelerations are then not finite, or mostly rounding errors. All functions that need M⁻¹ have
+/// this limitation.
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular at every position
-/// ([`Model::singular_joints`]).
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular at every
+/// position ([`Model::singular_joints`]).
 #[track_caller]
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -55,7 +55,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     &data.aba.qdd
 }
 
-/// Computes q̈ body by body, and keeps the placements and the factors in `data`. The arguments must be valid.
+/// Computes q̈ body by body, and leaves the placements and the factors of ABA in `data`. The arguments must be valid.
 pub(crate) fn run_serially<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -107,7 +107,7 @@ impl ForwardDynamicsMethod {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
@@ -131,7 +131,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes forward dynamics with the dense or sparse factor of M.
+/// Computes forward dynamics by factorising M, as a dense or a sparse matrix.
 pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

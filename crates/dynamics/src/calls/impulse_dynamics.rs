@@ -18,7 +18,7 @@ pub struct Impulse<'d, S> {
     /// Velocity v⁺ after the impact, nv numbers (rad/s, m/s).
     pub v: &'d [S],
     /// Impulses Λ of the constraints, one number per row of J (N s, N m s). Each impulse acts on the body of the
-    /// constraint's frame and is along the axes of the constraint's rows.
+    /// constraint's frame and is expressed in the axes of the constraint's rows.
     pub lambda: &'d [S],
     /// Largest absolute value in J (v⁺ + ε v), with the restitution ε (m/s, rad/s).
     pub residual: S,
@@ -48,7 +48,7 @@ pub struct Impulse<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn impulse_dynamics<'d, S: Scalar, R: Constant<S>>(
@@ -110,15 +110,16 @@ pub struct ImpulseDerivatives<'d, S> {
     pub residual: S,
     /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ per δ when q moves to q ⊕ δ.
+    /// Derivative ∂v⁺/∂q of the velocity after the impact in the tangent space, nv × nv: the change of v⁺ per δ when q
+    /// moves to q ⊕ δ.
     pub dv_dq: &'d Matrix<S>,
-    /// ∂v⁺/∂v, nv × nv.
+    /// Derivative ∂v⁺/∂v of the velocity after the impact, nv × nv.
     pub dv_dv: &'d Matrix<S>,
-    /// ∂Λ/∂q in the tangent space, rows × nv.
+    /// Derivative ∂Λ/∂q of the impulses in the tangent space, rows × nv.
     pub dlambda_dq: &'d Matrix<S>,
-    /// ∂Λ/∂v, rows × nv.
+    /// Derivative ∂Λ/∂v of the impulses, rows × nv.
     pub dlambda_dv: &'d Matrix<S>,
-    /// (J M⁻¹ Jᵀ)⁻¹, rows × rows: inertia of the robot along its constraints.
+    /// Inertia (J M⁻¹ Jᵀ)⁻¹ of the robot along its constraints, rows × rows.
     pub inertia: &'d Matrix<S>,
 }
 
@@ -140,7 +141,7 @@ pub struct ImpulseDerivatives<'d, S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
+/// Panics if an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(

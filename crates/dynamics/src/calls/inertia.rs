@@ -1,4 +1,4 @@
-//! Joint-space inertia matrix and its inverse.
+//! Joint-space inertia matrix M, and the inverse of M.
 
 use super::limbs;
 use crate::data::Data;
@@ -25,7 +25,7 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
@@ -54,7 +54,7 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, `data` was made for a model of another tree, or M is singular
+/// Panics if `q` does not have nq numbers, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {

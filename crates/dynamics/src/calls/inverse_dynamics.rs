@@ -9,8 +9,8 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// Runs the recursive Newton–Euler algorithm: with limbs in parallel lanes if the robot has limbs, otherwise body by
-/// body.
+/// Runs the recursive Newton–Euler algorithm. Limbs are computed in parallel lanes if the robot has limbs; otherwise
+/// the algorithm runs body by body.
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     if !limbs::rnea(model, data, arguments) {
         let Arguments { q, v, x: a, f_ext } = arguments;
@@ -33,7 +33,7 @@ fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, argument
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -50,7 +50,7 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
 }
 
 /// Panics if an argument has the wrong length, or `data` was made for a model of another tree. `name` is the name of
-/// the argument `x` in the panic's message.
+/// the argument `x` in the message of the panic.
 #[inline]
 #[track_caller]
 pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str, arguments: Arguments<'_, S>) {
@@ -68,7 +68,7 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str
 /// q: nq numbers; v: nv numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -100,7 +100,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
@@ -130,7 +130,7 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -144,8 +144,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     &data.statics.tau
 }
 
-/// Computes the Coriolis matrix C(q, v) of the Christoffel symbols, in O(n · depth). It satisfies C v = h − g and C +
-/// Cᵀ = Ṁ, so Ṁ − 2C is skew.
+/// Computes the Coriolis matrix C(q, v) with the Christoffel symbols as coefficients, in O(n · depth). C satisfies C v
+/// = h − g and C + Cᵀ = Ṁ, so Ṁ − 2C is skew-symmetric.
 ///
 /// q: nq numbers; v: nv numbers. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing. Source:
 /// Echeandia and Wensing (2021), algorithm 1.
@@ -163,7 +163,7 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

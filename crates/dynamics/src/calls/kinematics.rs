@@ -10,8 +10,8 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Scalar, Se3, Vec3};
 
 impl<S: Scalar> Data<S> {
-    /// Returns the placements that the last call with this data computed, without computing them again. Returns `None`
-    /// if the last call computed no placements, as for [`rnea`](crate::rnea()).
+    /// Returns the placements that the last call with this data computed, without a new computation. Returns `None` if
+    /// the last call did not compute placements, for example [`rnea`](crate::rnea()).
     ///
     /// The model must have the same joints and frames as the model of the last call. Inertias and gravity may differ.
     ///
@@ -26,8 +26,8 @@ impl<S: Scalar> Data<S> {
     /// ```
     ///
     /// # Panics
-    /// If this data was made for a model of another tree, or the last call used a model with other placements of joints
-    /// or frames.
+    /// Panics if this data was made for a model of another tree, or the last call used a model with other placements of
+    /// joints or frames.
     #[track_caller]
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);
@@ -54,7 +54,7 @@ fn wrong_geometry(name: &str) -> ! {
     );
 }
 
-/// Computes the placements of all bodies, oXi = oXλ λXi(q), in O(n).
+/// Computes the placements of all bodies, oXi = oXλ λXi(q), in O(n). λ is the parent of body i.
 ///
 /// q: nq numbers. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 4.1.
 ///
@@ -69,7 +69,7 @@ fn wrong_geometry(name: &str) -> ! {
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -85,8 +85,9 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// Computes the Jacobian J of one frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
 ///
 /// q: nq numbers. The function needs no `Data` and visits only the joints between the frame and the world, in O(depth +
-/// nv). If several quantities are needed at one position, use [`Placements::frame_jacobian`]. It gives the same numbers
-/// up to rounding. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example 4.1.
+/// nv). If several quantities are needed at one position, use [`Placements::frame_jacobian`], which gives the same
+/// Jacobian up to rounding. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example
+/// 4.1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, forward_kinematics, frame_jacobian, robots};
@@ -100,7 +101,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, the frame does not exist, or `J` is not 6 × nv.
+/// Panics if `q` does not have nq numbers, the frame does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -112,8 +113,9 @@ pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     frame_jacobian_strided(model, q, frame, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
-/// Computes the Jacobian of [`frame_jacobian`] with any strides. `strides[0]` is the distance between rows, and
-/// `strides[1]` is the distance between columns. Used by languages that store matrices by rows.
+/// Computes the Jacobian like [`frame_jacobian`], and writes it with the given strides. `strides[0]` is the distance
+/// between rows, and `strides[1]` is the distance between columns. Bindings of languages that store matrices by rows
+/// call this function.
 #[doc(hidden)]
 #[track_caller]
 pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
@@ -129,8 +131,8 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
     jacobian_on(model, q, frame.body, frame.placement, reference, J, strides);
 }
 
-/// Computes the Jacobian J of one body, 6 × nv, like [`frame_jacobian`] for a frame. The body's frame is the frame that
-/// the URDF gives it.
+/// Computes the Jacobian J of one body, 6 × nv, like [`frame_jacobian`] for a frame. The body's frame is the link's
+/// frame in the URDF.
 ///
 /// ```
 /// use condyle_dynamics::{ReferenceFrame, body_jacobian, robots};
@@ -141,7 +143,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, the body does not exist, or `J` is not 6 × nv.
+/// Panics if `q` does not have nq numbers, the body does not exist, or `J` is not 6 × nv.
 #[track_caller]
 pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -153,7 +155,7 @@ pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     body_jacobian_strided(model, q, body, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
-/// Computes the Jacobian of [`body_jacobian`] with any strides, as in [`frame_jacobian_strided`].
+/// Computes the Jacobian like [`body_jacobian`], and writes it with strides as [`frame_jacobian_strided`] does.
 #[doc(hidden)]
 #[track_caller]
 pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
@@ -184,7 +186,8 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
     path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J, strides);
 }
 
-/// Computes the placements and velocities of all bodies, v_i = v_λ + S q̇, in O(n).
+/// Computes the placements and velocities of all bodies, v_i = v_λ + S q̇, in O(n). λ is the parent of body i, and S
+/// the motion subspace of its joint.
 ///
 /// q: nq numbers; v: nv numbers. Allocates nothing. Source: Featherstone (2008), table 5.1, in the world's frame.
 ///
@@ -199,7 +202,7 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -213,7 +216,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
 }
 
-/// Computes the placements, velocities and accelerations of all bodies, a_i = a_λ + S q̈ + Ṡ q̇, in O(n).
+/// Computes the placements, velocities and accelerations of all bodies, a_i = a_λ + S q̈ + Ṡ q̇, in O(n). λ is the
+/// parent of body i, and S the motion subspace of its joint.
 ///
 /// q: nq numbers; v, a: nv numbers each. Accelerations exclude gravity. Allocates nothing. Source: Featherstone (2008),
 /// table 5.1, in the world's frame.
@@ -230,7 +234,7 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,

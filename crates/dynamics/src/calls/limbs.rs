@@ -1,7 +1,7 @@
 //! Algorithms that compute the limbs of a robot in parallel lanes.
 //!
-//! Limbs are branches of the tree, such as legs and arms. A step computes bodies of different limbs at once, one limb
-//! per lane of a SIMD vector.
+//! Limbs are branches of the tree, such as legs and arms. A step of a pass computes one body of each limb at the same
+//! time, with one limb per lane of a SIMD vector.
 #![allow(unsafe_code)]
 
 use crate::data::Data;
@@ -18,7 +18,7 @@ use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Scalar};
 
 register_kernel! {
-    /// Computes the efforts τ, step by step.
+    /// Computes the joint efforts τ with the limbs in parallel lanes.
     fn rnea_by_steps<V>(
         model: &Model,
         plan: &Plan,
@@ -44,7 +44,7 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes the placements and the joint columns S of all steps.
+    /// Computes the placements of all bodies and the joint columns S, with the limbs in parallel lanes.
     pub(super) fn place_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
         let l = Limbs::new(plan, model);
         place(&l, &mut s.world, &s.q);
@@ -53,22 +53,22 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes M step by step. The placements of all steps must be known.
+    /// Computes M with the limbs in parallel lanes. `s.world` must contain the placements of all bodies.
     fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [FusedF64]) {
         crba::pass(&Limbs::new(plan, model), &s.world, &mut s.IC, M);
     }
 }
 
 register_kernel! {
-    /// Computes the factors U and 1/D of the articulated-body algorithm, step by step. The placements of all steps must
-    /// be known.
+    /// Computes the factors U and 1/D of the articulated-body algorithm, with the limbs in parallel lanes. `s.world`
+    /// must contain the placements of all bodies.
     fn factorize_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
         aba::factorize(&Limbs::new(plan, model), &s.world, &mut s.aba);
     }
 }
 
 register_kernel! {
-    /// Computes q̈ step by step. The placements of all steps must be known.
+    /// Computes q̈ with the limbs in parallel lanes. `s.world` must contain the placements of all bodies.
     fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [FusedF64]) {
         aba::pass(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, given(f_ext, &s.f_ext));
         scatter(plan, &s.aba.qdd, qdd);
@@ -85,8 +85,9 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes ∂τ/∂q, ∂τ/∂v and M step by step. The placements of all steps must be known. If `after_aba` is set, q̈
-    /// is the result of the articulated-body algorithm; otherwise it is an argument of the call.
+    /// Computes ∂τ/∂q, ∂τ/∂v and M with the limbs in parallel lanes. `s.world` must contain the placements of all
+    /// bodies. If `after_aba` is set, q̈ is the result of the articulated-body algorithm; otherwise q̈ is an argument
+    /// of the call.
     fn rnea_derivatives_by_steps<V>(
         model: &Model,
         plan: &Plan,
@@ -106,21 +107,21 @@ register_kernel! {
     }
 }
 
-/// Returns the external forces on the bodies of all steps, or an empty slice if there are no forces.
+/// Returns `f_ext`, or an empty slice if the call has no external forces.
 #[inline(always)]
 fn given<T>(some: bool, f_ext: &[T]) -> &[T] {
     if some { f_ext } else { &[] }
 }
 
-/// Returns the plan of the limbs, if the model and `data` have limbs in parallel lanes and the processor supports the
-/// vectors.
+/// Returns the plan for computing limbs in parallel lanes. Returns `None` if the model or `data` does not have such
+/// limbs, or the processor does not support the vectors.
 #[inline]
 pub(crate) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
     let (Some(plan), Some(scratch)) = (&model.limbs(), &data.limbs) else { return None };
     (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
-/// Model, plan, scratch in lanes and other data of a call, all of `f64`.
+/// Model, plan and scratch of a call, all with `f64` as the scalar type.
 struct Call<'a> {
     model: &'a Model,
     plan: &'a Plan,
@@ -133,7 +134,7 @@ struct Call<'a> {
     rnea_derivatives: &'a mut rnea_derivatives::Workspace<f64>,
 }
 
-/// Returns the parts of a call and its arguments, if the model and `data` have limbs in parallel lanes.
+/// Returns the call and its arguments as `f64`, or `None` if the model or `data` does not have limbs in parallel lanes.
 #[inline]
 fn call<'a, S: Scalar, R: Constant<S>>(
     model: &'a Model<R>,
@@ -148,7 +149,8 @@ fn call<'a, S: Scalar, R: Constant<S>>(
     Some((call, arguments))
 }
 
-/// Does as [`call`], for algorithms that do not support joints that share a coordinate.
+/// Returns the same as [`call`], but `None` if joints share a coordinate. Used by algorithms that do not support shared
+/// coordinates.
 #[inline]
 fn call_without_mimic<'a, S: Scalar, R: Constant<S>>(
     model: &'a Model<R>,
@@ -159,27 +161,27 @@ fn call_without_mimic<'a, S: Scalar, R: Constant<S>>(
 }
 
 impl Call<'_> {
-    /// Loads the arguments and computes the placements of all steps.
+    /// Loads the arguments into lanes and computes the placements of all bodies.
     fn place(&mut self, arguments: Arguments<'_>) {
         load_steps(self.plan, self.s, arguments);
         self.place_loaded();
     }
 
-    /// Loads the arguments of forward dynamics and computes the placements of all steps.
+    /// Loads the arguments of forward dynamics into lanes and computes the placements of all bodies.
     fn place_free(&mut self, arguments: Arguments<'_>) {
         load_free(self.model, self.plan, self.s, self.aba, arguments);
         self.place_loaded();
     }
 
-    /// Computes the placements of all steps, for arguments that are loaded.
+    /// Computes the placements of all bodies from arguments that are already in lanes.
     fn place_loaded(&mut self) {
         place_steps(self.model, self.plan, self.s);
         self.world.placed = PlacementCache::Limbs(self.model.geometry_hash());
     }
 }
 
-/// Computes [`rnea`](crate::rnea) with the limbs in parallel lanes, if the model and `data` have them. Returns whether
-/// it ran. This also holds for the functions below. The arguments must be valid.
+/// Computes [`rnea`](crate::rnea) with the limbs in parallel lanes, and returns true. Returns false if the model or
+/// `data` does not have such limbs. The arguments must be valid.
 #[inline]
 pub(crate) fn rnea<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -194,7 +196,8 @@ pub(crate) fn rnea<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// Computes [`aba`](crate::aba()).
+/// Computes [`aba`](crate::aba()) with the limbs in parallel lanes, and returns true; returns false if this is not
+/// possible.
 #[inline]
 pub(crate) fn aba<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -207,7 +210,8 @@ pub(crate) fn aba<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// Computes [`crba`](crate::crba()).
+/// Computes [`crba`](crate::crba()) with the limbs in parallel lanes, and returns true; returns false if this is not
+/// possible.
 #[inline]
 pub(crate) fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> bool {
     let Some((mut c, arguments)) = call_without_mimic(model, data, Arguments::position(q)) else { return false };
@@ -216,7 +220,8 @@ pub(crate) fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<
     true
 }
 
-/// Computes [`minv`](crate::minv()).
+/// Computes [`minv`](crate::minv()) with the limbs in parallel lanes, and returns true; returns false if this is not
+/// possible.
 #[inline]
 pub(crate) fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> bool {
     let Some((mut c, arguments)) = call_without_mimic(model, data, Arguments::position(q)) else { return false };
@@ -226,7 +231,8 @@ pub(crate) fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<
     true
 }
 
-/// Computes [`rnea_derivatives`](crate::rnea_derivatives()).
+/// Computes [`rnea_derivatives`](crate::rnea_derivatives()) with the limbs in parallel lanes, and returns true; returns
+/// false if this is not possible.
 #[inline]
 pub(crate) fn rnea_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -261,8 +267,8 @@ pub(crate) fn aba_derivatives<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// Loads the arguments of forward dynamics into lanes, with efforts from which the bias of free joints with armature is
-/// subtracted.
+/// Loads the arguments of forward dynamics into lanes. The bias efforts of free joints with armature are subtracted
+/// from τ.
 pub(super) fn load_free(
     model: &Model,
     plan: &Plan,
@@ -278,7 +284,7 @@ pub(super) fn load_free(
     load_steps(plan, s, Arguments { x: effort, ..arguments });
 }
 
-/// Copies the placements and joint columns that the last call computed in lanes to the arrays of single bodies.
+/// Copies the placements and joint columns that the last call computed in lanes to the arrays with one entry per body.
 pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let Some(plan) = ready(model, data) else { return };
     let Data { limbs: Some(scratch), world: World { oX, S: columns, placed, .. }, .. } = data else { return };

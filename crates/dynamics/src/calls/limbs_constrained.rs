@@ -17,7 +17,7 @@ use condyle_spatial::{Constant, Scalar};
 use condyle_spatial::{kernel, register_kernel};
 
 register_kernel! {
-    /// Runs the inward pass of the articulated-body algorithm. The placements of all steps must be known.
+    /// Runs the inward pass of the articulated-body algorithm. `s.world` must contain the placements of all bodies.
     fn articulate<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool) {
         let f_ext = if f_ext { &s.f_ext[..] } else { &[] };
         aba::inward(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, f_ext);
@@ -64,11 +64,11 @@ register_kernel! {
         for r in 0..set.lambda.len() {
             lanes.all.x[r] = set.lambda[r].0;
         }
-        // SAFETY: the elements are vectors.
+        // SAFETY: the elements of `u` consist only of vectors of numbers.
         lanes.push(plan, &set.plans, unsafe { numbers_mut(&mut s.aba.u) });
         aba::outward(&Limbs::new(plan, model), &s.world, &mut s.aba);
         scatter(plan, &s.aba.qdd, qdd);
-        // SAFETY: motions consist of vectors.
+        // SAFETY: the motions in `a` consist only of vectors of numbers.
         let a = unsafe { numbers(&s.aba.a) };
         for (of, constraint) in lanes.rows.iter().zip(&set.plans) {
             let [one, other] = constraint.bodies;
@@ -80,8 +80,8 @@ register_kernel! {
     }
 }
 
-/// Computes constrained dynamics with limbs in parallel lanes, if the model, `data` and `constraints` support this.
-/// Returns whether constrained dynamics was computed.
+/// Computes constrained dynamics with limbs in parallel lanes, and returns true. Returns false if the model, `data` or
+/// `constraints` does not support this.
 #[inline]
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -1,8 +1,8 @@
 //! Derivatives of inverse and forward dynamics with respect to inputs other than q, v, a and τ.
 //!
 //! Inverse dynamics is linear in external forces, inertial parameters, armature, damping, friction and gravity. So the
-//! derivative of τ with respect to such an input is a matrix B. Its entries come from quantities that the computation
-//! of the derivatives with respect to q and v leaves in the data:
+//! derivative of τ with respect to such an input is a matrix B. The entries of B follow from quantities that remain in
+//! `Data` after the derivatives with respect to q and v are computed:
 //!
 //! ```text
 //! ∂τ/∂f_b = −J_bᵀ                        ∂τ_c/∂π_b = y(S_c, a_b) − y(v_b × S_c, v_b)     (regressor.rs)
@@ -68,7 +68,7 @@ impl Input {
     }
 }
 
-/// Destination of the entries of B: the matrix `out`, which is B, or −M⁻¹ B if `Minv` is given.
+/// Destination of the entries of B. The matrix `out` becomes B, or −M⁻¹ B if `Minv` is given.
 struct Entries<'e, S> {
     out: &'e mut [S],
     Minv: Option<&'e Matrix<S>>,
@@ -83,7 +83,7 @@ impl<S: Scalar> Entries<'_, S> {
         match self.Minv {
             None => out[row] += x,
             Some(Minv) => {
-                let by_row = &Minv.as_slice()[row * self.nv..(row + 1) * self.nv]; // symmetric: a column is a row
+                let by_row = &Minv.as_slice()[row * self.nv..(row + 1) * self.nv]; // row of M⁻¹: equal to its column
                 for i in 0..self.nv {
                     out[i] -= by_row[i] * x; // −M⁻¹ B
                 }
@@ -159,8 +159,9 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Adds the entries of B for damping, or for friction if a smoothing is given, to `to`. A free joint's losses x act
-    /// along the axes of its parent. Along the body's axes, B is Rᵀ diag(x(R v)) with the rotation R of the joint.
+    /// Adds the entries of B for damping, or for friction if a smoothing is given, to `to`. The damping and friction
+    /// efforts x of a free joint act along the axes of its parent. Along the body's axes, B is Rᵀ diag(x(R v)) with the
+    /// rotation R of the joint.
     #[inline(always)]
     fn losses(&self, smoothing: Option<f64>, to: &mut Entries<'_, S>) {
         let (model, qd) = (self.model, &self.pass.qd[..]);
@@ -239,8 +240,8 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `dtau` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the world, or
-    /// the input's smoothing is not positive.
+    /// Panics if `dtau` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the
+    /// world, or the input's smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, dtau: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "dtau", dtau.shape());
@@ -271,8 +272,8 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `da` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the world, or
-    /// the input's smoothing is not positive.
+    /// Panics if `da` is not nv × [`Input::len`], the input's body does not exist, the input is the inertia of the
+    /// world, or the input's smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, da: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "da", da.shape());

@@ -28,7 +28,7 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -60,7 +60,7 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -90,7 +90,7 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
+/// Panics if `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

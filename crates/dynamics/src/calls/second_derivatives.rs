@@ -18,13 +18,13 @@ use nalgebra::DMatrix;
 /// The matrices are blocks of the Hessian of φ(q ⊕ δ, v + δv, a + δa) at δ = 0, δv = 0 and δa = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaHessian<'d, S, R = f64> {
-    /// ∂²φ/∂q∂q, symmetric.
+    /// Second derivatives ∂²φ/∂q∂q, symmetric.
     pub dqdq: &'d Matrix<S>,
-    /// ∂²φ/∂v∂q: entry (j, k) is ∂²φ/∂v_j∂q_k.
+    /// Second derivatives ∂²φ/∂v∂q: entry (j, k) is ∂²φ/∂v_j∂q_k.
     pub dvdq: &'d Matrix<S>,
-    /// ∂²φ/∂v∂v, symmetric.
+    /// Second derivatives ∂²φ/∂v∂v, symmetric.
     pub dvdv: &'d Matrix<S>,
-    /// ∂²φ/∂a∂q, the derivative of M λ with respect to q: entry (j, k) is ∂²φ/∂a_j∂q_k.
+    /// Second derivatives ∂²φ/∂a∂q, the derivative of M λ with respect to q: entry (j, k) is ∂²φ/∂a_j∂q_k.
     pub dadq: &'d Matrix<S>,
     /// First derivatives of τ, which the same call computes.
     pub first: RneaDerivatives<'d, S, R>,
@@ -54,7 +54,7 @@ pub struct RneaHessian<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -78,15 +78,15 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
 /// Second derivatives of τ = rnea(q, v, a): one Hessian per effort, 4 nv³ numbers.
 #[derive(Clone, Debug)]
 pub struct RneaSecondDerivatives<S> {
-    /// ∂²τ_i/∂q∂q for each i, symmetric.
+    /// Second derivatives ∂²τ_i/∂q∂q for each i, symmetric.
     pub dqdq: Vec<DMatrix<S>>,
-    /// ∂²τ_i/∂v∂q for each i: entry (j, k) is ∂²τ_i/∂v_j∂q_k.
+    /// Second derivatives ∂²τ_i/∂v∂q for each i: entry (j, k) is ∂²τ_i/∂v_j∂q_k.
     pub dvdq: Vec<DMatrix<S>>,
-    /// ∂²τ_i/∂v∂v for each i, symmetric.
+    /// Second derivatives ∂²τ_i/∂v∂v for each i, symmetric.
     pub dvdv: Vec<DMatrix<S>>,
-    /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
+    /// Second derivatives ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
     pub dadq: Vec<DMatrix<S>>,
-    /// Scratch for the unit vector of each effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
+    /// Scratch for the unit vector that selects an effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
     lambda: Array<S>,
 }
 
@@ -103,7 +103,7 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
 ///
 /// q: nq numbers; v, a: nv numbers each; f_ext: one force per body, in the body's frame, or empty for no forces; out:
 /// the tensors, overwritten. Allocates nothing. Solvers usually need only the tensors contracted with a vector, which
-/// [`rnea_hessian`] computes. This function contracts with each unit vector.
+/// [`rnea_hessian`] computes. This function calls the contraction once for each unit vector.
 ///
 /// ```
 /// use condyle_dynamics::{Data, RneaSecondDerivatives, rnea_second_derivatives, robots};
@@ -116,7 +116,7 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `data` or `out` was made for a model of another tree.
+/// Panics if an argument has the wrong length, or `data` or `out` was made for a model of another tree.
 #[track_caller]
 pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -136,8 +136,8 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     });
 }
 
-/// Computes the matrices of [`rnea_hessian`] for each unit vector, and calls `give` with the index of the unit vector
-/// and the matrices. `lambda` is scratch.
+/// Computes the matrices of [`rnea_hessian`] for λ equal to each unit vector. Calls `give` with the index of the unit
+/// vector and the matrices. `lambda` is scratch.
 #[track_caller]
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -163,13 +163,13 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
 /// The matrices are blocks of the Hessian of ψ(q ⊕ δ, v + δv, τ + δτ) at δ = 0, δv = 0 and δτ = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct AbaHessian<'d, S, R = f64> {
-    /// ∂²ψ/∂q∂q, symmetric.
+    /// Second derivatives ∂²ψ/∂q∂q, symmetric.
     pub dqdq: &'d Matrix<S>,
-    /// ∂²ψ/∂v∂q: entry (j, k) is ∂²ψ/∂v_j∂q_k.
+    /// Second derivatives ∂²ψ/∂v∂q: entry (j, k) is ∂²ψ/∂v_j∂q_k.
     pub dvdq: &'d Matrix<S>,
-    /// ∂²ψ/∂v∂v, symmetric.
+    /// Second derivatives ∂²ψ/∂v∂v, symmetric.
     pub dvdv: &'d Matrix<S>,
-    /// ∂²ψ/∂τ∂q, the derivative of M⁻¹ λ with respect to q: entry (j, k) is ∂²ψ/∂τ_j∂q_k.
+    /// Second derivatives ∂²ψ/∂τ∂q, the derivative of M⁻¹ λ with respect to q: entry (j, k) is ∂²ψ/∂τ_j∂q_k.
     pub dtaudq: &'d Matrix<S>,
     /// q̈ and the first derivatives of q̈, which the same call computes.
     pub first: AbaDerivatives<'d, S, R>,
@@ -193,7 +193,7 @@ pub struct AbaHessian<'d, S, R = f64> {
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
+/// Panics if an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(

@@ -1,8 +1,8 @@
 //! Analytical derivatives of forward dynamics under constraints.
 //!
-//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. These equations are linear in (q̈, −λ), with a
-//! matrix K. Their derivatives are linear equations with the same K. Let r = ∂(M q̈ + h − Jᵀ λ)/∂x and c = ∂(J q̈ +
-//! γ)/∂x at fixed q̈ and λ, for x = q or v. With the blocks of K⁻¹:
+//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. These two equations are linear in (q̈, −λ), with a
+//! matrix K. The derivatives of the equations are linear equations with the same matrix K. Let r = ∂(M q̈ + h − Jᵀ
+//! λ)/∂x and c = ∂(J q̈ + γ)/∂x at fixed q̈ and λ, for x = q or v. With the blocks of K⁻¹:
 //!
 //! ```text
 //! K⁻¹ = [ P    J̄  ]      Λ = (J M⁻¹ Jᵀ)⁻¹,   J̄ = M⁻¹ Jᵀ Λ,   P = M⁻¹ − J̄ J M⁻¹
@@ -25,11 +25,11 @@ use core::ops::Range;
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// Sum of all external and constraint forces on each body, in the frame of the body. Written by: `load`.
+        /// Sum of all external forces and constraint forces on each body, in the body's frame. Written by: `load`.
         pub forces: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// M⁻¹, then the block P of K⁻¹. Written by: `invert`.
+        /// Matrix M⁻¹, which the block P of K⁻¹ overwrites. Written by: `invert`.
         pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂(M q̈ + h − Jᵀ λ)/∂q. Written by: `turn`.
+        /// Derivative ∂(M q̈ + h − Jᵀ λ)/∂q of the equations of motion. Written by: `turn`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Derivatives of q̈, or of the velocity after an impact. Written by: `constrained_dynamics_derivatives`,
         /// `impulse_dynamics_derivatives`.
@@ -120,8 +120,8 @@ pub(crate) enum By {
 same_layout!(By);
 
 kernel! {
-    /// Computes the derivatives −P r − J̄ c of q̈ and J̄ᵀ r − Λ c of λ, in the entries that may be nonzero. Inputs are
-    /// the blocks of K⁻¹, r, and the set's c.
+    /// Computes the derivatives −P r − J̄ c of q̈ and J̄ᵀ r − Λ c of λ, but only the entries that may be nonzero.
+    /// Inputs are the blocks of K⁻¹, r, and the matrix c of the set.
     pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &Matrix<S>, r: &Matrix<S>, da: &mut Matrix<S>) {
         let ConstraintSet { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, .. } = set;
         let (c, dlambda) = match by {
@@ -132,7 +132,7 @@ kernel! {
         for island in islands {
             let columns = &island.coordinates;
             island.clear_beside(da.as_mut_slice(), n, S::zero());
-            // This product and the next one compute da = −P r − J̄ c.
+            // This product −P r and the product with J̄ below sum to da = −P r − J̄ c.
             minus_block_product(P.as_slice(), r.as_slice(), da.as_mut_slice(), nonzero_rows, columns.clone());
             if island.rows.is_empty() {
                 continue;

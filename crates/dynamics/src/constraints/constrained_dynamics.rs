@@ -1,7 +1,7 @@
 //! Forward dynamics under constraints.
 //!
-//! Gauss's principle: among all accelerations with J q̈ + γ = 0, the robot has the acceleration that is nearest, in the
-//! metric of M, to its acceleration without constraints. With the forces λ of the constraints,
+//! Gauss's principle determines q̈: among all accelerations with J q̈ + γ = 0, the robot has the one nearest to its
+//! acceleration without constraints. The distance is measured in the metric of M. With the forces λ of the constraints,
 //!
 //! ```text
 //! [ M   Jᵀ ] [  q̈ ]   [ τ − h ]         J M⁻¹ Jᵀ λ = −(γ + J M⁻¹ (τ − h)),
@@ -27,12 +27,12 @@ use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, S
 workspace! {
     /// Scratch of constrained dynamics, in the world's frame.
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Velocity. Written by: `bias`.
+        /// Velocity of each body. Written by: `bias`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
         /// `bias`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Composite inertias Iᶜ. Written by: `bias`, `inertia`.
+        /// Composite inertia Iᶜ of each body. Written by: `bias`, `inertia`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// Force that each joint transmits for q̈ = 0. Written by: `bias`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
@@ -40,7 +40,7 @@ workspace! {
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Sparse factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub factor: Ltdl<S> = Ltdl::new(model),
-        /// Bias efforts h, then τ − h. Written by: `bias`, `constrained_dynamics`.
+        /// Bias efforts h, which the difference τ − h overwrites. Written by: `bias`, `constrained_dynamics`.
         pub effort: Array<S> = filled(S::zero, size.nv),
         /// Joint accelerations, or changes of the joint velocities in an impact. Written by: `constrained_dynamics`,
         /// `impulse_dynamics`.
@@ -48,8 +48,8 @@ workspace! {
     }
 }
 
-/// Computes M, h and the bodies' motion for q̈ = 0, for bodies whose placements are known. The Newton–Euler algorithm
-/// and the composite-rigid-body algorithm run together, in one pass to the tips and one pass back.
+/// Computes M, h and the motion of all bodies for q̈ = 0. `w` must contain the placements of the bodies. The
+/// Newton–Euler algorithm and the composite-rigid-body algorithm run together, in one outward and one inward pass.
 #[inline(always)]
 fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let Workspace { v, a, IC, F, M, effort, .. } = d;
@@ -79,7 +79,7 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Adds J x to y, where x has one number per coordinate and y one per row.
+    /// Adds J x to y, where x has one number per coordinate, and y has one number per row of J.
     #[inline(always)]
     pub(crate) fn add_motion(&self, x: &[S], y: &mut [S]) {
         for plan in &self.plans {
@@ -113,12 +113,12 @@ impl<S: Scalar> ConstraintSet<S> {
         residual
     }
 
-    /// Returns the force of constraint k from the last call, at the origin of the constraint's frame, along the axes of
-    /// its `reference`. Only rigid constraints have a moment. The force acts on the body of the frame. The opposite
-    /// force acts on the other body or the world.
+    /// Returns the force of constraint k from the last call, at the origin of the constraint's frame. The force is
+    /// expressed in the axes of the constraint's `reference`. Only rigid constraints have a moment. The force acts on
+    /// the body of the frame. The opposite force acts on the other body or the world.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force(&self, k: usize) -> Force<S> {
@@ -137,7 +137,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes the inertia matrix M and τ − h, for bodies whose placements are known.
+    /// Computes the inertia matrix M and the efforts τ − h. `world` must contain the placements of the bodies.
     pub(crate) fn equations<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -155,7 +155,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes only the inertia matrix M, for bodies whose placements are known.
+    /// Computes only the inertia matrix M. `world` must contain the placements of the bodies.
     pub(crate) fn inertia<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let l = Single::new(model);
         for i in l.bodies() {
@@ -166,15 +166,15 @@ kernel! {
 }
 
 kernel! {
-    /// Factorises M.
+    /// Factorises the inertia matrix M.
     pub(crate) fn factorize<S>(d: &mut Workspace<S>) {
         d.factor.factorize(&d.M);
     }
 }
 
 kernel! {
-    /// Computes J and J q̈ + γ from the velocities v and accelerations a of the bodies. If a are the accelerations for
-    /// q̈ = 0, J q̈ + γ is γ.
+    /// Computes J and J q̈ + γ from the velocities v and accelerations a of the bodies. If a are the accelerations of
+    /// the bodies for q̈ = 0, the result J q̈ + γ is γ.
     pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
         for (i, plan) in set.plans.iter().enumerate() {
             let target = &set.targets[i];
@@ -189,7 +189,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the forces λ and the acceleration x for given efforts, so that J x + γ = 0. M must be factorised.
+    /// Computes the constraint forces λ and the joint accelerations x for given efforts, so that J x + γ = 0. M must be
+    /// factorised.
     pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
         x.copy_from_slice(effort);
         factor.solve(x); // M⁻¹ (τ − h)
@@ -214,7 +215,7 @@ kernel! {
 }
 
 kernel! {
-    /// Raises `largest` to the largest absolute value in `of`, if that value is larger.
+    /// Sets `largest` to the maximum of `largest` and all absolute values in `of`.
     pub(crate) fn largest<S>(of: &[S], largest: &mut S) {
         for &x in of {
             *largest = S::select(largest.lt(x.abs()), x.abs(), *largest);

@@ -6,20 +6,22 @@ use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, same_layout};
 use core::any::Any;
 
-/// Kind of constraint: which motions of a frame it prevents.
+/// Kind of a constraint. The kind determines which motions of a frame the constraint prevents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum ConstraintKind {
-    /// The origin of a frame is held: three rows; λ is a force.
+    /// Point constraint: the origin of a frame is held. The constraint has three rows, and λ is a force.
     Point,
-    /// The origin of a frame is held along one axis, the third column of [`axes`](ContactConstraint::axes): one row.
+    /// Line constraint: the origin of a frame is held along one axis, the third column of
+    /// [`axes`](ContactConstraint::axes). The constraint has one row.
     Line,
-    /// The origin of a frame is held along two axes, the first and the third column of
-    /// [`axes`](ContactConstraint::axes): two rows.
+    /// Plane constraint: the origin of a frame is held along two axes, the first and the third column of
+    /// [`axes`](ContactConstraint::axes). The constraint has two rows.
     Plane,
-    /// The whole frame is held: six rows, linear first; λ is a force and a moment.
+    /// Rigid constraint: the whole frame is held. The constraint has six rows, linear first, and λ is a force and a
+    /// moment.
     Rigid,
 }
 
@@ -59,7 +61,7 @@ impl<S: Scalar> Target<S> {
         Self { placement: Se3::identity(), velocity: Motion::zero(), acceleration: Motion::zero() }
     }
 
-    /// Returns a message if the target's scalars are `f64` and the target is invalid.
+    /// Returns an error message if the target's scalars are `f64` and the target is invalid; otherwise returns `None`.
     pub(crate) fn wrong(&self) -> Option<&'static str> {
         let Target { placement: X, velocity, acceleration } = (self as &dyn Any).downcast_ref::<Target<f64>>()?;
         let motions = velocity.to_array().into_iter().chain(acceleration.to_array());
@@ -82,32 +84,33 @@ impl<S: Scalar> Target<S> {
     }
 }
 
-/// Contact of a frame with the world, or a loop that two frames close.
+/// Constraint of a contact between a frame and the world, or of a kinematic loop that two frames close.
 ///
-/// Frame 1 is `frame`. Frame 2 is at the target's placement in the other frame. Let X = ₂X₁ be the pose of frame 1 in
-/// frame 2, p₁ and p₂ the origins of both, and v and a the velocity and acceleration of frame 1 relative to the other
-/// body. The target has the velocity v* and acceleration a*. The constraint requires
+/// Frame 1 is `frame`. Frame 2 is at the target's placement in the other frame. X = ₂X₁ is the pose of frame 1 in frame
+/// 2; p₁ and p₂ are the origins of the two frames. v and a are the velocity and acceleration of frame 1 relative to the
+/// other body; v* and a* are the target's velocity and acceleration. The constraint requires
 ///
 /// ```text
 /// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), the axes of frame 1 applied to p₁ − p₂ (point)
 /// ```
 ///
-/// This is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0. All quantities
-/// are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the world
-/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The force λ of the constraint is expressed in the same
-/// way. It acts on the body of `frame`, and the force −λ acts on the other body or the world.
+/// The equation above is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0.
+/// All quantities are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the
+/// world ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The force λ of the constraint is expressed in the
+/// same axes. λ acts on the body of `frame`, and −λ acts on the other body or the world.
 ///
 /// The acceleration of a point is its classical acceleration, and the acceleration of a rigid frame is its spatial
 /// acceleration. For a rigid loop in `Local`, a is the rate of the six numbers of v. For a rigid loop in
 /// `LocalWorldAligned`, a is the difference of the two spatial accelerations; both definitions agree if v = 0. Signs,
 /// gains and axes agree with Pinocchio's `RigidConstraintModel`, whose second placement is the other frame's placement
-/// times the target. For contacts they also agree with Crocoddyl's `ContactModel3D` and `ContactModel6D`.
+/// times the target. For contacts, signs, gains and axes also agree with Crocoddyl's `ContactModel3D` and
+/// `ContactModel6D`.
 ///
 /// A line or plane contact holds a point only along some columns of `axes`: along e₃ (line), or along e₁ and e₃
 /// (plane). The columns e₁, e₂, e₃ are expressed in the axes of `reference`. The other directions are free. Crocoddyl's
 /// `ContactModel1D` with a `rotation` and a reference x* is the line with `axes` = rotationᵀ and the target rotation ·
-/// (0, 0, x*). Crocoddyl's `ContactModel2D` is the plane in `Local`. But if kp is not 0, `ContactModel2D` measures the
-/// error of position along the world's x and z.
+/// (0, 0, x*). Crocoddyl's `ContactModel2D` is the plane in `Local`. However, if kp is not 0, `ContactModel2D` measures
+/// the position error along the world's x and z axes.
 ///
 /// Source: Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems* (1972).
 ///
@@ -129,10 +132,11 @@ pub struct ContactConstraint {
     pub other: Option<usize>,
     /// Kind of the constraint: it holds a point, a point along one or two axes, or the whole frame.
     pub kind: ConstraintKind,
-    /// Axes of a line or a plane, as columns expressed in the axes of `reference`; the identity for other kinds.
+    /// Axes e₁, e₂, e₃ of a line or plane constraint, as columns expressed in the axes of `reference`. For other kinds,
+    /// this matrix is the identity.
     #[cfg_attr(feature = "serde", serde(default = "Mat3::identity"))]
     pub axes: Mat3<f64>,
-    /// Axes of the rows and of λ: `Local` or `LocalWorldAligned`.
+    /// Axes of the constraint's rows and of its force λ: `Local` or `LocalWorldAligned`.
     pub reference: ReferenceFrame,
     /// Gain of the position error (1/s²).
     pub kp: f64,

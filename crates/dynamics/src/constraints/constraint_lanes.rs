@@ -30,31 +30,32 @@ pub(crate) struct Rows {
     /// Number of values per slot in `Y` (`wide`), and index in `Y` of the first value of slot 0 (`start`).
     pub wide: usize,
     pub start: usize,
-    /// Constraints up to and including this one that share slots with this one, apart from the slots of the root. Each
-    /// entry has the index of a constraint and the runs of the shared slots, as in the plan.
+    /// Constraints that share slots with this constraint, apart from the slots of the root: earlier constraints and
+    /// this constraint itself. Each entry has the index of a constraint and the runs of shared slots, as in `Plan`.
     pub beside: Vec<(usize, Vec<[usize; 3]>)>,
     /// Unit forces of the constraint's rows on the bodies of both frames, in the world's frame. Written by: `begin`.
     pub forces: [[[f64; WIDE]; 6]; 2],
-    /// γ', the part of γ that is not the acceleration of a body. Written by: `begin`.
+    /// γ', the terms of γ other than the accelerations of the bodies for q̈ = 0. Written by: `begin`.
     pub gamma: [f64; WIDE],
 }
 
-/// Quantities of the rows of all constraints. Each array has one number per row, zeros up to a whole number of vectors,
-/// and one more vector of zeros.
+/// Quantities of the rows of all constraints. Each array has one number per row and is padded with zeros to a whole
+/// number of vectors. One more vector of zeros follows.
 #[derive(Clone, Debug)]
 pub(crate) struct All {
-    /// Body that carries all other bodies, or 0 if there is no such body (`root`), and the number of columns of its
-    /// joint (`nv`).
+    /// Body that carries all other bodies, or 0 if such a body does not exist (`root`), and number of columns of this
+    /// body's joint (`nv`).
     pub root: usize,
     pub nv: usize,
     pub stride: usize,
-    /// Two forces on the root: the sum of the unit forces on all bodies that it carries (`whole`), and the part of this
-    /// sum that the joints below the root pass on to it (`rest`). Shape: 6 × stride. Written by: `carry`.
+    /// Forces on the root: the sum of the unit forces on all bodies that the root carries (`whole`), and the portion of
+    /// this sum that the joints of these bodies transmit to the root (`rest`). Shape: 6 × stride. Written by: `carry`.
     pub whole: Vec<f64>,
     pub rest: Vec<f64>,
-    /// J q̈ + γ for λ = 0, then λ. Shape: stride. Written by: `carry`, `carry_on`, `constrained.rs`.
+    /// Value of J q̈ + γ for λ = 0, which λ overwrites. Shape: stride. Written by: `carry`, `carry_on`,
+    /// `constrained.rs`.
     pub x: Vec<f64>,
-    /// J, Y and Y D⁻¹ in the columns of the root's joint. Shape: nv × stride. Written by: `carry_on`.
+    /// Matrices J, Y and Y D⁻¹ in the columns of the root's joint. Shape: nv × stride. Written by: `carry_on`.
     pub J: Vec<f64>,
     pub Y: Vec<f64>,
     pub YD: Vec<f64>,
@@ -64,7 +65,8 @@ pub(crate) struct All {
 #[derive(Clone, Debug)]
 pub(crate) struct ConstraintLanes {
     pub(crate) rows: Vec<Rows>,
-    /// Y and Y D⁻¹. Shape: for each constraint, its number of slots × `wide`. Written by: `carry`.
+    /// Matrices Y and Y D⁻¹ in the slots of all constraints. Shape: for each constraint, its number of slots × `wide`.
+    /// Written by: `carry`.
     pub(crate) Y: Vec<f64>,
     pub(crate) YD: Vec<f64>,
     pub(crate) all: All,
@@ -93,7 +95,7 @@ impl ConstraintLanes {
             let [one, other] = plan.bodies.map(way);
             let own = |a: &[usize], b: &[usize]| a.iter().filter(|i| !b.contains(i)).map(link).collect();
             let shared = one.iter().filter(|i| other.contains(i)).map(link).collect();
-            // The root's slots come first; they are left out of each run.
+            // The slots of the root have the lowest indices. They are excluded from each run of shared slots.
             let beyond = |&[here, there, n]: &[usize; 3]| {
                 let root = if here < nv { nv } else { 0 };
                 (n > root).then_some([here + root, there + root, n - root])

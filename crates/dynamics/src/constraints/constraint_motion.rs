@@ -1,8 +1,8 @@
 //! Relative motion of the two frames of a constraint: the Jacobian J, the acceleration γ for q̈ = 0, and the
 //! derivatives of both.
 //!
-//! Body 1 carries frame 1, with pose ₀X₁ in the world. Body 2 carries the target, frame 2, with pose ₀X₂. With Δv = v₁
-//! − v₂, the following acceleration must vanish:
+//! Body 1 carries frame 1, whose pose in the world is ₀X₁. Body 2 carries frame 2, the target, whose pose in the world
+//! is ₀X₂. With Δv = v₁ − v₂, the following acceleration must vanish:
 //!
 //! ```text
 //! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)     (no Δv × v₂ along the world's axes)
@@ -12,15 +12,16 @@
 //! For a line or a plane, the rows are components of the point's row above: e₃ᵀ (…) for a line, [e₁ e₃]ᵀ (…) for a
 //! plane.
 //!
-//! When coordinate e moves a body, ∂v and ∂a are as in `rnea_derivatives`. A point p of the body has the velocity u and
-//! the acceleration α. With s = S_e, and Ψ̇ and Ψ̈ evaluated at p,
+//! When coordinate e moves a body, the derivatives ∂v and ∂a of the body's motion are the same as in
+//! `rnea_derivatives`. A point p of the body has the velocity u and the acceleration α. With s = S_e, and Ψ̇ and Ψ̈
+//! evaluated at p,
 //!
 //! ```text
 //! ∂u/∂q_e = s_ω × u + Ψ̇     ∂α/∂q_e = s_ω × α + Ψ̈ + 2 Ψ̇_ω × u     ∂α/∂q̇_e = Ψ̇ + Ṡ + 2 s_ω × u
 //! ```
 //!
 //! If e moves frame 1, a motion ₀X₁⁻¹ m that is expressed in frame 1 changes by ₀X₁⁻¹ (∂m − S_e × m). Gravity is
-//! included as the world's acceleration and cancels in all differences.
+//! included as an acceleration −g of the world, and it cancels in all differences of accelerations.
 
 use crate::constraints::constraint::{ConstraintKind, Target};
 use crate::constraints::plan::Plan;
@@ -28,8 +29,8 @@ use crate::passes::kinematics::World;
 use condyle_spatial::lie::{Quaternion, jlog6, log6};
 use condyle_spatial::{Act, Cross, Mat3, Matrix, Motion, Scalar, Se3, Vec3};
 
-/// Poses of the two frames of a constraint, and velocities and accelerations of the bodies that carry them, in the
-/// world's frame.
+/// Poses of the two frames of a constraint, and velocities and accelerations of the bodies that carry these frames, in
+/// the world's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FramePair<S> {
     /// Pose ₀X₁ of frame 1, the constraint's frame.
@@ -55,7 +56,7 @@ fn at<S: Scalar>(m: Motion<S>, p: Vec3<S>) -> Vec3<S> {
     m.linear + m.angular.cross(p)
 }
 
-/// Returns x − y. x counts as zero if `first` is false, y if `second` is false.
+/// Returns x − y. If `first` is false, x is replaced by zero; if `second` is false, y is replaced by zero.
 #[inline(always)]
 fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Motion<S> {
     match (first, second) {
@@ -66,7 +67,7 @@ fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Mo
     }
 }
 
-/// Returns the motion m with both its linear and its angular part crossed with ω: ω × m_v and ω × m_ω.
+/// Returns the motion (ω × m_v, ω × m_ω), for the linear part m_v and the angular part m_ω of m.
 #[inline(always)]
 fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
     Motion::new(w.cross(m.linear), w.cross(m.angular))
@@ -81,7 +82,7 @@ impl<S: Scalar> FramePair<S> {
         Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
     }
 
-    /// Returns the frame pair of two bodies at rest whose placements are known.
+    /// Returns the frame pair of two bodies at rest, with the placements in `World`.
     #[inline(always)]
     pub(crate) fn at_rest(plan: &Plan, target: &Target<S>, World { oX, .. }: &World<S>) -> Self {
         let [i, j] = plan.bodies;
@@ -120,8 +121,8 @@ impl<S: Scalar> FramePair<S> {
         Motion::new(linear, Vec3::zero())
     }
 
-    /// Returns a column of the Jacobian of p₁ − p₂ along the axes of `reference`, for the joint column s. The flags
-    /// tell which frames the joint carries.
+    /// Returns a column of the Jacobian of p₁ − p₂ along the axes of `reference`, for the joint column s. `first` and
+    /// `second` tell whether the joint carries frame 1 and frame 2.
     #[inline(always)]
     pub(crate) fn point_column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Vec3<S> {
         let (s1, s2) = (at(s, self.x1.translation), at(s, self.x2.translation));
@@ -147,8 +148,8 @@ impl<S: Scalar> FramePair<S> {
         log6(Quaternion::from_rotation(x.rotation), x.translation)
     }
 
-    /// Returns a column of J: the relative velocity when the joint moves with the column s. The flags tell which frames
-    /// the joint carries.
+    /// Returns a column of J: the relative velocity when the joint moves with the column s. `first` and `second` tell
+    /// whether the joint carries frame 1 and frame 2.
     #[inline(always)]
     fn column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Motion<S> {
         match plan.kind {

@@ -22,9 +22,9 @@ use core::ops::Range;
 /// [`new`](Self::new) allocates all memory. Make one set for each combination of contacts, and change targets with
 /// [`set_target`](Self::set_target). All sets can share one [`Data`](crate::Data).
 ///
-/// A model may contain several robots that no constraint connects. Then each robot costs as much as in a model of its
-/// own. In addition, matrices have zeros for each pair of robots, and these zeros must be written. For this, the
-/// constraints of each robot must be adjacent in the list.
+/// A model may contain several robots that no constraint connects. If the constraints of each robot are adjacent in the
+/// list, the computation for each robot costs as much as in a model of its own. An additional cost is writing the zero
+/// blocks of the matrices, one for each pair of robots.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
@@ -54,7 +54,7 @@ pub struct ConstraintSet<S> {
     /// Rows of J, each in the slots of its constraint. Shape: number of entries of all rows. Written by: `jacobian` of
     /// `constraint_motion.rs`.
     pub(crate) J: Array<S>,
-    /// γ, the accelerations of the constraints for q̈ = 0, including the corrections by kp and kd; for impacts, (1 + ε)
+    /// Accelerations γ of the constraints for q̈ = 0, including the corrections by kp and kd. For impacts, γ is (1 + ε)
     /// J v. Shape: rows. Written by: `constrained_dynamics`, `impulse_dynamics`.
     pub(crate) gamma: Array<S>,
     pub(crate) delassus: Delassus<S>,
@@ -86,9 +86,9 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Makes the plans of the constraints in a model and allocates all memory.
     ///
     /// # Errors
-    /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference
-    /// frame is `World`, or a gain is negative or not finite. The same error is returned if a target or its rotation is
-    /// invalid, `axes` are invalid for the kind, or two constraints are equal.
+    /// Returns [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a
+    /// reference frame is `World`, or a gain is negative or not finite. The same error is returned if a target or its
+    /// rotation is invalid, `axes` are invalid for the kind, or two constraints are equal.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
@@ -122,7 +122,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Checks the constraints of a model as [`new`](Self::new) does, without allocating a set.
     ///
     /// # Errors
-    /// Same errors as for [`new`](Self::new).
+    /// Returns the same errors as [`new`](Self::new).
     pub fn check_all<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<(), Error> {
         constraints.iter().enumerate().try_for_each(|(i, one)| one.bodies(model, &constraints[..i]).map(drop))
     }
@@ -145,7 +145,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Returns the range of the rows of constraint k in J and λ.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
         check_index("k", k, self.len(), "constraints");
@@ -162,7 +162,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Returns the target of constraint k. If the scalars have lanes, each lane has its own target.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn target(&self, k: usize) -> Target<S> {
         check_index("k", k, self.len(), "constraints");
@@ -172,11 +172,11 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Changes the target of constraint k between calls. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Constraint`] if the target's scalars are `f64` and the target is not finite or its rotation is invalid.
-    /// The old target is then kept.
+    /// Returns [`Error::Constraint`] if the target's scalars are `f64` and the target is not finite or its rotation is
+    /// invalid. In this case, the old target is kept.
     ///
     /// # Panics
-    /// If constraint k does not exist.
+    /// Panics if constraint k does not exist.
     #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<S>) -> Result<(), Error> {
         check_index("k", k, self.len(), "constraints");
@@ -191,7 +191,7 @@ impl<S: Scalar> ConstraintSet<S> {
     /// Writes the Jacobian J of the last call, rows × nv. Overwrites J.
     ///
     /// # Panics
-    /// If `J` is not rows × nv.
+    /// Panics if `J` is not rows × nv.
     #[track_caller]
     pub fn jacobian(&self, J: &mut DenseMatrix<S, impl Dense<S>>) {
         let shape = (self.rows(), self.nv);

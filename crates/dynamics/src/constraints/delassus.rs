@@ -16,42 +16,43 @@ use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::{Array, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
-/// Minimum pivot, as a multiple of the rounding error of the pivot's diagonal entry. Smaller pivots count as zero.
+/// Minimum pivot, as a multiple of the rounding error of the pivot's diagonal entry. A smaller pivot is treated as
+/// zero.
 const ROUNDINGS: f64 = 1e3;
 
-/// Returns the step: columns are padded to multiples of this number of entries, so that loops over columns have no
-/// remainder. Entries above the diagonal, and entries after the last row, have no meaning.
+/// Returns the number of entries that loops over columns process at once. Columns are padded to a multiple of this
+/// step, so these loops have no remainder. Entries above the diagonal, and entries after the last row, are never used.
 pub(crate) const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { STEP } else { 1 }
 }
 
-/// Step for scalars without lanes.
+/// Number of entries that loops over columns process at once, for scalars without lanes.
 const STEP: usize = 8;
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Delassus<S> {
-    /// Matrices Y = J L⁻¹ and Z = J L⁻¹ D⁻¹, in the slots of each constraint. Shape: entries of all rows. Written by:
-    /// `multiply`.
+    /// Matrices Y = J L⁻¹ and Z = J L⁻¹ D⁻¹, in the slots of each constraint. Shape: number of entries in all rows of
+    /// J. Written by: `multiply`.
     Y: Array<S>,
     Z: Array<S>,
-    /// Distance between the columns of `CE` and between the rows of `rows`: the number of rows plus 1, rounded up to
-    /// whole steps.
+    /// Distance between the columns of `CE` and between the rows of `rows`: the number of rows plus 1, rounded up to a
+    /// multiple of `step`.
     pub stride: usize,
-    /// Lower triangle of J M⁻¹ Jᵀ, then of C E, column by column. Shape: stride × rows, plus one step. Written by:
-    /// `multiply`, or in lanes by `limbs`; then by `decompose`.
+    /// Lower triangle of J M⁻¹ Jᵀ, which `decompose` overwrites by the lower triangle of C E. Stored by columns. Shape:
+    /// stride × rows, plus one step. Written by: `multiply`, or in lanes by `limbs`; then by `decompose`.
     pub CE: Array<S>,
-    /// Lower triangle of C E, row by row. Shape: stride × rows, plus one step. Written by: `decompose`.
+    /// Lower triangle of C E, stored by rows. Shape: stride × rows, plus one step. Written by: `decompose`.
     rows: Array<S>,
-    /// 1/E of each row, or 0 for a row without a pivot. Shape: rows. Written by: `decompose`.
+    /// Reciprocal 1/E of the pivot of each row, or 0 if the pivot counts as zero. Shape: rows. Written by: `decompose`.
     E_inv: Array<S>,
-    /// Number of rows without a pivot. Written by: `decompose`.
+    /// Number of rows whose pivot counts as zero. Written by: `decompose`.
     pub redundant: S,
-    /// Right-hand side b, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
+    /// Right-hand side b, which the solution overwrites. Shape: stride. Written by: `decompose`, `solve`, `invert`.
     x: Array<S>,
-    /// Result C⁻¹ b of the forward substitution. Shape: rows. Written by: `substitute`.
+    /// Vector y = C⁻¹ b, the result of the forward substitution. Shape: rows. Written by: `substitute`.
     y: Array<S>,
-    /// Inverse Λ. Shape: rows × rows. Written by: `invert`.
+    /// Matrix Λ, the inverse of J M⁻¹ Jᵀ. Shape: rows × rows. Written by: `invert`.
     pub inverse: Matrix<S>,
 }
 
@@ -82,7 +83,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Computes J M⁻¹ Jᵀ of an island from the rows of J, which are stored in the slots of their constraints.
+    /// Computes J M⁻¹ Jᵀ of an island from the rows of J. Each row is stored in the slots of its constraint.
     #[inline(always)]
     pub(crate) fn multiply(&mut self, plans: &[Plan], island: &Island, J: &[S], M: &Ltdl<S>) {
         let D_inv = M.inverse_diagonal();
@@ -121,7 +122,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Sets J M⁻¹ Jᵀ of an island, and the row after its last row, to zero.
+    /// Sets J M⁻¹ Jᵀ of an island to zero, and also the extra row after the island's last row.
     #[inline(always)]
     pub(crate) fn clear(&mut self, Island { rows, .. }: &Island) {
         for j in rows.clone() {
@@ -130,8 +131,8 @@ impl<S: Scalar> Delassus<S> {
     }
 
     /// Factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island and solves J M⁻¹ Jᵀ λ = b, as `solve` does. On entry `CE`
-    /// contains J M⁻¹ Jᵀ, and `lambda` contains b. b is eliminated like one more row of the matrix. Adds the number of
-    /// rows without a pivot to `redundant`.
+    /// contains J M⁻¹ Jᵀ, and `lambda` contains b. The elimination treats b as an additional row of the matrix. Adds
+    /// the number of rows whose pivot counts as zero to `redundant`.
     #[inline(always)]
     pub(crate) fn decompose(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let Self { CE, rows, E_inv, stride, .. } = self;
@@ -185,7 +186,7 @@ impl<S: Scalar> Delassus<S> {
         lambda[rows.clone()].copy_from_slice(&self.x[rows.clone()]);
     }
 
-    /// Computes Λ of an island: the matrix that maps b to λ. Entries outside the island stay zero.
+    /// Computes the matrix Λ of an island, which maps the right-hand side b to λ. Entries outside the island stay zero.
     #[inline(always)]
     pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings) {
         let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
@@ -234,13 +235,14 @@ impl<S: Scalar> Delassus<S> {
     }
 }
 
-/// Returns the length of column j, from the step of its diagonal entry to the step of the row after the last row.
+/// Returns the length of column j in whole steps. The column begins with the step that contains its diagonal entry and
+/// ends with the step that contains the row after the last row.
 #[inline(always)]
 fn room<S: Scalar>(rows: &Range<usize>, j: usize) -> usize {
     (rows.end + 1).next_multiple_of(step::<S>()) - (j - j % step::<S>())
 }
 
-/// Computes y += x s for a number s, in whole steps.
+/// Computes y += x s for a number s. Loops over whole steps, including the padding.
 #[inline(always)]
 fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -253,7 +255,8 @@ fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// Computes y −= Σ xₖ sₖ Eₖ⁻¹ in whole steps, where xₖ is column k of a matrix from the row `first` on.
+/// Computes y −= Σ xₖ sₖ Eₖ⁻¹, where xₖ is column k of a matrix, beginning at row `first`. Loops over whole steps,
+/// including the padding.
 #[inline(always)]
 fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_inv: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -274,7 +277,7 @@ fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_in
     }
 }
 
-/// Returns the number of proximal iterations. It is 1 if μ is 0, because one solve is then exact.
+/// Returns the number of proximal iterations. The number is 1 if μ is 0, because one solution is then exact.
 fn rounds(proximal: ProximalSettings) -> usize {
     if proximal.mu > 0.0 { proximal.iterations.max(1) } else { 1 }
 }

@@ -1,15 +1,17 @@
 //! Impacts: jumps of the velocity when constraints become active, and the analytical derivatives of the jumps.
 //!
-//! The constraints exert an impulse Λ in an infinitesimal time, in which other forces have no effect and no body moves.
-//! The restitution ε determines the velocity after the impact, from 0 (the frames stick) to 1 (no energy is lost):
+//! The constraints exert an impulse Λ during an infinitesimal time. During this time, other forces have no effect and
+//! no body moves. The restitution ε determines the velocity v⁺ after the impact. ε ranges from 0 (the frames stick) to
+//! 1 (no energy is lost):
 //!
 //! ```text
 //! M (v⁺ − v) = Jᵀ Λ,   J v⁺ = −ε J v          (A Newtonian restitution: Featherstone 2008, section 11.7)
 //! ```
 //!
-//! These are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ = (1 + ε) J v. The
-//! derivatives have the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ Λ)/∂q, w = v⁺ + ε v and c = ∂(J
-//! w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without gravity, with acceleration Δ:
+//! The equations of an impact are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ
+//! = (1 + ε) J v. The derivatives follow from the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ
+//! Λ)/∂q, w = v⁺ + ε v and c = ∂(J w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without
+//! gravity, with acceleration Δ:
 //!
 //! ```text
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
@@ -30,11 +32,12 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Velocity v⁺ after the impact. Written by: `part`.
         pub v_after: Array<S> = filled(S::zero, size.nv),
-        /// w = v⁺ + ε v, with the velocity v before the impact. Written by: `approach`, `part`.
+        /// Velocity w = v⁺ + ε v, where v is the velocity before the impact. Written by: `approach`, `part`.
         pub w: Array<S> = filled(S::zero, size.nv),
         /// Velocities of the bodies when the joints move with velocity w, in the world's frame. Written by: `spread`.
         pub velocity: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Ψ̇ = v_λ × S when the joints move with velocity w. Written by: `spread`.
+        /// Motion Ψ̇ = v_λ × S of each column S when the joints move with velocity w; v_λ is the parent's velocity.
+        /// Written by: `spread`.
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Zeros that are never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
@@ -42,7 +45,7 @@ workspace! {
 }
 
 kernel! {
-    /// Computes J and γ = (1 + ε) J v with the restitution ε, for bodies whose placements are known.
+    /// Computes J and γ = (1 + ε) J v with the restitution ε. `world` must contain the placements of the bodies.
     pub(crate) fn approach<S>(
         world: &World<S>,
         set: &mut ConstraintSet<S>,
@@ -74,7 +77,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c = ∂(J w)/∂q, for bodies whose placements are known.
+    /// Computes c = ∂(J w)/∂q. `world` must contain the placements of the bodies.
     pub(crate) fn differentiate_motion<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -119,8 +122,8 @@ kernel! {
     }
 }
 
-/// Computes the velocities of all bodies and Ψ̇ = v_λ × S for the joint velocity w. The placements of the bodies must
-/// be known.
+/// Computes the velocities of all bodies and Ψ̇ = v_λ × S for the joint velocity w. `World` must contain the placements
+/// of the bodies.
 #[inline(always)]
 fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { w, velocity, Psid, .. } = d;

@@ -1,9 +1,10 @@
 //! Islands: groups of trees and constraints that are independent of each other.
 //!
 //! M has one block for each tree that is attached to the world. J M⁻¹ Jᵀ has an entry for two constraints only if both
-//! act on the same tree. An island consists of all trees that constraints connect. Each island is factorised
-//! separately, and entries for two islands are zero. An island has a range of coordinates and a range of rows. The
-//! range of rows is empty for a tree without constraints. Islands with overlapping ranges are merged.
+//! act on the same tree. An island consists of trees that constraints connect, and of these constraints. Each island is
+//! factorised separately. Entries of a row in one island and a column in another island are zero. An island has a range
+//! of coordinates and a range of rows. The range of rows is empty for a tree without constraints. Islands with
+//! overlapping ranges are merged.
 
 use crate::constraints::plan::Plan;
 use alloc::vec;
@@ -22,7 +23,7 @@ pub(crate) struct Island {
     pub rows: Range<usize>,
 }
 
-/// Returns the smallest range that contains the ranges a and b. Each of them may be empty.
+/// Returns the smallest range that contains both a and b. The ranges a and b may be empty.
 fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     match (a.is_empty(), b.is_empty()) {
         (true, _) => b.clone(),
@@ -52,7 +53,8 @@ impl Island {
     /// islands are sorted by coordinates.
     pub(crate) fn of<R>(model: &Model<R>, plans: &[Plan]) -> Vec<Self> {
         let (nv, tree) = (model.nv(), EliminationTree::new(model, 1));
-        // If joints share coordinates, the slots of M's factor are not the coordinates. Then all trees form one island.
+        // If joints share coordinates, the slots of M's factor differ from the coordinates. Then all trees form one
+        // island.
         let roots: Vec<usize> = match tree.swaps.is_empty() {
             true => (0..nv).filter(|&k| tree.parent[k] == NONE).collect(),
             false => vec![0],
@@ -105,7 +107,8 @@ impl Island {
     }
 }
 
-/// Sets the entries of all islands to zero, in a matrix with one row per row of J and one column per coordinate.
+/// Sets the entries of all islands in `matrix` to zero. The matrix has one row per row of J and one column per
+/// coordinate.
 #[inline(always)]
 pub(crate) fn clear_rows<S: Scalar>(islands: &[Island], matrix: &mut Matrix<S>) {
     let rows = matrix.nrows();

@@ -7,11 +7,11 @@
 //! J δq̈         + c_q δq + c_v δv = 0,         c = ∂(J q̈ + γ)
 //! ```
 //!
-//! r comes from the derivatives of inverse dynamics, in which the forces of the constraints are external forces that
-//! move with their bodies. Two corrections are added. First, a force along the world's axes does not turn with frame 1.
-//! Second, the force on the other body moves with frame 1, not with this body. For a point constraint, this force turns
-//! with frame 1, but its point of action moves with body 2. Source: Carpentier and Mansard, *Analytical derivatives of
-//! rigid body dynamics algorithms* (2018).
+//! r follows from the derivatives of inverse dynamics. There, the constraint forces are external forces that move with
+//! the bodies on which they act. Two corrections are added. First, a force expressed in the world's axes does not turn
+//! with frame 1. Second, the force on body 2 moves with frame 1, not with body 2. For a point constraint, this force
+//! turns with frame 1, but its point of action moves with body 2. Source: Carpentier and Mansard, *Analytical
+//! derivatives of rigid body dynamics algorithms* (2018).
 
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::{Columns, FramePair};
@@ -51,8 +51,8 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes the sum of external forces and forces of the constraints on each body. The placements of the bodies
-    /// must be known.
+    /// Computes the sum of external forces and constraint forces on each body. `world` must contain the placements of
+    /// the bodies.
     pub(crate) fn load<S, R>(
         model: &Model<R>,
         set: &ConstraintSet<S>,
@@ -72,8 +72,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes r_q = ∂(M q̈ + h − Jᵀ λ)/∂q: the derivative `fixed` for forces that move with their bodies, plus two
-    /// corrections.
+    /// Computes r_q = ∂(M q̈ + h − Jᵀ λ)/∂q. The result is the sum of `fixed`, the derivative for forces that move with
+    /// their bodies, and two corrections.
     pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &Matrix<S>, r: &mut Matrix<S>) {
         r.as_mut_slice().copy_from_slice(fixed.as_slice());
         for (i, plan) in set.plans.iter().enumerate() {
@@ -114,8 +114,8 @@ kernel! {
                         continue;
                     }
                     let w = world.S[e.column].angular.scale(S::splat(e.ratio));
-                    // The turned force is not along the held axes of a line or a plane, so all three rows of the point
-                    // are needed.
+                    // After the turn, the force of a line or plane is not along the held axes, so all three rows of the
+                    // point are needed.
                     if let Some(ends) = &ends {
                         let turned = w.cross(f.linear); // ω × λ
                         for j in &plan.touches {
@@ -138,7 +138,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c_q and c_v, the derivatives of J q̈ + γ, for bodies whose velocities and accelerations are known.
+    /// Computes c_q and c_v, the derivatives of J q̈ + γ. The velocities and accelerations of the bodies must already
+    /// be computed.
     pub(crate) fn differentiate_motion<S>(
         set: &mut ConstraintSet<S>,
         world: &World<S>,

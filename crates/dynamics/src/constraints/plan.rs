@@ -1,10 +1,10 @@
 //! Plan of a constraint in a model: the coordinates that move the constraint's frames, and the index of the
 //! constraint's first row.
 //!
-//! The coordinates that move a constraint's frames are on the paths from the frames to the root, in the elimination
-//! tree of M's factor. A slot is the position of a coordinate in the order of this factor. The sorted slots of a
-//! constraint form at most three runs: the part that both paths share, then the rest of one path, then the rest of the
-//! other path. Rows of J are stored for the coordinates of these slots only.
+//! In the elimination tree of M's factor, the coordinates that move a constraint's frames are on the paths from the two
+//! frames to the root. A slot is the index of a coordinate in the order of this factor. The sorted slots of a
+//! constraint form at most three runs: the slots that both paths share, then the other slots of one path, then the
+//! other slots of the second path. Rows of J are stored for the coordinates of these slots only.
 
 use crate::constraints::constraint::{ConstraintKind, ContactConstraint};
 use crate::passes::frames::ReferenceFrame;
@@ -16,20 +16,20 @@ use condyle_model::{Error, Model};
 use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
 
-/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ. It makes redundant constraints share their forces.
+/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ. The regularisation distributes the force over redundant constraints.
 ///
 /// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with the last solution as λ'.
 /// Each iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
-/// If several forces give the same motion, the smallest forces are found. With μ = 0 one iteration is exact, and rows
-/// that depend on earlier rows get no force. The number of iterations is fixed, so that all lanes and dual numbers run
-/// the same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic
-/// equations* (2021).
+/// If several vectors λ give the same motion, the iterations converge to the λ with the smallest norm. With μ = 0 one
+/// iteration is exact, and rows that depend on earlier rows get no force. The number of iterations is fixed, so that
+/// all lanes and dual numbers run the same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse
+/// resolution of constrained dynamic equations* (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProximalSettings {
-    /// μ (1/kg): small compared with the entries of the Delassus matrix, large compared with their rounding errors, for
-    /// example 1e-8.
+    /// Regularisation μ (1/kg). It should be small compared with the entries of the Delassus matrix, but large compared
+    /// with the rounding errors of these entries, for example 1e-8.
     pub mu: f64,
-    /// Number of iterations; 0 counts as 1.
+    /// Number of proximal iterations; 0 has the same effect as 1.
     pub iterations: usize,
 }
 
@@ -45,7 +45,7 @@ impl Default for ProximalSettings {
 pub(crate) struct SupportColumn {
     /// Index of the joint column among all columns of the model.
     pub column: usize,
-    /// Index of the column's coordinate among the constraint's slots.
+    /// Index of the slot of the column's coordinate among the slots of the constraint.
     pub at: usize,
     pub coordinate: usize,
     pub ratio: f64,
@@ -55,7 +55,7 @@ pub(crate) struct SupportColumn {
     pub second: bool,
 }
 
-/// Plan of a constraint: the form in which the algorithms use the constraint.
+/// Plan of a constraint: the constraint's settings, with the indices of its bodies, rows, slots and coordinates.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub kind: ConstraintKind,
@@ -65,24 +65,24 @@ pub(crate) struct Plan {
     pub kp: f64,
     pub kd: f64,
     pub bodies: [usize; 2],
-    /// Placements bXf of both frames, in the bodies' frames as users see them (`placements`), and in the bodies' turned
-    /// frames (`turned`).
+    /// Placements bXf of both frames: in the public frames of the bodies (`placements`), and in the internal frames,
+    /// which are rotated to the joint axes (`turned`).
     pub placements: [Se3<f64>; 2],
     pub turned: [Se3<f64>; 2],
     /// Index of the constraint's first row in J.
     pub row: usize,
-    /// Slots of the coordinates that move the constraint's frames, beginning at the root (`places`), and the coordinate
-    /// of each slot (`coordinates`).
+    /// Slots of the coordinates that move the constraint's frames, sorted from the root outwards (`places`), and the
+    /// coordinate of each slot (`coordinates`).
     pub places: Vec<usize>,
     pub coordinates: Vec<usize>,
     /// Number of slots that both paths share (`shared`), and index of the first slot of the last run (`second`).
     pub shared: usize,
     pub second: usize,
     pub touches: Vec<SupportColumn>,
-    /// Offset of the constraint's rows in the array of all rows, which has one entry per slot of each row.
+    /// Offset of the constraint's first entry in the array that stores all rows of J. A row has one entry per slot.
     pub start: usize,
-    /// Runs of slots that this constraint shares with each constraint up to and including itself. A run is (index in
-    /// this constraint, index in the other constraint, length).
+    /// Runs of slots that this constraint shares with each earlier constraint and, last, with itself. A run consists of
+    /// the first index in this constraint, the first index in the other constraint, and the length.
     pub common: Vec<Vec<[usize; 3]>>,
 }
 
@@ -90,7 +90,7 @@ impl Plan {
     /// Makes a plan for each constraint, in order.
     ///
     /// # Errors
-    /// [`Error::Constraint`] for the first constraint that is invalid for the model.
+    /// Returns [`Error::Constraint`] for the first constraint that is invalid for the model.
     pub(crate) fn of_constraints<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Vec<Self>, Error> {
         let tree = EliminationTree::new(model, 1);
         let mut place = vec![0; model.nv()];
@@ -103,7 +103,7 @@ impl Plan {
         for (i, constraint) in constraints.iter().enumerate() {
             let bodies = constraint.bodies(model, &constraints[..i])?;
             let ways = bodies.map(|body| {
-                let mut way = BTreeSet::new(); // including all earlier slots, up to the root
+                let mut way = BTreeSet::new(); // with all ancestors of each slot in the elimination tree
                 for &c in support(body) {
                     let mut k = place[model.columns()[c].coordinate];
                     while k != NONE && way.insert(k) {
@@ -161,26 +161,27 @@ impl Plan {
         self.kind.rows()
     }
 
-    /// Returns the range of the constraint's row r in the array of all rows. Row 0 is the first row of the constraint.
+    /// Returns the range of row r of the constraint in the array that stores all rows of J. Row 0 is the constraint's
+    /// first row.
     #[inline(always)]
     pub(crate) fn range(&self, r: usize) -> Range<usize> {
         let n = self.places.len();
         self.start + r * n..self.start + (r + 1) * n
     }
 
-    /// Returns the offset at which the next constraint begins in the array of all rows.
+    /// Returns the offset of the next constraint's first entry in the array that stores all rows of J.
     pub(crate) fn end(&self) -> usize {
         self.start + self.rows() * self.places.len()
     }
 
-    /// Returns whether the rows are along the world's axes instead of the frame's axes.
+    /// Returns whether the rows are expressed in the world's axes (true) or in the frame's axes (false).
     #[inline(always)]
     pub(crate) fn aligned(&self) -> bool {
         self.reference == ReferenceFrame::LocalWorldAligned
     }
 }
 
-/// Returns the rows of J that may be nonzero in column k.
+/// Returns the indices of the rows of J that may be nonzero in column k.
 pub(crate) fn touching(plans: &[Plan], k: usize) -> Vec<usize> {
     let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
     touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
@@ -189,7 +190,8 @@ pub(crate) fn touching(plans: &[Plan], k: usize) -> Vec<usize> {
 /// Returns the rows in which each column of ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero.
 pub(crate) fn nonzero_rows<R>(model: &Model<R>, plans: &[Plan]) -> Vec<NonzeroRows> {
     let rows = |k: usize| {
-        // The force on the other frame depends on all joints that carry one of the two frames.
+        // The force on the other frame moves with frame 1. So its derivative involves all joints that carry one of the
+        // frames.
         let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
         let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
         model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()

@@ -1,8 +1,8 @@
 //! Analytical derivatives of forward dynamics.
 //!
 //! M(q) q̈ + h(q, v) = τ holds for every q and v. So the derivatives of forward dynamics follow from the derivatives of
-//! inverse dynamics, τ(q, v, q̈), at this q̈. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
-//! dynamics algorithms* (2018), equation 18.
+//! inverse dynamics τ(q, v, q̈) at the computed acceleration q̈. Source: Carpentier and Mansard, *Analytical
+//! derivatives of rigid body dynamics algorithms* (2018), equation 18.
 //!
 //! ```text
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
@@ -10,8 +10,8 @@
 //!
 //! The dynamics of a floating body, and of the bodies that it carries, do not depend on position or common velocity.
 //! Gravity accelerates all of these bodies equally. So some derivatives with respect to the linear and angular
-//! coordinates of the free joint are known in advance. With the position p₀, velocities v₀ and ω, rotation R and turn
-//! θ₀ of the floating body, and the acceleration of free fall g:
+//! coordinates of the free joint are known in advance. p₀, v₀, ω and R are the position, linear velocity, angular
+//! velocity and rotation of the floating body; θ₀ are its angular coordinates. With the acceleration g of free fall:
 //!
 //! ```text
 //! ∂q̈/∂p₀ = 0,   ∂v̇₀/∂v₀ = −ω×,   ∂v̇₀/∂θ₀ = (Rᵀ g)×,   and zeros in all other rows
@@ -30,22 +30,22 @@ use core::any::Any;
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// ∂q̈/∂q. Written by: `aba_derivatives`.
+        /// Derivative ∂q̈/∂q of the joint accelerations. Written by: `aba_derivatives`.
         pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂q̈/∂v. Written by: `aba_derivatives`.
+        /// Derivative ∂q̈/∂v of the joint accelerations. Written by: `aba_derivatives`.
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub solve: tree_solve::Workspace<S> = tree_solve::Workspace::new(model.columns(), size.nv),
     } same {
         /// Index of the first coordinate of each floating body. Written by: `new`.
         pub floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect(),
-        /// Rows of each column of ∂τ that M⁻¹ multiplies. The list is empty for the linear coordinates of floating
-        /// bodies. Written by: `new`.
+        /// Rows of ∂τ that may be nonzero, one list per column. The product with M⁻¹ uses only these rows. The list is
+        /// empty for the linear coordinates of floating bodies. Written by: `new`.
         pub nonzero_rows: Vec<NonzeroRows> = NonzeroRows::of_columns(rows_that_count(model, &floating)),
     }
 }
 
-/// Returns the rows of each column of ∂τ that may be nonzero. The list is empty for the linear coordinates of floating
-/// bodies.
+/// Returns for each column of ∂τ the rows that the product with M⁻¹ uses: the rows that may be nonzero. The list is
+/// empty for the linear coordinates of floating bodies, because their columns of the result are known.
 fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
     let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
     for &first in floating {
@@ -55,8 +55,8 @@ fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Returns `true` if the model has floating bodies, and no linear coordinate of these bodies has armature. Returns
-    /// `false` for models whose numbers are not `f64`.
+    /// Returns true if the model has floating bodies and none of their linear coordinates has armature. Returns false
+    /// if the scalar of the model is not `f64`.
     pub(crate) fn float_freely<R: 'static>(&self, model: &Model<R>) -> bool {
         let model = (model as &dyn Any).downcast_ref::<Model>();
         let is_free = |model: &Model| self.floating.iter().all(|&first| model.armature()[first..first + 3] == [0.0; 3]);
@@ -65,7 +65,8 @@ impl<S: Scalar> Workspace<S> {
 }
 
 kernel! {
-    /// Writes ∂v̇₀/∂v₀ = −ω× of each floating body into ∂q̈/∂v. All other entries of the columns of v₀ are zero.
+    /// Writes the block ∂v̇₀/∂v₀ = −ω× of each floating body into ∂q̈/∂v. v₀ is the body's linear velocity. All other
+    /// entries in the columns of v₀ are zero.
     pub(crate) fn set_floating_columns<S>(d: &mut Workspace<S>, v: &[S]) {
         let n = v.len();
         for &first in &d.floating {
@@ -78,7 +79,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes ∂q̈ = −M⁻¹ ∂τ with respect to q and v, with the factors of the articulated-body algorithm.
+    /// Computes ∂q̈/∂x = −M⁻¹ ∂τ/∂x for x = q and x = v, with the factors of the articulated-body algorithm.
     pub(crate) fn solves<S>(world: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>, dtau: [&[S]; 2]) {
         let Workspace { da_dq, da_dv, solve, .. } = d;
         minus_solve(world, f, solve, dtau, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);

@@ -19,7 +19,7 @@ use condyle_linalg::tree_product::neg_product;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
 
-/// Computes the transpose Bᵀ of an n × n matrix B.
+/// Writes the transpose Bᵀ of an n × n matrix B to `out`.
 #[inline(always)]
 fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
     for j in 0..n {
@@ -31,19 +31,19 @@ fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
-        /// μ = M⁻¹ λ. Written by: `aba_hessian`.
+        /// Vector μ = M⁻¹ λ. Written by: `aba_hessian`.
         pub mu: Array<S> = filled(S::zero, size.nv),
         /// Scratch for the transpose of ∂q̈/∂q, then of ∂q̈/∂v. Written by: `run`.
         pub transpose: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Scratch for the product −(∂q̈/∂q)ᵀ G. Written by: `run`.
         pub product: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// λᵀ ∂²q̈/∂q∂q. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂q∂q of contracted second derivatives. Written by: `run`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// λᵀ ∂²q̈/∂v∂q. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂v∂q of contracted second derivatives. Written by: `run`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// λᵀ ∂²q̈/∂v∂v. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂v∂v of contracted second derivatives. Written by: `run`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// λᵀ ∂²q̈/∂τ∂q. Written by: `run`.
+        /// Matrix λᵀ ∂²q̈/∂τ∂q of contracted second derivatives. Written by: `run`.
         pub dtaudq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
@@ -53,7 +53,7 @@ kernel! {
     pub(crate) fn multiply<S>(Minv: &Matrix<S>, lambda: &[S], mu: &mut [S]) {
         let n = mu.len();
         for i in 0..n {
-            let row = &Minv.as_slice()[i * n..(i + 1) * n]; // symmetric: a row is a column
+            let row = &Minv.as_slice()[i * n..(i + 1) * n]; // row i of M⁻¹ equals column i
             let mut sum = S::zero();
             for k in 0..n {
                 sum = row[k].mul_add(lambda[k], sum);
@@ -64,7 +64,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the four matrices λᵀ ∂²q̈ of second derivatives. Runs after `aba_derivatives` and the Hessian of φ.
+    /// Computes the four matrices λᵀ ∂²q̈/∂x∂y, for x and y among q, v and τ. Runs after `aba_derivatives` and the
+    /// Hessian of φ.
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,

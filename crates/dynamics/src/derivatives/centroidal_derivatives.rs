@@ -1,16 +1,16 @@
 //! Derivatives of the centre of mass, of the centroidal momentum and of the rate of this momentum, with respect to
 //! position, velocity and acceleration.
 //!
-//! About the world's origin, let the momentum be h = Σ I v and its rate F = Σ (I a + v ×* I v). When coordinate e
-//! changes, only the terms of the bodies that its joint carries change. hᶜ, Fᶜ, Iᶜ and Bᶜ are sums over these bodies.
-//! Ψ̇, Ψ̈ and B are as in `rnea_derivatives`, and Y = Ψ̇ + Ṡ:
+//! The momentum about the world's origin is h = Σ I v, and its rate is F = Σ (I a + v ×* I v). When coordinate e
+//! changes, only the terms of the bodies that the joint of e carries change. hᶜ, Fᶜ, Iᶜ and Bᶜ are sums over these
+//! bodies. S is the joint column of e. Ψ̇, Ψ̈ and B are defined in `rnea_derivatives`, and Y = Ψ̇ + Ṡ:
 //!
 //! ```text
 //! ∂h/∂q_e = S ×* hᶜ + Iᶜ Ψ̇     ∂F/∂q_e = S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇     ∂F/∂q̇_e = Iᶜ Y + 2Bᶜ S     ∂F/∂q̈_e = Iᶜ S
 //! ```
 //!
-//! Shifted to the centre of mass c, a force [f; n] becomes [f; n − c × f], and the derivative of its moment gains −∂c ×
-//! f. The linear rows, divided by the mass, are the derivatives of ċ and c̈.
+//! Shifted to the centre of mass c, a force [f; n] becomes [f; n − c × f], and the derivative of the moment has the
+//! additional term −∂c × f. The linear rows, divided by the mass, are the derivatives of ċ and c̈.
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the
 //! root of the tree.
@@ -45,9 +45,11 @@ impl<S: Scalar> Column<S> {
 }
 
 workspace! {
-    /// Quantities in the world's frame, about the world's origin unless a field says "about the centre of mass".
+    /// Scratch of the centroidal derivatives, in the world's frame. Moments are about the world's origin unless a field
+    /// says "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
-        /// Composite inertias Iᶜ. Index 0 holds the sum over all moving bodies. Written by: `pass`.
+        /// Composite inertia Iᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
+        /// Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// Momentum hᶜ and 2Bᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
         /// Written by: `pass`.
@@ -87,8 +89,8 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Computes the derivatives of h and F about the world's origin, for bodies whose velocities and accelerations are
-/// known.
+/// Computes the derivatives of h and F about the world's origin. The velocities and accelerations of the bodies must
+/// already be computed.
 #[inline(always)]
 fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, columns, .. } = d;
@@ -124,8 +126,8 @@ fn moved<S: Scalar>(dcom: Vec3<S>, f: Vec3<S>) -> Force<S> {
     Force::new(Vec3::zero(), -dcom.cross(f))
 }
 
-/// Computes the derivatives of momentum and rate about the centre of mass, and of the centre of mass itself. Runs after
-/// `pass`.
+/// Computes the derivatives of the momentum and of its rate about the centre of mass, and the derivatives of the centre
+/// of mass. Runs after `pass`.
 #[inline(always)]
 fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let per_mass = d.IC[0].mass.recip();
@@ -135,7 +137,7 @@ fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
         matrix.as_mut_slice().fill(S::zero());
     }
     for (c, &Column { h_q, F_q, F_v, F_a }) in d.columns.iter().enumerate() {
-        let dcom = F_a.linear.scale(per_mass); // m ∂c/∂q_e is the linear momentum of S_e
+        let dcom = F_a.linear.scale(per_mass); // m ∂c/∂q_e is the linear momentum for the motion S_e
         add(model, &mut d.dh_dq, c, about(com, h_q) + moved(dcom, p));
         add(model, &mut d.drate_dq, c, about(com, F_q) + moved(dcom, f));
         add(model, &mut d.drate_dv, c, about(com, F_v));
@@ -155,28 +157,29 @@ fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
 /// of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalDerivatives<'d, S> {
-    /// ∂hg/∂q, 6 × nv, linear rows first.
+    /// Derivative ∂hg/∂q of the centroidal momentum, 6 × nv, linear rows first.
     pub dh_dq: &'d Matrix<S>,
-    /// ∂hg/∂v = Ag, 6 × nv.
+    /// Derivative ∂hg/∂v = Ag of the centroidal momentum, 6 × nv.
     pub dh_dv: &'d Matrix<S>,
-    /// ∂dhg/∂q, 6 × nv.
+    /// Derivative ∂dhg/∂q of the rate of the centroidal momentum, 6 × nv.
     pub drate_dq: &'d Matrix<S>,
-    /// ∂dhg/∂v, 6 × nv.
+    /// Derivative ∂dhg/∂v of the rate of the centroidal momentum, 6 × nv.
     pub drate_dv: &'d Matrix<S>,
-    /// ∂dhg/∂a = Ag, 6 × nv.
+    /// Derivative ∂dhg/∂a = Ag of the rate of the centroidal momentum, 6 × nv.
     pub drate_da: &'d Matrix<S>,
-    /// ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, the Jacobian of the centre of mass, 3 × nv.
+    /// Jacobian ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a of the centre of mass, 3 × nv.
     pub dcom_dq: &'d Matrix<S>,
-    /// ∂ċ/∂q, 3 × nv.
+    /// Derivative ∂ċ/∂q of the velocity of the centre of mass, 3 × nv.
     pub dvcom_dq: &'d Matrix<S>,
-    /// ∂c̈/∂q, 3 × nv.
+    /// Derivative ∂c̈/∂q of the acceleration of the centre of mass, 3 × nv.
     pub dacom_dq: &'d Matrix<S>,
-    /// ∂c̈/∂v, 3 × nv.
+    /// Derivative ∂c̈/∂v of the acceleration of the centre of mass, 3 × nv.
     pub dacom_dv: &'d Matrix<S>,
 }
 
 kernel! {
-    /// Computes all derivatives of hg, dhg and c, for bodies whose accelerations are known.
+    /// Computes all derivatives of hg, dhg and c. The velocities and accelerations of the bodies must already be
+    /// computed.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         shift(model, d);

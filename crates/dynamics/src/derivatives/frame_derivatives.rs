@@ -1,6 +1,6 @@
 //! Derivatives of the velocity and the acceleration of bodies and frames with respect to position and velocity.
 //!
-//! When coordinate e changes, the bodies that its joint carries turn rigidly about S_e. The velocities and
+//! When coordinate e changes, the bodies that the joint of e carries turn rigidly about S_e. The velocities and
 //! accelerations of these bodies also change because the joint's parent λ moves (see `rnea_derivatives`):
 //!
 //! ```text
@@ -8,8 +8,8 @@
 //! Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e             ∂a/∂q_e = S_e × a + Ψ̈_e + Ψ̇_e × v     ∂a/∂q̇_e = Ψ̇_e + Ṡ_e + S_e × v
 //! ```
 //!
-//! These derivatives are changes as seen from the world. Let r be a frame with pose oXr that moves by r_e per unit of
-//! q_e. Then the six numbers of a motion m (v or a) in frame r have the derivative oXr⁻¹ (∂m/∂q_e − r_e × m).
+//! These derivatives are expressed in the fixed axes of the world. A frame r with pose oXr moves by the twist r_e per
+//! unit of q_e. Expressed in frame r, a motion m (v or a) has the derivative oXr⁻¹ (∂m/∂q_e − r_e × m).
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), section IV. A
 //! derivative costs O(depth + nv) and does not allocate.
@@ -19,7 +19,7 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Motion, Scalar, Se3, kernel};
 
 kernel! {
-    /// Computes ∂v/∂q of the velocity v of a frame with pose oXf that is on the body `body`.
+    /// Computes ∂v/∂q for the velocity v of a frame. The frame is fixed to `body` and has the pose oXf.
     fn velocity_derivative<S, R>(
         of: Velocities<'_, S, R>,
         body: usize,
@@ -44,11 +44,11 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// Computes ∂v/∂q of a body's velocity v, like [`frame_velocity_derivative`](Self::frame_velocity_derivative) for a
-    /// frame's velocity.
+    /// Computes ∂v/∂q for a body's velocity v, like [`frame_velocity_derivative`](Self::frame_velocity_derivative) for
+    /// a frame's velocity.
     ///
     /// # Panics
-    /// If the body does not exist, or `dv_dq` is not 6 × nv.
+    /// Panics if the body does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_velocity_derivative(
@@ -74,7 +74,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or `dv_dq` is not 6 × nv.
+    /// Panics if the frame does not exist, or `dv_dq` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_velocity_derivative(
@@ -103,8 +103,8 @@ struct Column<S> {
 }
 
 kernel! {
-    /// Computes ∂a/∂q and ∂a/∂v of the acceleration a of a frame with pose oXf that is on the body `body`. a is the
-    /// classical acceleration if the frame's `velocity` is given, otherwise the spatial acceleration.
+    /// Computes ∂a/∂q and ∂a/∂v for the acceleration a of a frame. The frame is fixed to `body` and has the pose oXf. a
+    /// is the classical acceleration if the frame's `velocity` is given, otherwise the spatial acceleration.
     fn acceleration_derivatives<S, R>(
         of: Accelerations<'_, S, R>,
         body: usize,
@@ -138,7 +138,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives) for a frame's acceleration.
     ///
     /// # Panics
-    /// If the body does not exist, or a matrix is not 6 × nv.
+    /// Panics if the body does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_acceleration_derivatives(
@@ -156,7 +156,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// accelerations is the frame's Jacobian.
     ///
     /// # Panics
-    /// If the frame does not exist, or a matrix is not 6 × nv.
+    /// Panics if the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_acceleration_derivatives(
@@ -190,7 +190,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or a matrix is not 6 × nv.
+    /// Panics if the frame does not exist, or a matrix is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_classical_acceleration_derivatives(

@@ -1,18 +1,18 @@
 //! Second derivatives of inverse dynamics, contracted with a vector, by analytical formulas.
 //!
-//! φ = λᵀ τ(q, v, a) is the power of the efforts when the joints move with velocity λ: φ = Σ ⟨w_i, F_i⟩, where w_i is
-//! then the velocity of body i. When coordinate e changes, the bodies that its joint carries turn rigidly about S_e,
-//! which does not change the power. In addition, the w, v and a of each of these bodies change as follows (see
-//! `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
+//! φ = λᵀ τ(q, v, a) is the power of the efforts when the joints move with velocity λ. So φ = Σ ⟨w_i, F_i⟩, where w_i
+//! is the velocity of body i for the joint velocity λ. When coordinate e changes, the bodies that the joint of e
+//! carries turn rigidly about S_e. This rigid turn does not change the power. In addition, the motions w, v and a of
+//! each of these bodies change as follows (see `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
 //!
 //! ```text
 //! by q_e:  δw = W_e,  δv = Ψ̇_e,  δa = Ψ̈_e + Ψ̇_e × v        by q̇_e:  δv = S_e,  δa = Y_e + S_e × v
 //! ```
 //!
-//! These changes are applied twice, for a column d and an earlier column e. All terms that depend on single bodies then
-//! become sums over the bodies that the joint of d carries. These sums are Iᶜ, 2Bᶜ and F as in the first derivatives,
-//! the momentum P = Σ I w, the rate of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. The six forces A₁ to C of
-//! column d are computed once for all earlier columns e:
+//! φ is differentiated in this way twice, with respect to a column d and an earlier column e. All terms of single
+//! bodies then become sums over the bodies that the joint of d carries. These sums are Iᶜ, 2Bᶜ and F as in the first
+//! derivatives, the momentum P = Σ I w, the rate of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. The six forces A₁
+//! to C of column d are computed once for all earlier columns e:
 //!
 //! ```text
 //! A₁ = Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F     A₂ = Iᶜ W_d + S_d ×* P     A₃ = 2Bᵀ W_d + S_d ×* Q + Ψ̇_d ×* P − D Ψ̇_d
@@ -30,8 +30,8 @@
 //!
 //! Sources: Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and implementation*
 //! (2024), for the tensors; Nganga and Wensing, *Accelerating second-order differential dynamic programming for
-//! rigid-body systems* (2021), for the contracted form. The sums above are the sums of the first paper, but are
-//! contracted with λ before they are expanded.
+//! rigid-body systems* (2021), for the contracted form. The sums above correspond to the sums of the first paper, but
+//! they are contracted with λ before the expansion.
 
 use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
@@ -48,25 +48,26 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Velocity w of each body when the joints move with velocity λ. Written by: `pass`.
         pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// W = w_λ × S of each column S, with the velocity w_λ of the parent. Written by: `pass`.
+        /// Motion W = w_λ × S of each column S, with the velocity w_λ of the parent. Written by: `pass`.
         pub W: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Momentum P = Σ I w and rate of inertia D, over all bodies that a joint carries. Written by: `pass`.
         pub PD: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Angular part of Q = Σ 2Bᵀ w; the linear part is zero. Written by: `pass`.
+        /// Angular part of the sum Q = Σ 2Bᵀ w over all bodies that a joint carries; the linear part is zero. Written
+        /// by: `pass`.
         pub Q: Array<Vec3<S>> = filled(Vec3::zero, size.bodies),
-        /// ∂²φ/∂q∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂q∂q. Written by: `pass`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂²φ/∂v∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂v∂q. Written by: `pass`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂²φ/∂v∂v. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂v∂v. Written by: `pass`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂²φ/∂a∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂a∂q. Written by: `pass`.
         pub dadq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// Computes all second derivatives of φ = λᵀ τ except the armature of free joints. Reads the sums over carried bodies
-/// that `rnea_derivatives::pass` has computed.
+/// Computes all second derivatives of φ = λᵀ τ, without the terms of the armature of free joints. Reads the sums Iᶜ,
+/// 2Bᶜ and F that `rnea_derivatives::pass` has computed.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,

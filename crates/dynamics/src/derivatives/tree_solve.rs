@@ -1,4 +1,4 @@
-//! Products −M⁻¹ B that do not need M⁻¹. On long chains they are faster than a product with M⁻¹.
+//! Products −M⁻¹ B without computing M⁻¹. On long chains, this algorithm is faster than a product with M⁻¹.
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity. The
 //! efforts are the columns of B. The algorithm works in the world's frame with the factors of the articulated-body
@@ -19,8 +19,9 @@ const SIDE: usize = 16;
 /// Number of columns of B that are processed together if the scalar has lanes.
 const SIDE_OF_LANES: usize = 2;
 
-/// Path of joint columns in the tree: each column except the last has exactly one child, the next column. A path stores
-/// its bias force and its acceleration in a slot. The last path that is attached to it reuses this slot.
+/// Path of joint columns in the tree: each column except the last has exactly one child, the next column. The bias
+/// force and the acceleration of a path are stored in a slot. The last path that is attached to this path reuses the
+/// slot.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     start: usize,
@@ -36,9 +37,9 @@ struct Path {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
-    /// Paths of the tree. Empty if M⁻¹ B is not computed by these paths. Written by: `new`.
+    /// Paths of the tree. The list is empty if the model uses another method for M⁻¹ B. Written by: `new`.
     paths: Vec<Path>,
-    /// Joint efforts, then joint accelerations. Shape: columns × `SIDE`. Written by: `minus_solve`.
+    /// Joint efforts, which the joint accelerations overwrite. Shape: columns × `SIDE`. Written by: `minus_solve`.
     pub x: Array<S>,
     /// Bias force of each slot. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
     pub P: Array<S>,
@@ -77,7 +78,7 @@ fn paths(columns: &[Column]) -> Vec<Path> {
     paths
 }
 
-/// Computes X = −M⁻¹ B for each of two square matrices B. Runs after `aba::factorize`.
+/// Computes X = −M⁻¹ B for two square matrices B. Runs after `aba::factorize`.
 #[inline(always)]
 pub(crate) fn minus_solve<S: Scalar>(
     w: &World<S>,
@@ -124,7 +125,7 @@ fn by_sides<S: Scalar, const N: usize>(
     }
 }
 
-/// Replaces the joint efforts `x` by the joint accelerations that they cause.
+/// Replaces the joint efforts `x` by the joint accelerations that these efforts cause.
 #[inline(always)]
 fn sweep<S: Scalar, const N: usize>(
     paths: &[Path],
@@ -136,7 +137,7 @@ fn sweep<S: Scalar, const N: usize>(
 ) {
     let (P, A) = (P.as_chunks_mut::<6>().0, A.as_chunks_mut::<6>().0);
     for &Path { start, end, from, place, tip } in paths.iter().rev() {
-        let mut p = [[S::zero(); N]; 6]; // in registers along the path
+        let mut p = [[S::zero(); N]; 6]; // bias force P, kept in registers along the path
         if !tip {
             copy(&P[place], &mut p);
         }

@@ -1,5 +1,5 @@
-//! Piece of a robot with two handles. The upper handle is the body to which the piece is attached; the lower handle is
-//! the last body of the piece.
+//! Relation between forces and accelerations of a piece of a robot. A piece has two handles. The upper handle is the
+//! body to which the piece is attached; the lower handle is the last body of the piece.
 //!
 //! Source: Featherstone (1999), part 1, describes an articulated body with two handles by inverse inertias, so that
 //! forces determine accelerations. Here the inputs are the acceleration a of the upper handle and the force f on the
@@ -12,7 +12,7 @@
 //!
 //! These relations need only the inverses of the articulated-body algorithm and no inverse of an inertia, so bodies may
 //! be massless. (In scattering theory, Redheffer's star product joins two such pieces.) If piece 2 is attached to the
-//! last body of piece 1, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f). For piece 2, piece 1 acts
+//! last body of piece 1, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f). Piece 1 acts on piece 2
 //! like a joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric matrix G = E Y₁,
 //!
 //! ```text
@@ -21,13 +21,13 @@
 //! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
 //! ```
 //!
-//! 1 + Y₁ K₂ has no eigenvalue below 1, because Y₁ and K₂ have no negative eigenvalues. The matrix is eliminated in
-//! this form, which is not symmetric. A square root of Y₁ would make it symmetric, but the rank of Y₁ is at most the
-//! number of degrees of freedom of piece 1. Then some pivots of the square root should be zero, and their rounding
-//! errors would spoil the result.
+//! 1 + Y₁ K₂ has no eigenvalue below 1, because Y₁ and K₂ have no negative eigenvalues. Gaussian elimination is applied
+//! to this unsymmetric matrix. A symmetric form would need a square root of Y₁. But the rank of Y₁ is at most the
+//! number of degrees of freedom of piece 1, so some pivots of the square root may be zero up to rounding. These
+//! rounding errors would falsify the result.
 //!
-//! Forces and accelerations of a handle are expressed at the handle's own origin, along the world's axes. So the
-//! lengths in Y are lengths within the piece, not distances from the world's origin.
+//! Forces and accelerations of a handle are expressed at the handle's own origin, along the world's axes. So the lever
+//! arms in Y are distances within the piece, not distances from the world's origin.
 
 use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
@@ -44,21 +44,24 @@ pub(crate) struct ArticulatedPair<S> {
     pub X: Se3<S>,
     /// Velocity of the lower body relative to the upper body, in the frame of the upper body.
     pub w: Motion<S>,
-    /// Force at the upper handle per acceleration of the upper handle.
+    /// Matrix K that maps the acceleration of the upper handle to the force at the upper handle.
     pub K: ArticulatedInertia<S>,
-    /// Force at the upper handle when this handle is at rest.
+    /// Force p at the upper handle when the upper handle has no acceleration.
     pub p: Force<S>,
-    /// Acceleration of the lower handle per acceleration of the upper handle.
+    /// Matrix L that maps the acceleration of the upper handle to the acceleration of the lower handle.
     L: Matrix<S>,
-    /// Acceleration of the lower handle per force on the lower handle.
+    /// Matrix Y that maps the force on the lower handle to the acceleration of the lower handle.
     Y: Matrix<S>,
-    /// Acceleration of the lower handle when the upper handle is at rest.
+    /// Acceleration b of the lower handle when the upper handle has no acceleration.
     b: Motion<S>,
-    /// Acceleration of the body between the two parts of a joined piece, per acceleration of the upper handle.
+    /// Matrix N that maps the acceleration of the upper handle to the acceleration of the body at which the two parts
+    /// of a joined piece meet.
     N: Matrix<S>,
-    /// Acceleration of the body between the two parts of a joined piece, per force on this body.
+    /// Matrix G that maps the force on the body at which the two parts of a joined piece meet to the acceleration of
+    /// this body.
     G: Matrix<S>,
-    /// Acceleration of the body between the two parts of a joined piece, when the upper handle is at rest.
+    /// Acceleration e of the body at which the two parts of a joined piece meet, when the upper handle has no
+    /// acceleration.
     e: Motion<S>,
 }
 
@@ -79,8 +82,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         }
     }
 
-    /// Starts a piece without joints between the handles: Y = 0, b = 0, and L moves a motion from the origin to the
-    /// point r of the lower handle.
+    /// Resets the relation to a piece without joints between the handles: Y = 0, b = 0, and L converts a motion at the
+    /// origin to a motion at the point r of the lower handle.
     #[inline(always)]
     pub(crate) fn begin(&mut self, r: Vec3<S>) {
         let skew = r.skew(); // a' = [v + ω × r; ω]
@@ -92,8 +95,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b = Motion::zero();
     }
 
-    /// Adds a degree of freedom above the piece, with column S (`axis`), U = Iᴬ S and 1/D. x = u/D is its acceleration
-    /// when the upper handle is at rest.
+    /// Adds a degree of freedom above the piece, with column S (`axis`), U = Iᴬ S and 1/D. x = u/D is the acceleration
+    /// of the degree of freedom when the upper handle has no acceleration.
     #[inline(always)]
     pub(crate) fn extend(&mut self, axis: Motion<S>, U: Force<S>, D_inv: S, x: S) {
         let s = times(&self.L, &axis.to_array()); // s = L S
@@ -154,8 +157,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.G = G;
     }
 
-    /// Returns the acceleration a₂ of the body between the two parts of this piece, and the force f₁ on the upper part
-    /// at this body.
+    /// Returns the acceleration a₂ of the body at which the upper and the lower part of this piece meet, and the force
+    /// f₁ on the upper part at this body.
     #[inline(always)]
     pub(crate) fn between(&self, lower: &Self, a: Motion<S>, f: Option<Force<S>>) -> (Motion<S>, Force<S>) {
         let mut a2 = self.e + Motion::from(times(&self.N, &a.to_array()));
@@ -169,8 +172,8 @@ impl<S: Scalar> ArticulatedPair<S> {
     }
 }
 
-/// Replaces B by A⁻¹ B in the rows of [A, B], by Gaussian elimination. The pivot of a step is the largest entry of its
-/// column in the remaining rows.
+/// Replaces B by A⁻¹ B in the rows of [A, B], by Gaussian elimination with row pivoting: each pivot is the largest
+/// entry of its column in the remaining rows.
 #[inline(always)]
 fn eliminate<S: Scalar>(rows: &mut [[S; WIDTH]; 6]) {
     for k in 0..6 {
@@ -227,7 +230,7 @@ fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
     }
 }
 
-/// Returns A x.
+/// Returns the product A x.
 #[inline(always)]
 fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     let mut y = [S::zero(); 6];
@@ -237,7 +240,7 @@ fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     y
 }
 
-/// Returns Aᵀ x.
+/// Returns the product Aᵀ x.
 #[inline(always)]
 fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     let mut y = [S::zero(); 6];
@@ -249,7 +252,7 @@ fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     y
 }
 
-/// Returns A B.
+/// Returns the product A B.
 #[inline(always)]
 fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     let mut C = zero();
@@ -259,7 +262,7 @@ fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     C
 }
 
-/// Returns Aᵀ B.
+/// Returns the product Aᵀ B.
 #[inline(always)]
 fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     let mut T = zero();

@@ -4,21 +4,21 @@
 //! rigid-body dynamics*, part 2: trees, loops and accuracy (1999). The paper leaves the choice of the assembly tree
 //! open.
 //!
-//! Here a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983). From each
-//! body, a heavy path continues to the child that carries the most bodies. The other children begin separate paths. The
-//! weight of a part of a path is the number of its bodies, plus the number of bodies in the other subtrees attached to
-//! them. A path is cut so that both halves have nearly the same weight, and the halves are cut in the same way. So
-//! joins are nested ⌈log₂ n⌉ deep for a chain of n bodies, and O(log n) deep for any tree.
+//! In this module, a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983).
+//! From each body, a heavy path continues to the child that carries the most bodies. The other children begin separate
+//! paths. The weight of a segment of a path is the number of bodies in the segment and in all side branches attached to
+//! these bodies. A path is cut into two segments of nearly the same weight, and each segment is cut in the same way. So
+//! the nesting depth of joins is ⌈log₂ n⌉ for a chain of n bodies, and O(log n) for any tree.
 //!
-//! No cut is made directly below a body whose own inertia does not resist the motion of its joint, such as a massless
-//! body. The piece above such a cut could not be solved separately.
+//! A path is not cut directly below a body whose own inertia does not resist the motion of its joint, such as a
+//! massless body. The equations of the piece above such a cut would be singular.
 
 use alloc::vec::Vec;
 use condyle_model::{Body, Model};
 use condyle_spatial::{Act, ArticulatedInertia, Se3, Vec3};
 
 /// Minimum inertia along a degree of freedom, as a fraction of the body's mass (kg) and rotational inertia (kg m²). A
-/// joint with less inertia counts as a joint without inertia.
+/// body with less inertia is treated as if it did not resist the motion of its joint.
 const FREE: f64 = 1e-9;
 
 /// Value of [`Link::parent`] for a body that is attached to the handle above its piece.
@@ -27,18 +27,18 @@ pub(crate) const HANDLE: usize = usize::MAX;
 /// Kind of a piece, which determines how it is assembled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Bodies that are eliminated one after the other. Each is attached to another body of the run or to the body above
-    /// the run.
+    /// Run: bodies that are eliminated one after the other. Each body is attached to another body of the run or to the
+    /// body above the run.
     Run,
-    /// One body, and the next piece in the list. The next piece assembles the subtrees that are attached to this body.
+    /// Hub: one body and the next piece in the list. This piece assembles the subtrees that are attached to the body.
     Hub,
-    /// Join of the next two pieces in the list. The second is attached to the last body of the first.
+    /// Join of the next two pieces in the list. The second piece is attached to the last body of the first piece.
     Join,
-    /// Sum of the next two pieces in the list. Both are attached to the same body.
+    /// Gather: sum of the next two pieces in the list, which are attached to the same body.
     Gather,
 }
 
-/// Piece of the tree. In the list of pieces, the parts of a piece follow the piece.
+/// Piece of the tree. The list of pieces contains each piece immediately before its parts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     pub kind: Kind,
@@ -48,13 +48,13 @@ pub(crate) struct Piece {
     pub links: usize,
     /// Number of degrees of freedom of the joints in this piece.
     pub dofs: usize,
-    /// Number of pieces in this piece: its parts, the parts of its parts and so on, and the piece itself.
+    /// Number of pieces in this piece, including the piece itself and its parts at all levels.
     pub pieces: usize,
-    /// Number of pieces on the longest path from this piece to a run, including both.
+    /// Number of pieces on the longest path from this piece to a run, including this piece and the run.
     depth: usize,
 }
 
-/// Body of a piece.
+/// Body in a piece.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub body: usize,
@@ -81,11 +81,12 @@ pub struct AssemblySize {
     pub runs: usize,
     /// Number of bodies in the largest run.
     pub longest_run: usize,
-    /// Number of joins of two pieces, of which the second is attached to the last body of the first.
+    /// Number of joins. In a join of two pieces, the second piece is attached to the last body of the first piece.
     pub joins: usize,
-    /// Number of sums of two pieces that are attached to the same body.
+    /// Number of sums of two pieces. Both pieces are attached to the same body.
     pub gathers: usize,
-    /// Number of pieces on the longest path from a run to the whole robot; they must be assembled one after the other.
+    /// Number of pieces on the longest path from a run to the whole robot. The pieces of a path must be assembled one
+    /// after the other.
     pub depth: usize,
 }
 
@@ -97,7 +98,7 @@ pub(crate) struct Assembly {
 }
 
 impl Assembly {
-    /// Plans the pieces of a model. A run has at most `grain` bodies, but more if no cut is allowed in it.
+    /// Plans the pieces of a model. A run has at most `grain` bodies, or more if its path may not be cut.
     pub(crate) fn new<R>(model: &Model<R>, grain: usize) -> Self {
         let bodies = model.bodies().len();
         let mut children = vec![Vec::new(); bodies];
@@ -147,7 +148,7 @@ struct Planner {
 }
 
 impl Planner {
-    /// Adds a piece, and then the bodies and pieces that `parts` appends.
+    /// Adds a piece to the list, and calls `parts` to append the piece's bodies and parts.
     fn piece(&mut self, kind: Kind, open: bool, parts: impl FnOnce(&mut Self)) {
         let (at, first) = (self.pieces.len(), self.links.len());
         self.pieces.push(Piece { kind, open, links: 0, dofs: 0, pieces: 0, depth: 0 });
@@ -175,7 +176,7 @@ impl Planner {
         }
     }
 
-    /// Adds the pieces of a part of a heavy path.
+    /// Adds the pieces of a segment of a heavy path.
     fn path(&mut self, path: &[usize], open: bool) {
         let heavy = |i: usize| self.children[i].first().map_or(0, |&child| self.weight[child]);
         let weights: Vec<usize> = path.iter().map(|&i| self.weight[i] - heavy(i)).collect();
@@ -198,8 +199,8 @@ impl Planner {
         }
     }
 
-    /// Adds all bodies that the roots carry to a run. If there is a spine, the subtree of the heaviest child of the
-    /// spine's last body is left out.
+    /// Adds the bodies `roots` and all bodies that they carry to a run. If `spine` is not empty, the subtree of the
+    /// heaviest child of the spine's last body is excluded.
     fn run(&mut self, roots: &[usize], spine: &[usize]) {
         let first = self.links.len();
         let mut stack: Vec<(usize, usize)> = roots.iter().rev().map(|&i| (i, HANDLE)).collect();
@@ -214,8 +215,8 @@ impl Planner {
     }
 }
 
-/// Returns the best allowed cut of a list of weights, or `None` if no cut is allowed. With the best cut, the heavier
-/// part is as light as possible. Both parts have at least one weight.
+/// Returns the best allowed index at which to cut a list of weights, or `None` if no cut is allowed. The best cut
+/// minimises the weight of the heavier half. Both halves have at least one entry.
 fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> {
     let total: usize = weights.iter().sum();
     let (mut left, mut best) = (0, None);
@@ -229,8 +230,8 @@ fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> 
     best.map(|(_, cut)| cut)
 }
 
-/// Returns whether the inertia of the body alone resists each degree of freedom of its joint: all D are greater than
-/// zero. D is computed in the body's frame, where S is constant.
+/// Returns whether the inertia of the body alone resists each degree of freedom of its joint. This is true if all D are
+/// greater than zero. D is computed in the body's frame, in which S is constant.
 fn firm(body: &Body) -> bool {
     let inertia = Se3::new(body.joint.axis_rotation(), Vec3::zero()).act_inv(body.inertia);
     let rotational = inertia.rotational;

@@ -1,8 +1,9 @@
-//! Ties between joints that share a coordinate (mimic joints and their leaders). First the accelerations of the free
-//! robot are computed, in which all joints move independently. The accelerations of the tied robot follow from them.
+//! Ties between joints that share a coordinate (mimic joints and their leaders). In the free robot, all joints move
+//! independently. The accelerations of the free robot are computed first, and the accelerations of the tied robot
+//! follow from these.
 //!
 //! Let Z be the joints that share coordinates. G maps the shared coordinates y to positions of the joints Z (1 for a
-//! leader, the ratio for a mimic joint). Let w be the efforts at the joints Z that tie the joints. In the free robot
+//! leader, the ratio for a mimic joint). w are the efforts at the joints Z that enforce the ties. In the free robot
 //! only, each joint of Z has a rotor with inertia σ. Let M_σ be the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ,
 //! and a the accelerations of the free robot without w. Then:
 //!
@@ -14,8 +15,8 @@
 //! ```
 //!
 //! The columns of (M_σ⁻¹)_Z are the accelerations of the free robot, at rest and without gravity, for a unit effort at
-//! one joint of Z. With the rotors, M_σ is regular if M of the tied robot is regular: a motion that M_σ does not resist
-//! has no velocity in Z, so M would not resist this motion either. Without rotors M_σ may be singular, because the
+//! one joint of Z. With the rotors, M_σ is regular if M of the tied robot is regular: a motion in the null space of M_σ
+//! has no velocity in Z, so it would be in the null space of M, too. Without rotors, M_σ may be singular, because the
 //! bodies that a mimic joint moves may have no inertia.
 
 use crate::calls::inertia::crba;
@@ -35,7 +36,7 @@ use rand::{SeedableRng, rngs::StdRng};
 #[derive(Clone, Debug)]
 struct Member {
     body: usize,
-    /// Index of the joint's degree of freedom, in the order of the assembly.
+    /// Index of the joint's degree of freedom among the degrees of freedom in the order of the assembly.
     dof: usize,
     /// Index of the joint's coordinate among the shared coordinates.
     shared: usize,
@@ -50,8 +51,8 @@ pub(crate) struct Ties<S> {
     rotors: Vec<S>,
     /// Matrix G of the ratios. Shape: Z × y. Written by: `prepare`.
     G: DMatrix<S>,
-    /// Accelerations a of the free robot, then accelerations of the tied robot. Shape: degrees of freedom. Written by:
-    /// `keep_free` and `solve`.
+    /// Accelerations a of the free robot, which the accelerations of the tied robot overwrite. Shape: degrees of
+    /// freedom. Written by: `keep_free` and `solve`.
     free: Vec<S>,
     /// Columns (M_σ⁻¹)_Z of the inverse inertia matrix. Shape: degrees of freedom × Z. Written by: `keep_response`.
     response: DMatrix<S>,
@@ -65,7 +66,7 @@ pub(crate) struct Ties<S> {
     factor_H: Cholesky<S>,
     /// Accelerations ÿ of the shared coordinates. Shape: y. Written by: `solve`.
     ydd: Vec<S>,
-    /// G ÿ − a_Z, then the tying efforts w. Shape: Z. Written by: `solve`.
+    /// Vector G ÿ − a_Z, which the tying efforts w overwrite. Shape: Z. Written by: `solve`.
     w: Vec<S>,
 }
 
@@ -103,8 +104,8 @@ impl<S: Scalar> Ties<S> {
         ties
     }
 
-    /// Chooses rotors with about the same inertia as the bodies that the joints move, so that rounding errors hide
-    /// neither inertia. Gᵀ σ G is the diagonal of M at a random position.
+    /// Chooses rotors with about the same inertia as the bodies that the joints move. Then neither inertia is lost in
+    /// the rounding errors of the other. Gᵀ σ G is the diagonal of M at a random position.
     fn choose_rotors<R: Constant<S>>(&mut self, model: &Model<R>, shared: &[usize]) {
         if shared.is_empty() {
             return;

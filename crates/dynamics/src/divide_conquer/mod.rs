@@ -4,11 +4,11 @@
 //! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999).
 //!
 //! The robot is cut in two at a joint, and each half is cut again (`assembly.rs`). A piece is described only by forces
-//! and accelerations at its handles, and two such pieces are joined to one such piece (`articulated_pair.rs`). When the
-//! whole robot is assembled, the accelerations and forces at the cuts are computed, from the first cut down to each
-//! joint. Positions and velocities are computed in the same way, so no pass waits for a chain of bodies. All joints may
-//! have armature and any number of degrees of freedom. Joints that share a coordinate are first treated as free and
-//! then tied (`mimic.rs`).
+//! and accelerations at its handles. Two joined pieces form a piece with the same description (`articulated_pair.rs`).
+//! When the whole robot is assembled, the accelerations and forces at the cuts are computed, in the order in which the
+//! cuts were made. Positions and velocities are computed in the same way, so no pass waits for a chain of bodies. All
+//! joints may have armature and any number of degrees of freedom. Joints that share a coordinate are first treated as
+//! free and then tied (`mimic.rs`).
 
 mod articulated_pair;
 pub(crate) mod assembly;
@@ -33,14 +33,14 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
 /// depth of ⌈log₂ n⌉ + 1 for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
 /// of a body. A body in a run with two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with few
-/// processors the runs must be long (n divided by the number of threads). On two threads, divide and conquer is faster
-/// than `aba` from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). If joints share
-/// coordinates (mimic), the passes run once with all joints free, and once more for each joint that shares a
-/// coordinate.
+/// processors, `grain` should be large: n divided by the number of threads. On two threads, divide and conquer is
+/// faster than `aba` for more than about 200 bodies. On one thread, it is always slower (`benches/divide_conquer.rs`).
+/// If joints share coordinates (mimic), the passes run once with all joints free, and once more for each joint that
+/// shares a coordinate.
 ///
-/// Runs in the rayon pool of the calling thread, or in the global pool if the calling thread is in no pool. The bits of
-/// the results do not depend on the number of threads. [`new`](Self::new) allocates all memory, except what rayon
-/// allocates. Source: Featherstone (1999), parts 1 and 2.
+/// Runs in the rayon pool of the calling thread, or in the global pool if the calling thread does not belong to a pool.
+/// The bits of the results do not depend on the number of threads. [`new`](Self::new) allocates all memory, except what
+/// rayon allocates. Source: Featherstone (1999), parts 1 and 2.
 ///
 /// ```
 /// use condyle_dynamics::{Data, DivideConquer, aba, robots};
@@ -117,8 +117,8 @@ impl<S: Scalar> DivideConquer<S> {
     /// (mimic), the passes take 1 + z times the work and steps, and the ties take O(n z + z³).
     ///
     /// # Panics
-    /// If an argument has the wrong length, M is singular ([`Model::singular_joints`]), or `model` has joints or frames
-    /// at other placements than the model of the plan.
+    /// Panics if an argument has the wrong length, M is singular ([`Model::singular_joints`]), or `model` has joints or
+    /// frames at other placements than the model of the plan.
     #[track_caller]
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
@@ -131,7 +131,7 @@ impl<S: Scalar> DivideConquer<S> {
         check_forces(f_ext.len(), bodies);
         let l = Single::<S, R>::new(model);
         self.qdd.copy_from_slice(tau);
-        subtract_armature_bias(model, v, &mut self.qdd); // holds efforts now, accelerations at the end
+        subtract_armature_bias(model, v, &mut self.qdd); // contains efforts here, and accelerations when `aba` returns
         let mut dofs = self.dofs.iter_mut();
         for link in &self.assembly.links {
             let node = &model.nodes()[link.body];
@@ -161,7 +161,7 @@ impl<S: Scalar> DivideConquer<S> {
     }
 }
 
-/// Arguments of one run of all passes.
+/// Arguments that all passes of one computation share.
 struct Job<'d, L: Layout> {
     l: &'d L,
     q: &'d [L::S],
@@ -173,8 +173,8 @@ struct Job<'d, L: Layout> {
 }
 
 impl<L: Layout + Sync> Job<'_, L> {
-    /// Computes the accelerations of all degrees of freedom, with ties. The efforts and armatures in `all.dofs` must be
-    /// set.
+    /// Computes the accelerations of all degrees of freedom, and enforces the ties. The efforts and armatures in
+    /// `all.dofs` must be set.
     fn run(&self, mut all: Part<'_, L::S>, ties: &mut Ties<L::S>, zero: &[L::S]) {
         ties.add_rotors(all.dofs);
         self.passes(all.again());
@@ -253,7 +253,7 @@ impl<L: Layout + Sync> Job<'_, L> {
     }
 
     /// Computes the placements of the bodies of a piece and the relation between the handles of the piece. oX and v are
-    /// the pose and velocity of the body to which the piece is attached.
+    /// the pose and velocity of the body that carries the piece.
     fn assemble(&self, part: Part<'_, L::S>, oX: Se3<L::S>, v: Motion<L::S>) {
         let (piece, mut rest) = part.open();
         let handle = piece.handle;
@@ -289,7 +289,7 @@ impl<L: Layout + Sync> Job<'_, L> {
             Kind::Join => {
                 let (mut upper, mut lower) = rest.split();
                 let ArticulatedPair { X, w, .. } = &upper.handles[0];
-                let (oX2, v2) = (oX * *X, v + oX.act(*w)); // last body of the upper piece
+                let (oX2, v2) = (oX * *X, v + oX.act(*w)); // pose and velocity of the upper piece's last body
                 let v2 = Se3::new(Mat3::identity(), oX2.translation).act_inv(v2); // about its origin
                 let oX2 = Se3::new(oX2.rotation, Vec3::zero());
                 self.both(|| self.assemble(upper.again(), oX, v), || self.assemble(lower.again(), oX2, v2));

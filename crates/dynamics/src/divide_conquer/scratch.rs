@@ -12,15 +12,15 @@ pub(crate) struct Body<S> {
     pub X: Se3<S>,
     /// Pose oXi of the body. Written by: `place`.
     pub oX: Se3<S>,
-    /// Velocity. Written by: `place`.
+    /// Velocity of the body. Written by: `place`.
     pub v: Motion<S>,
-    /// v × v_J, with v_J the velocity of the joint. Written by: `place`.
+    /// Velocity-dependent acceleration v × v_J, with the velocity v_J of the joint. Written by: `place`.
     pub c: Motion<S>,
     /// Articulated inertia Iᴬ. Written by: `place`; the elimination of each child adds to it.
     pub IA: ArticulatedInertia<S>,
     /// Articulated bias force pᴬ. Written by: `place`; the elimination of each child adds to it.
     pub pA: Force<S>,
-    /// Acceleration. Written by: `accelerate`.
+    /// Acceleration of the body. Written by: `accelerate`.
     pub a: Motion<S>,
 }
 
@@ -28,18 +28,18 @@ pub(crate) struct Body<S> {
 /// share.
 #[derive(Clone, Debug)]
 pub(crate) struct Dof<S> {
-    /// Effort. Written by: `aba` and `run`.
+    /// Joint effort τ. Written by: `aba` and `run`.
     pub tau: S,
-    /// Armature. For joints that share a coordinate, plus the inertia of the rotor of `mimic.rs`. Written by: `aba` and
-    /// `add_rotors`.
+    /// Armature. For joints that share a coordinate, the inertia of the rotor in `mimic.rs` is added. Written by: `aba`
+    /// and `add_rotors`.
     pub rotor: S,
     /// Joint column S. Written by: `place`.
     pub S: Motion<S>,
-    /// U = Iᴬ S, with the articulated inertia Iᴬ. Written by: `eliminate`.
+    /// Force U = Iᴬ S, with the articulated inertia Iᴬ. Written by: `eliminate`.
     pub U: Force<S>,
-    /// 1/D, where D = Sᵀ U + armature. Written by: `eliminate`.
+    /// Reciprocal of D = Sᵀ U + armature. Written by: `eliminate`.
     pub D_inv: S,
-    /// τ − Sᵀ pᴬ, with the bias force pᴬ. Written by: `eliminate`, `accelerate`.
+    /// Effort u = τ − Sᵀ pᴬ, with the bias force pᴬ. Written by: `eliminate`, `accelerate`.
     pub u: S,
     /// Joint acceleration. Written by: `accelerate`.
     pub qdd: S,

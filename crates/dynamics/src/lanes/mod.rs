@@ -1,3 +1,3 @@
-//! Passes in lanes: they compute several bodies of one state at once.
+//! Passes that compute several bodies of one state at once, one body per lane.
 
 pub(crate) mod limbs;

@@ -1,11 +1,12 @@
 //! Forward dynamics by the articulated-body algorithm.
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. All quantities are in the world's frame,
-//! so a child's inertia and force are added to its parent's without a change of coordinates. A joint with several
-//! degrees of freedom is treated as a chain of joints with one degree of freedom, between massless bodies. The columns
-//! of such a joint are eliminated one by one, the last one first, so no matrix is inverted. Each pass waits for its dot
-//! products: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. So the linear and the angular half of such a
-//! product are computed independently.
+//! so the inertia and force of a body are added to the inertia and force of its parent without a change of coordinates.
+//! A joint with several degrees of freedom is treated as a chain of joints with one degree of freedom, between massless
+//! bodies. The columns of such a joint are eliminated one by one, beginning with the last column, so no matrix is
+//! inverted. The dot products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. To
+//! shorten the chain of dependent operations, the linear and the angular half of each product are computed
+//! independently.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};
@@ -19,19 +20,20 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Articulated inertia of each body. Written by: `factorize`, `inward`.
         pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.body_depth),
-        /// U = Iᴬ S of each column S, with the articulated inertia Iᴬ. Written by: `factorize`, `inward`.
+        /// Force U = Iᴬ S of each column S, with the articulated inertia Iᴬ. Written by: `factorize`, `inward`.
         pub U: Array<Force<S>> = filled(Force::zero, size.columns),
-        /// 1/D of each column, where D = Sᵀ U + armature. Written by: `factorize`, `inward`.
+        /// Reciprocal 1/D of each column, where D = Sᵀ U + armature. Written by: `factorize`, `inward`.
         pub D_inv: Array<S> = filled(S::zero, size.columns),
         /// Velocity of each body; the world's velocity stays 0. Written by: `inward`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
         /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `outward`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
-        /// v × v_J of each body, with v_J the velocity of its joint. Written by: `inward`.
+        /// Velocity-dependent acceleration v × v_J of each body, with the velocity v_J of the body's joint. Written by:
+        /// `inward`.
         pub c: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Articulated bias force pᴬ of each body. Written by: `inward`.
         pub pA: Array<Force<S>> = filled(Force::zero, size.body_depth),
-        /// τ − Sᵀ pᴬ of each column, with the bias force pᴬ. Written by: `inward`.
+        /// Effort u = τ − Sᵀ pᴬ of each column, with the bias force pᴬ. Written by: `inward`.
         pub u: Array<S> = filled(S::zero, size.columns),
         /// Joint accelerations. Written by: `outward`, `forward_dynamics`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
@@ -40,8 +42,8 @@ workspace! {
     }
 }
 
-/// Eliminates the degrees of freedom of joint i. Returns Iᵃ, the part of the articulated inertia Iᴬ that acts on the
-/// parent.
+/// Eliminates the degrees of freedom of joint i. Returns Iᵃ, the articulated inertia that the parent feels through the
+/// joint.
 #[inline(always)]
 fn eliminate<L: Layout>(
     l: &L,
@@ -63,7 +65,8 @@ fn eliminate<L: Layout>(
     Ia
 }
 
-/// Computes U = Iᴬ S and 1/D for all columns S of bodies whose placements are known. U and D depend only on q.
+/// Computes U = Iᴬ S and 1/D for all columns S. U and D depend only on q. The placements of the bodies must already be
+/// computed.
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;
@@ -91,7 +94,8 @@ pub(crate) fn pass<L: Layout>(
     outward(l, w, d);
 }
 
-/// Computes the articulated inertia and bias force of each body, branch by branch, to the tip of the branch and back.
+/// Computes the articulated inertia and bias force of each body, branch by branch: from the start of the branch to its
+/// tip, and back.
 #[inline(always)]
 pub(crate) fn inward<L: Layout>(
     l: &L,
@@ -111,7 +115,7 @@ pub(crate) fn inward<L: Layout>(
         }
         let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
         let here = l.stack_index(i);
-        v[here] = vi; // stored immediately, so that it does not occupy the machine stack
+        v[here] = vi; // stored here, so that `vi` needs no stack memory later
         c[i] = vi.cross(vJ); // c_i = v_i × v_J
         let I = oX[i].act(l.inertia(i));
         IA[here] = ArticulatedInertia::from(I);
@@ -160,7 +164,7 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
 }
 
 kernel! {
-    /// Runs the articulated-body algorithm body by body. The placements of the bodies must be known.
+    /// Runs the articulated-body algorithm body by body. The placements of the bodies must already be computed.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -174,7 +178,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes only the factors U and 1/D, for bodies whose placements are known.
+    /// Computes only the factors U and 1/D. The placements of the bodies must already be computed.
     pub(crate) fn factors<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         factorize(&Single::new(model), world, d);
     }

@@ -1,4 +1,4 @@
-//! All terms of the equations of motion, computed in one pass to the tips and one pass back to the root.
+//! All terms of the equations of motion, computed in one outward pass and one inward pass.
 //!
 //! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects need the same four
 //! quantities: the placements, the velocities, the bodies' inertias in the world's frame, and the columns Iᶜ S
@@ -19,20 +19,20 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame. Other intermediate results are in the workspaces of kinematics and of the
-    /// centroidal map.
+    /// Scratch for all terms, in the world's frame. Other intermediate results are in the workspaces of kinematics and
+    /// of the centroidal map.
     pub(crate) struct Workspace<S>(size) {
         /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
         /// `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Force that each joint transmits for q̈ = 0. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// M. Written by: `pass`.
+        /// Inertia matrix M. Written by: `pass`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// h. Written by: `pass`.
+        /// Nonlinear effects h. Written by: `pass`.
         pub h: Array<S> = filled(S::zero, size.nv),
-        /// Twice the kinetic energy of the bodies (`pass`), then the total kinetic energy (`run`). Written by: `pass`,
-        /// `run`.
+        /// Kinetic energy. `pass` stores twice the energy of the bodies, and `run` replaces this value by the total
+        /// energy. Written by: `pass`, `run`.
         pub kinetic_energy: S = S::zero(),
         /// Potential energy. Written by: `run`.
         pub potential_energy: S = S::zero(),
@@ -40,7 +40,7 @@ workspace! {
 }
 
 /// Computes M, h, the kinetic energy of the bodies and the columns of the centroidal map. The velocities of the bodies
-/// must be known.
+/// must already be computed.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -60,7 +60,7 @@ fn pass<L: Pairs>(
         let I = oX[i].act(l.inertia(i));
         a[i] = a_i;
         IC[i] = I;
-        BC[i] = Coriolis::of(I, v[i]); // I v and İ
+        BC[i] = Coriolis::of(I, v[i]); // momentum I v and rate of inertia İ
         f[i] = I * a_i + v[i].cross(BC[i].momentum); // f_i = I a_i + v_i ×* I v_i
         *twice += v[i].dot(BC[i].momentum); // 2T = Σ v_iᵀ I v_i
     }
@@ -95,8 +95,8 @@ fn pass<L: Pairs>(
 /// Results of [`compute_all_terms`](crate::compute_all_terms()).
 #[derive(Clone, Copy, Debug)]
 pub struct AllTerms<'d, S, R = f64> {
-    /// Queries for the placements and velocities of bodies and frames, and for the Jacobians J and dJ/dt of bodies and
-    /// frames.
+    /// Placements and velocities. The methods of this field return poses, velocities, Jacobians J and rates dJ/dt of
+    /// bodies and frames.
     pub kinematics: Velocities<'d, S, R>,
     /// Inertia matrix M(q), the full symmetric nv × nv matrix, as returned by [`crba`](crate::crba).
     pub M: &'d Matrix<S>,
@@ -130,7 +130,7 @@ impl<'d> Rename<AllTerms<'d, FusedF64>> for AllTerms<'d, f64> {
 }
 
 impl<'d, S, R> AllTerms<'d, S, R> {
-    /// Returns the robot.
+    /// Returns the robot's model.
     #[inline(always)]
     fn robot(&self) -> &'d Model<R> {
         self.kinematics.placements.model
@@ -138,9 +138,9 @@ impl<'d, S, R> AllTerms<'d, S, R> {
 }
 
 answers! {
-    /// Returns the drift J̇ v of a frame along the world's axes, in O(1). The drift is p̈ of the frame's origin and ω̇
-    /// of the frame, both for q̈ = 0 (m/s², rad/s²). With the Jacobian J in
-    /// [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.
+    /// Returns the drift J̇ v of a frame along the world's axes, in O(1). The drift consists of the acceleration p̈ of
+    /// the frame's origin and the angular acceleration ω̇ of the frame, for q̈ = 0 (m/s², rad/s²). With the Jacobian J
+    /// in [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.
     ///
     /// ```
     /// use condyle_dynamics::ReferenceFrame::LocalWorldAligned;
@@ -155,7 +155,7 @@ answers! {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_drift(of: AllTerms, frame: usize) -> Motion = Motion::zero(); {
         let reference = ReferenceFrame::LocalWorldAligned;
         let origin = reference.pose(of.kinematics.frame(frame));
@@ -166,7 +166,7 @@ answers! {
 }
 
 kernel! {
-    /// Computes all terms, for bodies whose velocities are known.
+    /// Computes all terms. The velocities of the bodies must already be computed.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,

@@ -1,14 +1,15 @@
-//! Macro for queries on bodies whose placements are known. The answer to such a query is a few numbers.
+//! Macro that defines queries on bodies whose placements are already computed. Such a query returns a few numbers, the
+//! answer.
 //!
-//! For a single `f64`, the answer is computed in a kernel with the kernel's fused products. So the answer has the same
-//! bits as for a state in lanes. For other scalars, the answer is computed directly, because queries with these scalars
-//! already run inside kernels.
+//! If the scalar is `f64`, the query runs in a kernel, which uses fused products. So the answer is bit-identical to the
+//! answer for a state in lanes. With other scalars, queries already run inside kernels, so the answer is computed
+//! directly.
 
-/// One number.
+/// Answer of a query that returns one number.
 pub(crate) type Number<S> = S;
 
-/// Defines methods of [`Placements`](crate::Placements) and similar types. Each method computes its answer from `self`
-/// and its arguments only.
+/// Defines methods of [`Placements`](crate::Placements) and similar types. Each method is a query: it computes its
+/// answer from `self` and its arguments only.
 macro_rules! answers {
     ($(
         $(#[$doc:meta])*

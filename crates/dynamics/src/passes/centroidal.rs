@@ -1,12 +1,12 @@
 //! Momentum of the whole robot about its centre of mass, and the matrix that maps joint velocities to this momentum.
 //!
-//! About the world's origin the momentum is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all bodies that
+//! The momentum about the world's origin is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all bodies that
 //! joint k carries. So column k of the map is Iᶜ_k S_k, and the rate of the column is İᶜ_k S_k + Iᶜ_k Ṡ_k. Finally the
 //! map and its rate are shifted to the centre of mass.
 //!
 //! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved
-//! computation of the humanoid centroidal dynamics* (2016). All quantities are along the axes of the world; linear rows
-//! come first.
+//! computation of the humanoid centroidal dynamics* (2016). All quantities are expressed in the axes of the world;
+//! linear rows come first.
 
 use crate::passes::answers::answers;
 use crate::passes::coriolis::Coriolis;
@@ -20,17 +20,18 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame, about the world's origin unless a field says "about the centre of mass".
+    /// Scratch of the centroidal map, in the world's frame. Moments are about the world's origin unless a field says
+    /// "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
-        /// Composite inertias Iᶜ. Index 0 holds the sum over all moving bodies. Written by: `map`, `map_rate`, all
-        /// terms.
+        /// Composite inertia Iᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
+        /// Written by: `map`, `map_rate`, all terms.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// Momentum and rate of inertia İᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving
         /// bodies. Written by: `map_rate`, all terms.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Iᶜ S of each column S, with the composite inertia Iᶜ. Written by: `map`, `map_rate`, all terms.
+        /// Momentum Iᶜ S of each column S, with the composite inertia Iᶜ. Written by: `map`, `map_rate`, all terms.
         pub F: Array<Force<S>> = filled(Force::zero, size.columns),
-        /// İᶜ S + Iᶜ Ṡ, the rate of `F`. Written by: `map_rate`, all terms.
+        /// Rate İᶜ S + Iᶜ Ṡ of `F`. Written by: `map_rate`, all terms.
         pub dF: Array<Force<S>> = filled(Force::zero, size.columns),
         /// Centroidal map Ag about the centre of mass. Written by: `shift_map`.
         pub Ag: Matrix<S> = zero_matrix(6, size.nv),
@@ -38,14 +39,14 @@ workspace! {
         pub dAg: Matrix<S> = zero_matrix(6, size.nv),
         /// Jacobian of the centre of mass. Written by: `shift_map`.
         pub Jcom: Matrix<S> = zero_matrix(3, size.nv),
-        /// Quantities of the whole robot. Written by: `shift_map`, `shift_rate`.
+        /// Quantities of the whole robot as one body. Written by: `shift_map`, `shift_rate`.
         pub whole: Whole<S> = Whole::new(size),
     }
 }
 
 workspace! {
-    /// Quantities of the robot as if it were one body. `hg` and `com_velocity` are written only together with the map's
-    /// rate.
+    /// Quantities of the whole robot as one body. `hg` and `com_velocity` are written only if the rate of the map is
+    /// computed.
     pub(crate) struct Whole<S>(_size) {
         pub Ig: Inertia<S> = Inertia::zero(),
         pub com: Vec3<S> = Vec3::zero(),
@@ -68,7 +69,8 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// Computes Iᶜ S of all columns S, with the composite inertia Iᶜ, for bodies whose placements are known.
+/// Computes the momentum Iᶜ S of each column S, with the composite inertia Iᶜ. The placements of the bodies must
+/// already be computed.
 #[inline(always)]
 fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, F, .. } = d;
@@ -86,7 +88,8 @@ fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     }
 }
 
-/// Computes Iᶜ S and its rate for all columns S, with the composite inertia Iᶜ, for bodies whose velocities are known.
+/// Computes the momentum Iᶜ S of each column S and the rate of this momentum, with the composite inertia Iᶜ. The
+/// velocities of the bodies must already be computed.
 #[inline(always)]
 fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, dF, .. } = d;
@@ -108,7 +111,8 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
     }
 }
 
-/// Adds `f`, times the ratio of column c, to the column of the coordinate that drives column c.
+/// Multiplies `f` by the ratio of joint column c, and adds the product to the matrix column of the coordinate that
+/// drives column c.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usize, f: Force<S>) {
     let column = &model.columns()[c];
@@ -118,7 +122,7 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usi
     }
 }
 
-/// Returns a force [f; n] about the point c instead of the origin: [f; n − c × f].
+/// Returns the force [f; n − c × f], which is the force [f; n] with its moment about the point c instead of the origin.
 #[inline(always)]
 pub(crate) fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
     Force::new(f.linear, f.angular - c.cross(f.linear))
@@ -162,7 +166,7 @@ pub(crate) fn shift_rate<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
 }
 
 /// Centroidal map Ag of the momentum hg = Ag(q) v, and other centroidal quantities that depend only on the position.
-/// All are along the axes of the world.
+/// All quantities are expressed in the axes of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMap<'d, S> {
     /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
@@ -175,12 +179,13 @@ pub struct CentroidalMap<'d, S> {
     pub Jcom: &'d Matrix<S>,
 }
 
-/// Centroidal momentum hg = Ag(q) v, and the terms of its rate dhg = Ag a + dAg v. All are along the axes of the world.
+/// Centroidal momentum hg = Ag(q) v, and the terms of its rate dhg = Ag a + dAg v. All quantities are expressed in the
+/// axes of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMapRate<'d, S> {
     /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d Matrix<S>,
-    /// dAg/dt, 6 × nv: the rate of Ag when the robot moves with velocity v.
+    /// Time derivative dAg/dt of the centroidal momentum matrix for the velocity v, 6 × nv.
     pub dAg: &'d Matrix<S>,
     /// Momentum about the centre of mass (kg m/s, kg m²/s).
     pub hg: Force<S>,
@@ -211,7 +216,7 @@ impl<'d> Rename<CentroidalMapRate<'d, FusedF64>> for CentroidalMapRate<'d, f64> 
 }
 
 kernel! {
-    /// Computes the centroidal map, for bodies whose placements are known.
+    /// Computes the centroidal map. The placements of the bodies must already be computed.
     pub(crate) fn run_map<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         map(&Single::new(model), world, d);
         shift_map(model, d);
@@ -219,7 +224,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the centroidal map and its rate, for bodies whose velocities are known.
+    /// Computes the centroidal map and its rate. The velocities of the bodies must already be computed.
     pub(crate) fn run_map_rate<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         map_rate(&Single::new(model), world, moving, d);
         shift_rate(model, d);
@@ -227,8 +232,8 @@ kernel! {
 }
 
 answers! {
-    /// Returns hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, along the world's axes (kg
-    /// m/s, kg m²/s), in O(n).
+    /// Returns hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, in the axes of the world
+    /// (kg m/s, kg m²/s). Costs O(n).
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum(of: Velocities) -> Force = Force::zero(); {
@@ -241,8 +246,9 @@ answers! {
         about(of.com(), momentum)
     }
 
-    /// Returns dhg = Σ (I_i a_i + v_i ×* I_i v_i), the rate of the centroidal momentum, along the world's axes (N, N
-    /// m), in O(n). The rate equals the sum of the weight and the external forces, about the centre of mass.
+    /// Returns dhg = Σ (I_i a_i + v_i ×* I_i v_i), the rate of the centroidal momentum, in the axes of the world (N, N
+    /// m). Costs O(n). The rate equals the sum of the weight and the external forces, with moments about the centre of
+    /// mass.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum_rate(of: Accelerations) -> Force = Force::zero(); {
@@ -253,6 +259,6 @@ answers! {
             let (v, a) = (oX.act_inv(of.moving.v[i]), oX.act_inv(of.moving.a[i]));
             rate += oX.act(I * a + v.cross(I * v)); // I a + v ×* I v
         }
-        about(of.com(), rate) // ċ × m ċ = 0
+        about(of.com(), rate) // the term ċ × m ċ of the shift is 0
     }
 }

@@ -1,17 +1,17 @@
-//! Coriolis matrix.
+//! Coriolis matrix of a robot, with the Christoffel symbols as coefficients.
 //!
 //! Source: Echeandia and Wensing, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for
 //! rigid-body systems* (2021), algorithm 1, in the world's frame. For a body with velocity v and inertia I, the matrix
-//! B is defined by 2B m = v ×* I m − I (v × m) + m ×* I v for all m. Let Iᶜ and Bᶜ be the sums of I and B over all
-//! bodies that the joint of column d carries. Let e be a column of the same joint, or of a joint on its path to the
-//! root. Then
+//! B is defined by 2B m = v ×* I m − I (v × m) + m ×* I v for all m. Iᶜ and Bᶜ are the sums of I and B over all bodies
+//! that the joint of column d carries. Column e belongs to the same joint, or to a joint on the path from this joint to
+//! the root. Then
 //!
 //! ```text
 //! C_de = S_dᵀ (Iᶜ Ṡ_e + Bᶜ S_e)     C_ed = S_eᵀ (Iᶜ Ṡ_d + Bᶜ S_d)
 //! ```
 //!
-//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B is determined by the momentum (p, l) = I v and the rate Σ
-//! of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
+//! B + Bᵀ is the rate of a body's inertia, so Ṁ = C + Cᵀ. The momentum (p, l) = I v and the rate Σ of the rotational
+//! inertia determine 2B: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
 use crate::passes::free_armature;
 use crate::passes::kinematics::{Moving, World};
@@ -25,9 +25,9 @@ use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, 
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Coriolis<S> {
-    /// I v.
+    /// Momentum I v.
     pub momentum: Force<S>,
-    /// Σ = dĪ/dt.
+    /// Rate Σ = dĪ/dt of the rotational inertia.
     pub rate: Sym3<S>,
 }
 
@@ -60,7 +60,7 @@ impl<S: Scalar> Coriolis<S> {
         Self { momentum: I * v, rate }
     }
 
-    /// Returns 2B m.
+    /// Returns the product 2B m.
     #[inline(always)]
     pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
@@ -77,7 +77,7 @@ impl<S: Scalar> Coriolis<S> {
         self.rate.mul_add(m.angular, l.cross_add(m.angular, p.cross(m.linear).scale(S::splat(2.0))))
     }
 
-    /// Returns the rate İ of the inertia: İ m = v ×* I m − I (v × m). In the form of an inertia, İ has mass 0, and its
+    /// Returns the rate İ of the inertia: İ m = v ×* I m − I (v × m). Stored as an `Inertia`, İ has mass 0, and its
     /// first moment is the linear momentum.
     #[inline(always)]
     pub(crate) fn inertia_rate(self) -> Inertia<S> {
@@ -88,16 +88,16 @@ impl<S: Scalar> Coriolis<S> {
 workspace! {
     /// Scratch for the Coriolis matrix, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// Iᶜ. Written by: `pass`.
+        /// Composite inertia Iᶜ of all bodies that a joint carries. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// 2Bᶜ. Written by: `pass`.
+        /// Matrix 2Bᶜ of all bodies that a joint carries. Written by: `pass`.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// C. Written by: `pass`.
+        /// Coriolis matrix C. Written by: `pass`.
         pub C: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// Computes C without the armature of free joints, for bodies whose velocities are known.
+/// Computes C without the terms of free joints' armature. The velocities of the bodies must already be computed.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let (S, dS, half) = (&w.S, &m.dS, L::S::splat(0.5));
@@ -135,7 +135,7 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// Computes the Coriolis matrix C, for bodies whose velocities are known.
+    /// Computes the Coriolis matrix C. The velocities of the bodies must already be computed.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         free_armature::add_coriolis(model, &moving.qd, d.C.as_mut_slice());

@@ -1,7 +1,7 @@
 //! Joint-space inertia matrix by the composite-rigid-body algorithm.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2. All inertias are in the world's frame,
-//! where the composite inertia of several bodies is the sum of their inertias.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2. All inertias are in the world's frame, in
+//! which the composite inertia of several bodies is the sum of the bodies' inertias.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace, zero_matrix};
@@ -15,12 +15,12 @@ workspace! {
         /// Composite inertia in the world's frame: the sum over a body and all bodies that it carries. Written by:
         /// `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// M. Written by: `pass`.
+        /// Inertia matrix M. Written by: `pass`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// Computes M by the composite-rigid-body algorithm, for bodies whose placements are known.
+/// Computes M by the composite-rigid-body algorithm. The placements of the bodies must already be computed.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {
     let oX = &w.oX[..];
@@ -56,7 +56,7 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
 }
 
 kernel! {
-    /// Computes M body by body, for bodies whose placements are known.
+    /// Computes M body by body. The placements of the bodies must already be computed.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let Workspace { IC, M } = d;
         pass(&Single::new(model), world, IC, M.as_mut_slice());

@@ -1,4 +1,4 @@
-//! Kinetic and potential energy and the derivatives of both energies, as sums over the moving bodies.
+//! Kinetic energy, potential energy, and the derivatives of the two energies, as sums over the moving bodies.
 
 use crate::passes::answers::{Number, answers};
 use crate::passes::frames::{Placements, Velocities};
@@ -10,8 +10,8 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 answers! {
-    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), in O(n). V
-    /// is zero for a mass at the world's origin.
+    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J). Costs O(n).
+    /// V is zero for a mass at the world's origin.
     ///
     /// Allocates nothing.
     fn potential_energy(of: Placements) -> Number = S::zero(); {
@@ -20,7 +20,7 @@ answers! {
     }
 
     /// Returns T = ½ Σ v_iᵀ I_i v_i + ½ Σ armature q̇² = ½ q̇ᵀ M q̇, the kinetic energy of the moving bodies and the
-    /// rotors (J), in O(n).
+    /// rotors (J). Costs O(n).
     ///
     /// Allocates nothing.
     ///
@@ -43,8 +43,8 @@ answers! {
         twice * S::splat(0.5)
     }
 
-    /// Returns E = T + V, the mechanical energy (J), in O(n). The rate of E is the power of the joint efforts and the
-    /// external forces.
+    /// Returns E = T + V, the mechanical energy (J). Costs O(n). The rate of E is the power of the joint efforts and
+    /// the external forces.
     ///
     /// Allocates nothing.
     fn mechanical_energy(of: Velocities) -> Number = S::zero(); {
@@ -52,7 +52,7 @@ answers! {
     }
 }
 
-/// Returns Σ armature q̇², twice the kinetic energy of the rotors.
+/// Returns twice the kinetic energy of the rotors: Σ armature q̇².
 #[inline(always)]
 pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S {
     let mut twice = S::zero();
@@ -69,11 +69,11 @@ workspace! {
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// Momentum of all bodies that a joint carries. Written by: `derivatives`.
         pub h: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// ∂T/∂q. Written by: `derivatives`.
+        /// Derivative ∂T/∂q of the kinetic energy. Written by: `derivatives`.
         pub dT_dq: Array<S> = filled(S::zero, size.nv),
-        /// ∂T/∂v. Written by: `derivatives`.
+        /// Derivative ∂T/∂v of the kinetic energy. Written by: `derivatives`.
         pub dT_dv: Array<S> = filled(S::zero, size.nv),
-        /// ∂V/∂q. Written by: `derivatives`.
+        /// Derivative ∂V/∂q of the potential energy. Written by: `derivatives`.
         pub dV_dq: Array<S> = filled(S::zero, size.nv),
     }
 }
@@ -85,7 +85,7 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Computes the derivatives of the energies, for bodies whose velocities are known.
+/// Computes the derivatives of the energies. The velocities of the bodies must already be computed.
 #[inline(always)]
 fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, h, dT_dq, dT_dv, dV_dq } = d;
@@ -102,7 +102,7 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
             let S = S[l.column(i) + k];
             l.add_joint_effort(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
             l.add_joint_effort(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
-            // ∂(m c)/∂q = m S_v + S_ω × m c is the derivative of the first moment.
+            // The first moment m c has the derivative ∂(m c)/∂q = m S_v + S_ω × m c.
             let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com));
             l.add_joint_effort(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
         }
@@ -116,16 +116,16 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
 /// Derivatives of the kinetic and potential energy; each has nv numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct EnergyDerivatives<'d, S> {
-    /// ∂T/∂q of the kinetic energy T.
+    /// Derivative ∂T/∂q of the kinetic energy T.
     pub dT_dq: &'d [S],
-    /// ∂T/∂v = M v, the generalised momentum.
+    /// Derivative ∂T/∂v = M v of the kinetic energy T: the generalised momentum.
     pub dT_dv: &'d [S],
-    /// ∂V/∂q of the potential energy V: the gravity efforts g(q).
+    /// Derivative ∂V/∂q of the potential energy V: the gravity efforts g(q).
     pub dV_dq: &'d [S],
 }
 
 kernel! {
-    /// Computes the derivatives of the energies, for bodies whose velocities are known.
+    /// Computes the derivatives of the energies. The velocities of the bodies must already be computed.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         derivatives(&Single::new(model), world, moving, d);
     }

@@ -1,4 +1,4 @@
-//! Forward dynamics that solves M q̈ = τ − h with a factor of M, and the enum of all methods of forward dynamics.
+//! Forward dynamics by solving M q̈ = τ − h with a factor of M, and the list of all methods of forward dynamics.
 
 use crate::selection::SHORT_CHAIN;
 use crate::workspace::{filled, workspace};
@@ -32,7 +32,7 @@ workspace! {
     }
 }
 
-/// Computes τ − h for given h.
+/// Writes τ − h to `out`.
 #[inline(always)]
 fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
     for k in 0..tau.len() {

@@ -1,5 +1,5 @@
-//! Queries on bodies and frames whose placements are known: pose, velocity, acceleration, Jacobian and rate of the
-//! Jacobian.
+//! Queries on bodies and frames whose placements are already computed: pose, velocity, acceleration, Jacobian and rate
+//! of the Jacobian.
 //!
 //! All quantities are stored in the world's frame. The same quantities in a frame r with pose oXr and velocity v_r are
 //!
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), sections 2.10 (differentiation) and 2.11
-//! (acceleration). A Jacobian costs O(depth + nv), any other query about one body or frame costs O(1). Queries do not
+//! (acceleration). A Jacobian costs O(depth + nv); any other query about one body or frame costs O(1). Queries do not
 //! allocate.
 
 use crate::passes::answers::answers;
@@ -25,9 +25,9 @@ use core::ops::Deref;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ReferenceFrame {
-    /// Frame whose quantity is computed; for a quantity of a body, the body's frame.
+    /// Frame or body whose quantity is computed: the quantity is expressed in the frame itself, or in the body's frame.
     Local,
-    /// World's frame: a velocity is the velocity of the body's point at the world's origin.
+    /// World's frame: a linear velocity is the velocity of the body-fixed point at the world's origin.
     World,
     /// Axes of the world at the frame's origin: a linear velocity is the velocity of this origin.
     LocalWorldAligned,
@@ -46,8 +46,8 @@ impl ReferenceFrame {
         }
     }
 
-    /// Returns v_r, the velocity of the reference frame, expressed in the world's frame. The queried frame has pose oXf
-    /// and is on a body with velocity v.
+    /// Returns v_r, the velocity of the reference frame, expressed in the world's frame. The queried frame has the pose
+    /// oXf and is fixed to a body with velocity v.
     #[inline(always)]
     pub(crate) fn velocity<S: Scalar>(self, oXf: Se3<S>, v: Motion<S>) -> Motion<S> {
         match self {
@@ -105,7 +105,7 @@ impl<'d> Rename<Accelerations<'d, FusedF64>> for Accelerations<'d, f64> {
 }
 
 impl<'d, S, R> Placements<'d, S, R> {
-    /// Returns the robot.
+    /// Returns the robot's model.
     #[inline(always)]
     pub(crate) fn robot(&self) -> &'d Model<R> {
         self.model
@@ -128,7 +128,8 @@ impl<'d, S, R> Deref for Accelerations<'d, S, R> {
     }
 }
 
-/// Adds `s`, times the ratio of column c, to the column of J that belongs to the coordinate of column c.
+/// Multiplies `s` by the ratio of joint column c, and adds the product to the column of J for the coordinate that
+/// drives column c.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut [S], c: usize, s: Motion<S>) {
     let column = &model.columns()[c];
@@ -169,10 +170,10 @@ pub(crate) fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
 }
 
 answers! {
-    /// Returns oXb, the pose of a body in the world. The body's frame is the frame that the URDF gives it.
+    /// Returns oXb, the pose of a body in the world. The body's frame is the link's frame in the URDF.
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body(of: Placements, body: usize) -> Se3 = Se3::identity(); {
         let zXb = Se3::new(of.model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
         of.world.oX[body] * zXb.lift()
@@ -181,65 +182,65 @@ answers! {
     /// Returns oXf, the pose of a frame in the world.
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame(of: Placements, frame: usize) -> Se3 = Se3::identity(); {
         let frame = &of.model.frames()[frame];
         of.body(frame.body) * frame.placement.lift()
     }
 
-    /// Returns the spatial velocity of a body: the velocity of the body's point at the origin of the reference frame
-    /// (m/s), and the body's angular velocity (rad/s).
+    /// Returns the spatial velocity of a body. It consists of the velocity of the body-fixed point at the origin of the
+    /// reference frame (m/s), and the body's angular velocity (rad/s).
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body_velocity(of: Velocities, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.body(body)).act_inv(of.moving.v[body])
     }
 
-    /// Returns the spatial velocity of a frame. It consists of the velocity of a point that is fixed to the frame's
-    /// body and now at the origin of the reference frame (m/s), and the angular velocity (rad/s).
+    /// Returns the spatial velocity of a frame. It consists of the velocity of the body-fixed point at the origin of
+    /// the reference frame (m/s), and the angular velocity (rad/s).
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_velocity(of: Velocities, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.frame(frame)).act_inv(of.moving.v[of.model.frames()[frame].body])
     }
 
-    /// Returns the spatial acceleration of a body (m/s², rad/s²), without gravity. It is the rate of the body's spatial
-    /// velocity, as seen from the world, and is expressed in the reference frame.
+    /// Returns the spatial acceleration of a body (m/s², rad/s²), without gravity. The acceleration is the rate of the
+    /// body's spatial velocity in the world's frame, expressed in the reference frame.
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body_acceleration(of: Accelerations, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.body(body)).act_inv(of.moving.a[body])
     }
 
-    /// Returns the spatial acceleration of a frame (m/s², rad/s²), without gravity. It is the rate of the frame's
-    /// spatial velocity, as seen from the world, and is expressed in the reference frame.
+    /// Returns the spatial acceleration of a frame (m/s², rad/s²), without gravity. The acceleration is the rate of the
+    /// frame's spatial velocity in the world's frame, expressed in the reference frame.
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_acceleration(of: Accelerations, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
         reference.pose(of.frame(frame)).act_inv(of.moving.a[of.model.frames()[frame].body])
     }
 
-    /// Returns the classical acceleration v̇ + ω × v of a body's point at the origin of the reference frame (m/s²), and
-    /// the body's angular acceleration (rad/s²).
+    /// Returns the classical acceleration v̇ + ω × v of the body-fixed point at the origin of the reference frame
+    /// (m/s²), and the body's angular acceleration (rad/s²).
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     fn body_classical_acceleration(
         of: Accelerations, body: usize, reference: ReferenceFrame
     ) -> Motion = Motion::zero(); {
         classical(of.body_acceleration(body, reference), of.body_velocity(body, reference))
     }
 
-    /// Returns the classical acceleration v̇ + ω × v of a frame's point at the origin of the reference frame (m/s²),
-    /// and the frame's angular acceleration (rad/s²). In `LocalWorldAligned` the linear part is p̈ of the frame's
-    /// origin. Source: Featherstone (2008), section 2.11.
+    /// Returns the classical acceleration v̇ + ω × v of the frame's point at the origin of the reference frame (m/s²),
+    /// and the frame's angular acceleration (rad/s²). In `LocalWorldAligned`, the linear part is the acceleration p̈ of
+    /// the frame's origin. Source: Featherstone (2008), section 2.11.
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     fn frame_classical_acceleration(
         of: Accelerations, frame: usize, reference: ReferenceFrame
     ) -> Motion = Motion::zero(); {
@@ -248,7 +249,7 @@ answers! {
 }
 
 kernel! {
-    /// Computes the Jacobian J of a frame with pose oXf that is on the body `body`.
+    /// Computes the Jacobian J of a frame. The frame is fixed to `body` and has the pose oXf.
     fn jacobian<S, R>(
         of: Placements<'_, S, R>,
         body: usize,
@@ -265,7 +266,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the rate dJ/dt of the Jacobian of a frame with pose oXf that is on the body `body`.
+    /// Computes the rate dJ/dt of the Jacobian of a frame. The frame is fixed to `body` and has the pose oXf.
     fn jacobian_rate<S, R>(
         of: Velocities<'_, S, R>,
         body: usize,
@@ -286,7 +287,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a body, 6 × nv, linear rows first: the body's velocity is J v. Overwrites J.
     ///
     /// # Panics
-    /// If the body does not exist, or `J` is not 6 × nv.
+    /// Panics if the body does not exist, or `J` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -296,7 +297,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// Computes the Jacobian J of a frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
     ///
     /// # Panics
-    /// If the frame does not exist, or `J` is not 6 × nv.
+    /// Panics if the frame does not exist, or `J` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -316,7 +317,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// for a frame. Overwrites dJ.
     ///
     /// # Panics
-    /// If the body does not exist, or `dJ` is not 6 × nv.
+    /// Panics if the body does not exist, or `dJ` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -325,9 +326,9 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
 
     /// Computes the rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. Overwrites dJ.
     ///
-    /// dJ v + J a is the derivative of the six numbers of the frame's velocity. In `Local` and `World` this derivative
-    /// is the spatial acceleration. In `LocalWorldAligned`, whose origin moves with the frame, it is the classical
-    /// acceleration.
+    /// dJ v + J a is the derivative of the six numbers of the frame's velocity. In `Local` and `World`, this derivative
+    /// is the spatial acceleration. In `LocalWorldAligned`, the origin moves with the frame, and the derivative is the
+    /// classical acceleration.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};
@@ -344,7 +345,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or `dJ` is not 6 × nv.
+    /// Panics if the frame does not exist, or `dJ` is not 6 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {

@@ -1,9 +1,9 @@
-//! Armature of free joints: an apparent mass without weight, along the axes of the joint's parent.
+//! Armature of free joints. It acts like a mass without weight, along the axes of the joint's parent.
 //!
 //! The armature a along the linear coordinates of a free joint resists the acceleration of the body's origin, as in
 //! MuJoCo. MuJoCo expresses this acceleration along the axes of the parent (for a floating base, the axes of the
-//! world). The velocities v and ω of the joint are along the axes of the body, where the same acceleration is v̇ + ω ×
-//! v. The kinetic energy T = ½ a vᵀ v of this mass gives
+//! world). The velocities v and ω of the joint are expressed in the axes of the body. In these axes, the acceleration
+//! of the origin is v̇ + ω × v. With the kinetic energy T = ½ a vᵀ v of the armature, the efforts are
 //!
 //! ```text
 //! τ_v = a (v̇ + ω × v)     ∂τ_v/∂v = a ω×     ∂τ_v/∂ω = −a v×
@@ -11,23 +11,24 @@
 //!
 //! The diagonal of M contains the first term, a v̇, together with all other armature. This file adds the second term,
 //! the bias a (ω × v). The bias depends only on the joint's velocity and does no work: v · (ω × v) = 0. The matrix a ω×
-//! of the bias is skew, as required by Ṁ = C + Cᵀ for a constant M. Armature of the angular coordinates gives a ω̇
-//! without a bias.
+//! of the bias is skew-symmetric, as Ṁ = C + Cᵀ requires for a constant M. Armature of the angular coordinates gives a
+//! ω̇ without a bias.
 //!
-//! [`Model::free_armature`] lists the free joints with armature. If the list is empty, nothing is computed here. The
-//! model checks that the three armatures a of a joint are equal. Each row still uses its own armature, so that recorded
-//! code can take the three armatures as arguments.
+//! [`Model::free_armature`] lists the free joints with armature. If the list is empty, the functions of this file
+//! compute nothing. The model checks that the three armatures a of a joint are equal. Nevertheless, each row uses its
+//! own armature, because code that was recorded from these functions may take the three armatures as separate
+//! arguments.
 
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar, Vec3, kernel};
 
-/// Returns the three numbers of `x` from index `first` on as a vector.
+/// Returns three adjacent numbers of `x`, beginning at index `first`, as a vector.
 #[inline(always)]
 fn three<S: Scalar>(x: &[S], first: usize) -> Vec3<S> {
     Vec3::new(x[first], x[first + 1], x[first + 2])
 }
 
-/// Multiplies each component of `x` with the armature of its coordinate. The first coordinate is `first`.
+/// Multiplies the components of `x` by the armatures of the coordinates `first`, `first` + 1 and `first` + 2.
 #[inline(always)]
 fn times<S: Scalar, R: Constant<S>>(model: &Model<R>, first: usize, x: Vec3<S>) -> Vec3<S> {
     let a = model.armature();
@@ -52,8 +53,8 @@ pub fn add_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], 
     }
 }
 
-/// Subtracts the bias a (ω × v) of each free joint with armature from its efforts. The remaining efforts accelerate the
-/// joint.
+/// Subtracts the bias a (ω × v) of each free joint with armature from the efforts of the joint. The remaining efforts
+/// accelerate the joint.
 #[doc(hidden)]
 #[inline(always)]
 pub fn subtract_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], tau: &mut [S]) {
@@ -65,8 +66,8 @@ pub fn subtract_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &
     }
 }
 
-/// Multiplies the rows of the 3 × 3 matrix `skew` with the armatures of the joint, and adds the product to a block of
-/// an nv × nv matrix. The block begins at row `first` and column `column`. Both matrices are stored by columns.
+/// Multiplies the rows of the 3 × 3 matrix `skew` by the armatures of the joint, and adds the product to a block of an
+/// nv × nv matrix. The block begins at row `first` and column `column`. Both matrices are stored by columns.
 #[inline(always)]
 fn add_block<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -93,8 +94,8 @@ pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], d
     }
 }
 
-/// Adds the bias to the Coriolis matrix C (nv × nv, stored by columns): a ω× in the rows and columns of the linear
-/// velocity v.
+/// Adds the matrix a ω× of the bias to the Coriolis matrix C (nv × nv, stored by columns), in the rows and columns of
+/// the linear velocity v.
 #[inline(always)]
 pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], C: &mut [S]) {
     for &first in model.free_armature() {
@@ -102,8 +103,8 @@ pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]
     }
 }
 
-/// Adds the second derivative ∂²(λᵀ τ)/∂v∂v of the bias τ to an nv × nv matrix stored by columns. With μ = a λ_v, λᵀ τ
-/// is μ · (ω × v). So the block ∂²/∂v∂ω is μ×, and the block ∂²/∂ω∂v is −μ×.
+/// Adds the second derivative ∂²(λᵀ τ)/∂v∂v of the bias τ to an nv × nv matrix stored by columns. With μ = a λ_v, where
+/// λ_v are the linear components of λ, λᵀ τ = μ · (ω × v). So the block ∂²/∂v∂ω is μ×, and the block ∂²/∂ω∂v is −μ×.
 #[inline(always)]
 pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda: &[S], dvdv: &mut [S]) {
     let nv = model.nv();
@@ -120,7 +121,7 @@ pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda:
 }
 
 kernel! {
-    /// Computes the efforts `tau` minus the bias of all free joints with armature.
+    /// Writes the efforts `tau` minus the bias of all free joints with armature to `effort`.
     pub(crate) fn without_bias<S, R>(model: &Model<R>, v: &[S], tau: &[S], effort: &mut [S]) {
         effort.copy_from_slice(tau);
         subtract_armature_bias(model, v, effort);

@@ -1,8 +1,8 @@
-//! Gravity compensation: efforts that carry a fraction of the weight of the bodies that ask for it.
+//! Gravity compensation: efforts that carry a given fraction of the weight of selected bodies.
 //!
-//! For each such body, a force −m g acts at a point c, where m is the carried mass. The joint efforts of these forces
-//! are the gradient of the potential energy of the carried masses. Let a₀ = −g, and let i be a body on the path to the
-//! root. In the frame of body i:
+//! For each compensated body, a force −m g acts at a point c, where m is the carried mass. The joint efforts of these
+//! forces are the gradient of the potential energy of the carried masses. a₀ = −g, and body i is a body on the path to
+//! the root. In the frame of body i:
 //!
 //! ```text
 //! F = [m a₀; m c × a₀]     τ_i = S_iᵀ F     λF = λXi F
@@ -10,15 +10,16 @@
 //! ```
 //!
 //! ∂τ_e/∂q_d equals ∂τ_d/∂q_e, because both are second derivatives of an energy. The cost per body is O(depth), and
-//! O(depth²) with derivatives. No scratch is needed. Source: the equations for weights in `statics.rs`, applied to each
-//! body.
+//! O(depth²) with derivatives. The algorithm needs no scratch. Source: the equations for weights in `statics.rs`,
+//! applied to each body.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
 use condyle_model::{GravityCompensation, Model};
 use condyle_spatial::{Act, Force, Inertia, Mat3, Se3, Vec3};
 
-/// Returns the carried mass and a₀ = −g, both in the turned frame of the compensated body.
+/// Returns the carried mass and a₀ = −g in the internal frame of the compensated body, which is rotated to the joint
+/// axis.
 #[inline(always)]
 fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &[L::S]) -> (Inertia<L::S>, Vec3<L::S>) {
     let bRz = model.nodes()[of.body].axis_rotation;

@@ -1,11 +1,13 @@
 //! Inverse of the joint-space inertia matrix, by one of three methods ([`InverseMethod`]).
 //!
-//! 1. For short chains: from M by Gauss–Jordan elimination, which needs no search for pivots if M is positive definite.
+//! 1. For short chains: from M by Gauss–Jordan elimination. Because M is positive definite, the elimination needs no
+//!    pivoting.
 //! 2. If the sparse factor ([`Ltdl`]) has short rows: from M by this factor, in O(n d) operations per column for a tree
 //!    of depth d.
 //! 3. Otherwise, without M: Carpentier, *Analytical inverse of the joint space inertia matrix* (2018), in O(n) per
 //!    column. This is the articulated-body algorithm for all unit efforts at once. In the inward pass, a joint needs
-//!    only the efforts in its subtree. In the world's frame, one array of bias forces is enough for all bodies.
+//!    only the efforts in its subtree. Because quantities are in the world's frame, all bodies can share one array of
+//!    bias forces.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
@@ -21,21 +23,20 @@ use condyle_spatial::{Array, Matrix, Scalar};
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Bias force for each unit effort: one row for each of its six components. Shape: 6 × columns. Written by:
+        /// Bias force for each unit effort, stored in six rows, one per component. Shape: 6 × columns. Written by:
         /// `sweep`.
         pub P: Array<S> = filled(S::zero, 6 * size.columns),
-        /// Acceleration for each unit effort: a block of zeros for the world, then one block for each depth of the
-        /// tree. Shape: (1 + depth) × 6 × columns. Written by: `sweep`.
+        /// Acceleration for each unit effort, in blocks: a block of zeros for the world, followed by one block for each
+        /// depth of the tree. Shape: (1 + depth) × 6 × columns. Written by: `sweep`.
         pub A: Array<S> = filled(S::zero, (1 + size.depth) * 6 * size.columns),
-        /// M⁻¹. Written by: `minv`.
+        /// Inverse M⁻¹ of the inertia matrix. Written by: `minv`.
         pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Sparse factor of M. Written by: `from_matrix`.
         pub factor: Ltdl<S> = Ltdl::new(model),
     }
 }
 
-/// Computes y −= Σ sᵣ xᵣ. The six rows xᵣ have n numbers each, and entry 0 of y corresponds to column `from` of the
-/// rows.
+/// Computes y −= Σ sᵣ xᵣ for six rows xᵣ of n numbers each. Entry 0 of y corresponds to entry `from` of each row.
 #[inline(always)]
 fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S]) {
     let to = from + y.len();
@@ -48,8 +49,8 @@ fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S
     }
 }
 
-/// Computes M⁻¹ from the factors of `aba::factorize`. The entries j ≥ c of each row c are computed; the others are
-/// copied by symmetry.
+/// Computes M⁻¹ from the factors of `aba::factorize`. In each row c, the entries j ≥ c are computed. The other entries
+/// are copies, because M⁻¹ is symmetric.
 #[inline(always)]
 fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
     let n = columns.len();
@@ -71,7 +72,7 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
         let S_c = w.S[c].to_array();
         let row = &mut rows[c * n + c..(c + 1) * n];
         let (above, here) = A.split_at_mut((columns[c].depth + 1) * 6 * n);
-        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column attached to the world
+        let above = &above[columns[c].depth * 6 * n..]; // block of the parent; zeros if the parent is the world
         subtract_six(f.U[c].scale(f.D_inv[c]).to_array(), above, n, c, row); // −D⁻¹ Uᵀ A_λ
         for r in 0..6 {
             let (A_parent, A) = (&above[r * n + c..(r + 1) * n], &mut here[r * n + c..(r + 1) * n]);
@@ -88,7 +89,7 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
 }
 
 kernel! {
-    /// Computes M⁻¹ from M by one of the two methods that need M.
+    /// Computes M⁻¹ from M, by Gauss–Jordan elimination or by the sparse factor.
     pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &Matrix<S>, method: InverseMethod) {
         if method == InverseMethod::GaussJordan {
             return gauss_jordan::<S, SHORT_CHAIN>(M, &mut d.Minv);

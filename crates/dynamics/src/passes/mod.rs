@@ -1,7 +1,8 @@
-//! Passes: each file holds one recursion over the bodies.
+//! Passes of the algorithms. Each file contains one recursion over the bodies.
 //!
-//! A pass depends only on its [`Layout`](condyle_model::layout::Layout) and its workspace. It does not depend on data,
-//! checks, limbs or batches. The kernels of a pass visit one body after the other.
+//! A pass depends only on its [`Layout`](condyle_model::layout::Layout) and its workspace. It does not use `Data`, does
+//! not check arguments, and contains no code for limbs or batches. The kernels of a pass visit one body after the
+//! other.
 
 pub(crate) mod aba;
 pub(crate) mod all_terms;

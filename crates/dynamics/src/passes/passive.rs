@@ -4,20 +4,21 @@
 //! τ_k = −(d + d₁ |v_k| + d₂ v_k²) v_k − f tanh(v_k/ε) − (spring of the joint)_k + (gravity compensation)_k
 //! ```
 //!
-//! d is the model's [`damping`](Model::damping), f its [`friction`](Model::friction) (a URDF's `<dynamics damping
-//! friction>`). d₁ and d₂ are its [`damping_polynomial`](Model::damping_polynomial). Springs are in `springs.rs`,
-//! gravity compensation is in `gravity_compensation.rs`. Other algorithms do not include passive efforts: callers add
-//! them to τ.
+//! d is the model's [`damping`](Model::damping), and f is the model's [`friction`](Model::friction) (a URDF's
+//! `<dynamics damping friction>`). d₁ and d₂ are the model's [`damping_polynomial`](Model::damping_polynomial). Springs
+//! are in `springs.rs`, gravity compensation is in `gravity_compensation.rs`. Other algorithms do not include passive
+//! efforts: callers add them to τ.
 //!
 //! Coulomb friction jumps from −f to f at v = 0. tanh replaces this jump by a slope of f/ε. The relative error of the
-//! friction is below 1 % from |v| = 2.65 ε on and below 1e-6 from 7.25 ε on. At rest a joint creeps instead of
-//! sticking: a load below f moves the joint with a speed of at most ε artanh(load/f). An explicit integrator needs
-//! steps shorter than 2 ε m/f, where m is the inertia that the joint feels.
+//! friction is below 1 % for |v| ≥ 2.65 ε and below 1e-6 for |v| ≥ 7.25 ε. A loaded joint creeps instead of sticking: a
+//! load below f moves the joint with a speed of at most ε artanh(load/f). An explicit integrator needs steps shorter
+//! than 2 ε m/f, where m is the inertia at the joint.
 //!
-//! The losses (damping and friction) of a free joint's linear coordinates act along the axes of its parent, as in
-//! MuJoCo. With the rotation R of the joint, the velocity along these axes is u = R v. With the loss L of each
-//! component of u, the effort is τ = −Rᵀ L(u). Constant damping with three equal coefficients is the same along any
-//! axes. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With A = Rᵀ diag(L′) R
+//! Damping and friction of a free joint's linear coordinates act along the axes of the joint's parent, as in MuJoCo.
+//! With the rotation R of the joint, the velocity along these axes is u = R v. L(u) is the damping and friction effort
+//! of each component of u. The joint's effort is τ = −Rᵀ L(u). For constant damping with three equal coefficients, the
+//! choice of axes has no effect. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With A =
+//! Rᵀ diag(L′) R,
 //!
 //! ```text
 //! ∂τ/∂v = −A     ∂τ/∂δ = τ× + A v×
@@ -38,16 +39,17 @@ use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Sc
 /// numbers (N m, N), overwritten.
 ///
 /// - Damping and friction dissipate power. Damping may be a polynomial, d = d₀ + d₁ |v| + d₂ v²
-///   ([`Model::damping_polynomial`]). The error of the smoothed friction is below 1 % from |v| = 2.65 ε on. At rest a
-///   joint creeps instead of sticking: a load below f moves the joint with a speed of at most ε artanh(load/f). An
-///   explicit integrator needs steps shorter than 2 ε m/f, with m the inertia that the joint feels.
+///   ([`Model::damping_polynomial`]). The error of the smoothed friction is below 1 % for |v| ≥ 2.65 ε. A loaded joint
+///   creeps instead of sticking: a load below f moves the joint with a speed of at most ε artanh(load/f). An explicit
+///   integrator needs steps shorter than 2 ε m/f, where m is the inertia at the joint.
 /// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ of the joint from the rest of the spring. Its
 ///   effort is −(k₀ + k₁ Δ + k₂ Δ²) Δ on a joint with one degree of freedom, and −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on other
 ///   joints. For a spherical joint, Δ is a rotation vector along the body's axes. A free or planar joint has two
 ///   displacements, a translation of the origin and a rotation, each with its own |Δ|. The spring of a mimic joint acts
 ///   on the coordinate of the joint's leader.
-/// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a fraction of the weight of the
-///   bodies that ask for it: τ = −Σ Jᵀ m g, with the carried masses m and the Jacobians J of their centres.
+/// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a fraction of the weight of
+///   each body with gravity compensation: τ = −Σ Jᵀ m g. m are the carried masses, and J the Jacobians of the points at
+///   which these masses are carried.
 ///
 /// The cost is O(n), plus O(depth) for each body with gravity compensation. Allocates nothing. The formulas are the
 /// same as in MuJoCo (`mj_passive`).
@@ -67,7 +69,7 @@ use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Sc
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `smoothing` is not positive.
+/// Panics if an argument has the wrong length, or `smoothing` is not positive.
 #[track_caller]
 pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, tau: &mut [S]) {
     check("q", q.len(), model.nq());
@@ -95,7 +97,7 @@ pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong shape, or `smoothing` is not positive.
+/// Panics if an argument has the wrong shape, or `smoothing` is not positive.
 #[track_caller]
 pub fn passive_torque_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -115,14 +117,14 @@ pub fn passive_torque_derivatives<S: Scalar, R: Constant<S>>(
     slopes(model, q, v, smoothing, dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice());
 }
 
-/// Derivatives of passive efforts; the type of a result of a batch.
+/// Derivatives of passive efforts, as the result type for batches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassiveDerivatives<'d, S> {
     pub dtau_dq: &'d Matrix<S>,
     pub dtau_dv: &'d Matrix<S>,
 }
 
-/// Loss of a coordinate: its damping, the polynomial of the damping, and its friction.
+/// Coefficients of the damping and friction of one coordinate: damping, polynomial damping and Coulomb friction.
 #[derive(Clone, Copy)]
 struct Loss {
     damping: f64,
@@ -164,7 +166,8 @@ impl Loss {
     }
 }
 
-/// Returns whether it matters that the linear losses of a free joint act along the axes of the parent, not of the body.
+/// Returns whether the losses of a free joint's linear coordinates are different along the axes of the parent and of
+/// the body.
 #[inline(always)]
 fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
     let (d, of) = (model.damping(), first..first + 3);
@@ -180,8 +183,8 @@ fn turn<S: Scalar>(q: &[S], v: &[S]) -> (Mat3<S>, Vec3<S>) {
     (Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(v[0], v[1], v[2]))
 }
 
-/// Returns the effort of the loss of each component of u, or the slope of this effort if `slope` is set. u is a free
-/// joint's velocity along the axes of its parent.
+/// Returns the damping and friction effort for each component of u, or the slope of this effort if `slope` is set. u is
+/// the linear velocity of a free joint along the axes of the joint's parent.
 #[inline(always)]
 fn each<S: Scalar, R>(model: &Model<R>, first: usize, smoothing: f64, u: Vec3<S>, slope: bool) -> Vec3<S> {
     let mut x = u.to_array();
@@ -193,7 +196,7 @@ fn each<S: Scalar, R>(model: &Model<R>, first: usize, smoothing: f64, u: Vec3<S>
 }
 
 kernel! {
-    /// Computes all efforts.
+    /// Computes the sum of all passive efforts.
     pub(crate) fn efforts<S, R>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, tau: &mut [S]) {
         for k in 0..tau.len() {
             tau[k] = Loss::of(model, k, smoothing).effort(v[k]);
@@ -258,7 +261,7 @@ kernel! {
     }
 }
 
-/// Returns Rᵀ diag(s) R x.
+/// Returns the product Rᵀ diag(s) R x.
 #[inline(always)]
 fn stretched<S: Scalar>(R: Mat3<S>, s: [S; 3], x: Vec3<S>) -> Vec3<S> {
     let u = R * x;

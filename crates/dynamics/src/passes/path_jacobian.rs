@@ -1,6 +1,7 @@
 //! Jacobian of one frame at one position. The computation visits only the joints between the frame and the world.
 //!
-//! The recursion goes from the frame f to the world. With the pose iXf of f in the frame of body i:
+//! The recursion goes from the frame f to the world. iXf is the pose of f in the frame of body i, and λ is the parent
+//! of i:
 //!
 //! ```text
 //! J_i = iXf⁻¹ S_i     λXf = λXi(q) iXf     at the world, oXf converts J to other reference frames
@@ -20,8 +21,8 @@ use condyle_spatial::{Act, Motion, Scalar, Se3, Vec3, kernel};
 const AT_ONCE: usize = 8;
 
 kernel! {
-    /// Computes the Jacobian J of a frame on the body `body`, in O(depth). iXf is the pose of the frame in the frame of
-    /// the body. `strides` are the distances in `J` between rows and between columns.
+    /// Computes the Jacobian J of a frame that is fixed to `body`, in O(depth). iXf is the pose of the frame in the
+    /// body's frame. `strides` are the distances in `J` between rows and between columns.
     pub(crate) fn path_jacobian<S, R>(
         model: &Model<R>,
         q: &[S],
@@ -63,7 +64,8 @@ kernel! {
             ReferenceFrame::LocalWorldAligned => Se3::new(X.rotation, Vec3::zero()),
         };
         if model.has_mimic() {
-            // With mimic joints, several columns may belong to one coordinate, which must be turned only once.
+            // With mimic joints, several joint columns may belong to one coordinate. Each column of J is converted only
+            // once.
             for coordinate in 0..model.nv() {
                 act(turn, J, coordinate, strides);
             }
@@ -75,7 +77,7 @@ kernel! {
     }
 }
 
-/// Expresses the column of one coordinate of J in another frame, whose transformation is X.
+/// Converts the column of J for one coordinate to another frame by the transformation X.
 #[inline(always)]
 fn act<S: Scalar>(X: Se3<S>, J: &mut [S], coordinate: usize, [down, along]: [usize; 2]) {
     let mut column = [S::zero(); 6];

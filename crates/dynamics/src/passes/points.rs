@@ -1,7 +1,8 @@
 //! Points of bodies and frames: velocities, Jacobians, and forces at points.
 //!
-//! A point is given in the frame of its body, or in a frame on the body, and moves with the body. Let p be the position
-//! of the point in the world. Let S be the columns of the joints on the path to the root, in the world's frame. Then
+//! A point is given in the frame of its body, or in a frame that is fixed to the body, and moves with the body. p is
+//! the position of the point in the world. S are the columns of the joints on the path to the root, in the world's
+//! frame. Then
 //!
 //! ```text
 //! ṗ = v + ω × p     J = ∂ṗ/∂v = S_v + S_ω × p
@@ -30,26 +31,26 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
-    /// Computes the Jacobian J of a point of a body, 3 × nv: the point's velocity along the axes of the world is J v
+    /// Computes the Jacobian J of a point of a body, 3 × nv: J v is the point's velocity along the axes of the world
     /// (m/s). Overwrites J.
     ///
     /// point: position in the frame of the body (m). Costs O(depth + nv) and allocates nothing. The equation is in
     /// [`frame_point_jacobian`](Self::frame_point_jacobian).
     ///
     /// # Panics
-    /// If the body does not exist, or `J` is not 3 × nv.
+    /// Panics if the body does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_jacobian(&self, body: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
         point_jacobian(*self, body, &self.body(body).act(point), columns(J, self.model.nv()));
     }
 
-    /// Computes the Jacobian J of a point of a frame, 3 × nv: the point's velocity along the axes of the world is J v
+    /// Computes the Jacobian J of a point of a frame, 3 × nv: J v is the point's velocity along the axes of the world
     /// (m/s). Overwrites J.
     ///
-    /// point: position in the frame (m). J = S_v + S_ω × p, with p = oXf · point and S the columns of the joints on the
-    /// path to the root. J equals the linear rows of the Jacobian, in `LocalWorldAligned`, of a frame whose origin is
-    /// the point. Costs O(depth + nv) and allocates nothing.
+    /// point: position in the frame (m). J = S_v + S_ω × p, where p = oXf · point, and S are the columns of the joints
+    /// on the path to the root. J equals the linear rows of the Jacobian in `LocalWorldAligned` for a frame with its
+    /// origin at the point. Costs O(depth + nv) and allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Act, Data, Vec3, forward_velocities, robots};
@@ -67,7 +68,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the frame does not exist, or `J` is not 3 × nv.
+    /// Panics if the frame does not exist, or `J` is not 3 × nv.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_jacobian(&self, frame: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -75,12 +76,12 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         point_jacobian(*self, self.model.frames()[frame].body, &p, columns(J, self.model.nv()));
     }
 
-    /// Converts a force at a point of the world to the convention of `f_ext`: in the frame of the body, about the
-    /// body's origin.
+    /// Converts a force that acts on a body at a point given in the world's frame. The result has the convention of
+    /// `f_ext`: it is in the body's frame, with the moment about the body's origin.
     ///
-    /// point: position in the world at which the force acts (m); force: along the axes of the world (N). With the
-    /// body's pose (R, p), the result is f = Rᵀ force and n = Rᵀ ((point − p) × force). If the point is given in the
-    /// body's frame, pass `body(body).act(point)`.
+    /// point: position at which the force acts, in the world's frame (m); force: force along the axes of the world (N).
+    /// With the body's pose (R, p), the result is f = Rᵀ force and n = Rᵀ ((point − p) × force). If the point is given
+    /// in the body's frame, pass `body(body).act(point)`.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Force, Vec3, forward_kinematics, aba, robots};
@@ -95,7 +96,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force_on_body(&self, body: usize, point: Vec3<S>, force: Vec3<S>) -> Force<S> {
@@ -108,7 +109,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// the frame of the body (m).
     ///
     /// # Panics
-    /// If the body does not exist.
+    /// Panics if the body does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn body_point_velocity(&self, body: usize, point: Vec3<S>) -> Vec3<S> {
@@ -120,7 +121,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// the frame (m).
     ///
     /// # Panics
-    /// If the frame does not exist.
+    /// Panics if the frame does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_velocity(&self, frame: usize, point: Vec3<S>) -> Vec3<S> {

@@ -1,16 +1,16 @@
 //! Dynamics and energies as linear functions of the inertial parameters.
 //!
 //! π stacks the ten [parameters](crate::inertial_parameters) of each body except the world. All regressors use one
-//! bilinear form y: ⟨m, I w⟩ = y(m, w) · π_i, where I is the inertia and π_i are the parameters of body i. Let v and a
-//! be the velocity and acceleration of this body. Let S be a column of a joint on the path from the body to the root.
-//! All are in the body's frame. Then
+//! bilinear form y: ⟨m, I w⟩ = y(m, w) · π_i, where I is the inertia and π_i are the parameters of body i. v and a are
+//! the velocity and acceleration of this body, and S is a column of a joint on the path from the body to the root. v, a
+//! and S are expressed in the body's frame. Then
 //!
 //! ```text
 //! τ_S = ⟨S, I a + v ×* I v⟩ = (y(S, a) − y(v × S, v)) · π_i,     T_i = ½ y(v, v) · π_i
 //! ```
 //!
-//! Source: Atkeson, An, Hollerbach, *Estimation of inertial parameters of manipulator loads and links* (1986); because
-//! of the form y, the 6 × 10 matrices of this paper are not needed.
+//! Source: Atkeson, An, Hollerbach, *Estimation of inertial parameters of manipulator loads and links* (1986); the form
+//! y replaces the 6 × 10 matrices of this paper.
 
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::{Moving, World};
@@ -34,8 +34,8 @@ workspace! {
     }
 }
 
-/// Returns y(m, w), the ten numbers with ⟨m, I w⟩ = y · π for each inertia I with parameters π. y is symmetric in m and
-/// w.
+/// Returns the ten numbers y(m, w) that satisfy ⟨m, I w⟩ = y · π for each inertia I with parameters π. y is symmetric
+/// in m and w.
 #[inline(always)]
 pub(crate) fn pairing<S: Scalar>(m: Motion<S>, w: Motion<S>) -> [S; PARAMETERS] {
     let (a, b) = (m.angular, w.angular);
@@ -54,8 +54,8 @@ pub(crate) fn pairing<S: Scalar>(m: Motion<S>, w: Motion<S>) -> [S; PARAMETERS] 
     ]
 }
 
-/// Returns y(S, a) − y(v × S, v): the derivatives of the effort at a joint column S with respect to the ten parameters
-/// of a body. v and a are the velocity and acceleration of the body.
+/// Returns y(S, a) − y(v × S, v), the derivatives of the effort at joint column S with respect to the ten parameters of
+/// a body. v and a are the velocity and acceleration of the body.
 #[inline(always)]
 pub(crate) fn effort<S: Scalar>(column: Motion<S>, v: Motion<S>, a: Motion<S>) -> [S; PARAMETERS] {
     let (mut y, quadratic) = (pairing(column, a), pairing(v.cross(column), v));
@@ -65,14 +65,14 @@ pub(crate) fn effort<S: Scalar>(column: Motion<S>, v: Motion<S>, a: Motion<S>) -
     y
 }
 
-/// Returns the ten entries of body i in a vector for the parameters of all bodies.
+/// Returns the ten entries that belong to body i, in a vector with the parameters of all bodies.
 #[inline(always)]
 fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
     &mut parameters[PARAMETERS * (i - 1)..PARAMETERS * i]
 }
 
 kernel! {
-    /// Computes the regressor Y of the joint efforts, for bodies whose accelerations are known.
+    /// Computes the regressor Y of the joint efforts. The accelerations of the bodies must already be computed.
     pub(crate) fn torque<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         let l = Single::new(model);
         let minus_g = l.minus_gravity();
@@ -96,7 +96,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the regressor y of the kinetic energy, for bodies whose velocities are known.
+    /// Computes the regressor y of the kinetic energy. The velocities of the bodies must already be computed.
     pub(crate) fn kinetic<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         for i in 1..model.nodes().len() {
             let v_b = Placements { model, world }.body(i).act_inv(moving.v[i]);
@@ -106,7 +106,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the regressor y of the potential energy, for bodies whose placements are known.
+    /// Computes the regressor y of the potential energy. The placements of the bodies must already be computed.
     pub(crate) fn potential<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let minus_g = Single::<S, R>::new(model).minus_gravity();
         for i in 1..model.nodes().len() {

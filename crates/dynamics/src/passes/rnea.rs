@@ -2,9 +2,9 @@
 //!
 //! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980). Quantities of a body
 //! are in the frame of the body. Featherstone (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) uses the spatial
-//! acceleration of each body; this file uses the classical acceleration a of its origin. So no linear velocity is
-//! needed. A point r of a body has the acceleration a + K r with K = ω̇× + ω× ω×. The point may be the centre of mass
-//! or the origin of a joint on the body. Line by line:
+//! acceleration of each body. This file uses the classical acceleration a of the body's origin, so it needs no linear
+//! velocity. A point r of a body has the acceleration a + K r with K = ω̇× + ω× ω×. The point may be the centre of mass
+//! or the origin of a joint on the body. The equations of the book correspond to the following equations:
 //!
 //! ```text
 //! the book                            here
@@ -18,8 +18,8 @@
 //! ```
 //!
 //! The two loops of the book are merged into one. When the pass has visited the last body of a subtree, it adds the
-//! force on the subtree's root to the force on its parent. The test `the_book_gives_the_same` compares this pass with
-//! the equations of the book.
+//! force on the root of the subtree to the force on the root's parent. The test `the_book_gives_the_same` compares this
+//! pass with the equations of the book.
 
 use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::{PlacementCache, World};
@@ -32,9 +32,10 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Force, Inertia, Scalar, Se3, Vec3};
 
 workspace! {
-    /// Scratch of the recursive Newton–Euler algorithm, in the turned frames of the bodies.
+    /// Scratch of the recursive Newton–Euler algorithm, in the internal frames of the bodies, which are rotated to the
+    /// joint axes.
     pub(crate) struct Workspace<S>(size) {
-        /// λXi. Written by: `pass`.
+        /// Pose λXi of each body in the frame of its parent. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.body_depth),
         /// Angular velocity, angular acceleration and acceleration of the origin of each body. The world's acceleration
         /// is −g, which includes gravity. Written by: `pass`.
@@ -44,12 +45,12 @@ workspace! {
         pub f: Array<Force<S>> = filled(Force::zero, size.body_depth),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
-        /// Zeros that stand for accelerations or velocities that the caller does not give. Never overwritten.
+        /// Zeros, passed as accelerations or velocities if the caller gives none. Never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Runs the recursive Newton–Euler algorithm, branch by branch, to the tip of the branch and back.
+/// Runs the recursive Newton–Euler algorithm branch by branch: from the start of the branch to its tip, and back.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -69,7 +70,7 @@ pub(crate) fn pass<L: Layout>(
     for i in l.bodies() {
         let here = l.stack_index(i);
         let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
-        X[here] = Xi; // stored immediately, so that it does not occupy the machine stack
+        X[here] = Xi; // stored here, so that `Xi` needs no stack memory later
         let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
         let a = parent.centripetal().mul_add(Xi.translation, parent.a); // a_λ + K_λ p
         let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };

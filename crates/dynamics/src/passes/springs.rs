@@ -1,23 +1,23 @@
-//! Springs of joints.
+//! Efforts of the springs of joints, and the derivatives of these efforts.
 //!
 //! ```text
 //! τ = −(k₀ + k₁ Δ + k₂ Δ²) Δ                        (one degree of freedom)
 //! τ = −g(|Δ|) Δ,   g(r) = k₀ + k₁ r + k₂ r²     ∂τ/∂Δ = −(g 1 + (k₁/r + 2 k₂) Δ Δᵀ)     (others)
 //! ```
 //!
-//! Δ is the displacement of the joint from the rest position q₀ or R₀ of its spring. For a joint of one degree of
-//! freedom and for a translational joint, Δ = q − q₀; for a continuous joint, this angle is mapped to (−π, π]. For a
+//! Δ is the displacement of the joint from the rest position q₀ or R₀ of its spring. For joints with one degree of
+//! freedom and for translation joints, Δ = q − q₀. For a continuous joint, this angle is mapped to (−π, π]. For a
 //! spherical joint, Δ is the rotation vector log(R₀ᵀ R), and ∂Δ/∂q is the Jacobian J_log(Δ) of the logarithm. A free or
-//! planar joint has two displacements, each with its own r: u of the origin, along the axes of the body, and Δ of the
-//! rotation:
+//! planar joint has two displacements, each with its own r: the displacement u of the origin, along the axes of the
+//! body, and the displacement Δ of the rotation:
 //!
 //! ```text
 //! u = Rᵀ (p − p₀),   ∂u/∂(p, θ) = [1, u×]     Δ = log(R₀ᵀ R)
 //! ```
 //!
-//! All of these forces have a potential. The formulas are the same as in MuJoCo (`mj_passive`): on a joint with one
-//! degree of freedom, k₁ makes the spring stiffer on one side than on the other. The spring of a mimic joint uses the
-//! mimic joint's own displacement, and the layout adds its effort to the leader's coordinate.
+//! All spring forces have a potential. The formulas are the same as in MuJoCo (`mj_passive`). On a joint with one
+//! degree of freedom, k₁ makes the stiffness depend on the sign of Δ. The spring of a mimic joint uses the mimic
+//! joint's own displacement, and the layout adds the spring's effort to the leader's coordinate.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
@@ -25,10 +25,12 @@ use condyle_model::{Model, Spring};
 use condyle_spatial::lie::{jlog3, log3};
 use condyle_spatial::{Quaternion, Scalar, Vec3};
 
-/// Minimum of |Δ|² (rad², m²) before the square root is taken. It avoids a division by r = 0.
+/// Minimum of |Δ|² (rad², m²). Smaller values are replaced by this minimum before the square root r is taken, to avoid
+/// a division by r = 0.
 const LEAST: f64 = 1e-30;
 
-/// Returns the stiffness g at a displacement Δ, and the factor s = k₁/r + 2 k₂ of Δ Δᵀ in the slope.
+/// Returns the stiffness g at a displacement Δ, and the coefficient s = k₁/r + 2 k₂ of the term Δ Δᵀ in the derivative
+/// of the force.
 #[inline(always)]
 fn stiffness<S: Scalar>([k0, k1, k2]: [f64; 3], displacement: Vec3<S>) -> (S, S) {
     if k1 == 0.0 && k2 == 0.0 {
@@ -46,7 +48,7 @@ fn pull<S: Scalar>(k: [f64; 3], displacement: Vec3<S>) -> Vec3<S> {
     displacement.scale(-stiffness(k, displacement).0)
 }
 
-/// Returns −(g 1 + s Δ Δᵀ) x, the derivative of the spring's force along x.
+/// Returns −(g 1 + s Δ Δᵀ) x, the derivative of the spring's force in the direction x.
 #[inline(always)]
 fn slope<S: Scalar>(k: [f64; 3], displacement: Vec3<S>, x: Vec3<S>) -> Vec3<S> {
     let (g, s) = stiffness(k, displacement);
@@ -59,7 +61,7 @@ fn angle<S: Scalar>([cos, sin]: [S; 2], [cos0, sin0]: [S; 2]) -> S {
     (cos0 * sin - sin0 * cos).atan2(cos0 * cos + sin0 * sin)
 }
 
-/// Returns the rest position of a spring on a joint of one degree of freedom, as an angle or a length.
+/// Returns the rest position of a spring on a joint with one degree of freedom, as an angle or a length.
 #[inline(always)]
 fn rest_of_one<R>(model: &Model<R>, spring: &Spring) -> f64 {
     match model.bodies()[spring.body].joint {
@@ -68,7 +70,7 @@ fn rest_of_one<R>(model: &Model<R>, spring: &Spring) -> f64 {
     }
 }
 
-/// Returns the displacement of a joint of one degree of freedom from the rest of its spring.
+/// Returns the displacement of a joint with one degree of freedom from the rest position of the joint's spring.
 #[inline(always)]
 fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L::S]) -> L::S {
     let (i, rest) = (spring.body, rest_of_one(model, spring));
@@ -76,14 +78,15 @@ fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q
     let (node, own) = (&model.nodes()[i], model.bodies()[i].joint);
     let position = l.position(q, i, 0);
     if turns(node.joint) {
-        // The offset of a mimic joint is part of the joint's placement, not of its position.
+        // The placement of a mimic joint, not its position, includes the joint's offset. So the offset is subtracted
+        // here.
         let offset = node.mimic.map_or(0.0, |mimic| mimic.offset);
         let (sin0, cos0) = Scalar::sin_cos(rest - offset);
         return angle([position, l.position(q, i, 1)], [L::S::splat(cos0), L::S::splat(sin0)]);
     }
     let displacement = position - L::S::splat(rest);
     if turns(own) {
-        let (sin, cos) = displacement.sin_cos(); // the leader is not continuous
+        let (sin, cos) = displacement.sin_cos(); // the leader is not continuous, so the angle is mapped to (−π, π] here
         return sin.atan2(cos);
     }
     displacement
@@ -99,8 +102,8 @@ fn quaternion<S: Scalar>(q: &[S]) -> Quaternion<S> {
     Quaternion::new(q[0], q[1], q[2], q[3])
 }
 
-/// Returns the two displacements of a joint of several degrees of freedom: u of the origin and Δ of the rotation, along
-/// the axes of the body.
+/// Returns the two displacements of a joint with several degrees of freedom: the displacement u of the origin and the
+/// rotation vector Δ, along the axes of the body.
 #[inline(always)]
 fn displacements<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L::S]) -> (Vec3<L::S>, Vec3<L::S>) {
     let (joint, o) = (l.joint(spring.body), L::S::zero());

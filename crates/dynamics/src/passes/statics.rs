@@ -1,9 +1,10 @@
-//! Efforts that hold a robot still, and the derivatives of these efforts. Weights and external forces are summed from
-//! the tips to the root.
+//! Efforts that hold a robot still against gravity and external forces, and the derivatives of these efforts. Weights
+//! and external forces are summed from the tips to the root.
 //!
-//! Coordinate e turns all bodies that its joint carries about S_e. The weights of these bodies keep their direction;
-//! external forces turn with the bodies. In the notation of `rnea_derivatives`, for a robot at rest, a₀ = −g and Ψ̈ =
-//! a₀ × S. Iᶜ is the inertia of all bodies that a joint carries, and F the sum of I a₀ − f_ext over these bodies. Then
+//! Coordinate e turns all bodies that the joint of e carries about S_e. The weights of these bodies keep their
+//! direction, whereas external forces turn with the bodies. With the symbols of `rnea_derivatives`, a robot at rest has
+//! a₀ = −g and Ψ̈ = a₀ × S. Iᶜ is the inertia of all bodies that a joint carries, and F is the sum of I a₀ − f_ext over
+//! these bodies. Then
 //!
 //! ```text
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
@@ -25,12 +26,12 @@ workspace! {
         pub tau: Array<S> = filled(S::zero, size.nv),
         /// Inertia of all bodies that a joint carries. Written by: `derivative`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// ∂τ/∂q. Written by: `derivative`.
+        /// Derivative ∂τ/∂q of the joint efforts. Written by: `derivative`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// Computes the efforts τ, for bodies whose placements are known.
+/// Computes the efforts τ. The placements of the bodies must already be computed.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, tau, .. } = d;
@@ -54,13 +55,13 @@ fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// Computes the efforts τ that hold a robot still, for bodies whose placements are known.
+    /// Computes the efforts τ that hold a robot still. The placements of the bodies must already be computed.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
         pass(&Single::new(model), world, d, f_ext);
     }
 }
 
-/// Computes ∂τ/∂q of the efforts that hold a robot still, for bodies whose placements are known.
+/// Computes ∂τ/∂q of the efforts that hold a robot still. The placements of the bodies must already be computed.
 #[inline(always)]
 fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, IC, dtau_dq, .. } = d;
@@ -98,7 +99,7 @@ fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Worksp
 }
 
 kernel! {
-    /// Computes ∂τ/∂q of the efforts that hold a robot still, for bodies whose placements are known.
+    /// Computes ∂τ/∂q of the efforts that hold a robot still. The placements of the bodies must already be computed.
     pub(crate) fn run_derivative<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
         derivative(&Single::new(model), world, d, f_ext);
     }

@@ -1,58 +1,59 @@
-//! Impulses λ of m unilateral contacts with Coulomb friction, as the solution of a problem on the level of velocities:
+//! Solver for the impulses λ of m unilateral contacts with Coulomb friction. The equations are formulated with
+//! velocities u:
 //!
 //! ```text
 //! u = G λ + b        0 ≤ λ_n ⊥ u_n ≥ 0        ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t/‖u_t‖ where u_t ≠ 0
 //! ```
 //!
-//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity that the points would have without contact, plus terms for the
-//! gaps in the normal rows. Each point has three rows: two along the ground, then the normal one. Friction follows
-//! Coulomb's disc exactly, without a pyramid or a convex relaxation. λ is a solution if and only if it is a fixed point
-//! of
+//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity of the points without contact, plus terms for the gaps in the
+//! normal rows. Each point has three rows: two rows along the ground, and the third row along the normal. Friction is
+//! limited by Coulomb's disc exactly, without a pyramid or a convex relaxation. λ is a solution if and only if λ is a
+//! fixed point of
 //!
 //! ```text
 //! λ_n ← max(0, λ_n − u_n/g_n)        λ_t ← P(λ_t − u_t/g_t),  P the projection on the disc of radius μ λ_n
 //! ```
 //!
-//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the distance from the fixed point times g. It is a
-//! velocity. Two methods take turns:
+//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the difference between λ and its image, times g. So
+//! the residual has the unit of a velocity. The solver alternates between two methods:
 //!
-//! - Newton's method on the fixed point. It squares the error once it has found which points stick, slide or are open.
-//!   Several steps together are discarded if they do not reduce the residual.
-//! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). The sweeps find from any first guess which
-//!   points stick, slide or are open.
+//! - Newton's method for the fixed-point equation. When the state of each point (sticking, sliding or open) is correct,
+//!   each step squares the error. A burst of several steps is discarded if it does not reduce the residual.
+//! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). The sweeps determine from any initial guess
+//!   which points stick, slide or are open.
 //!
-//! Where contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the
-//! diagonal of G in the slope, but not in the equation for u. So its step changes the impulses least, and the fixed
-//! point stays the same (the proximal point algorithm, Rockafellar 1976). The impulses of the last time step are the
-//! first guess, so that forces at rest stay constant.
+//! If contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the
+//! diagonal of G in the slope matrix, but not in the equation for u. So each step changes the impulses as little as
+//! possible, and the fixed point is not changed (the proximal point algorithm, Rockafellar 1976). The impulses of the
+//! last time step are the initial guess. This keeps the forces on a robot at rest constant.
 
 use alloc::vec::Vec;
 use condyle_spatial::Scalar;
 
-/// Minimum and maximum of ε, as a share of the largest entry on the diagonal of G. The minimum is small compared with
-/// the coupling of contacts, and large compared with rounding.
+/// Minimum and maximum of ε, as a fraction of the largest diagonal entry of G. The minimum is small compared with the
+/// entries that couple contacts, and large compared with rounding errors.
 const PROXIMAL: [f64; 2] = [1e-8, 1.0];
-/// Minimum of g_n and g_t, as a share of the largest entry on the diagonal of G. If the joints hold a point in a
-/// direction, the row of G for this direction is 0.
+/// Minimum of g_n and g_t, as a fraction of the largest diagonal entry of G. The minimum is needed if the joints
+/// prevent the motion of a point in a direction: the row of G for this direction is then 0.
 const LEAST: f64 = 1e-12;
 /// Factor by which ε grows after discarded steps and shrinks after accepted steps.
 const DAMPING: f64 = 30.0;
-/// Number of steps of Newton's method within which the residual must shrink. Two or three steps find which points
-/// stick, slide or are open, and the residual may grow during these steps. With random contacts, 4 steps fail four
-/// times less often than 1 step.
+/// Maximum number of steps in a burst of Newton's method. The residual must shrink within these steps. It may grow
+/// during the first two or three steps, which determine the points that stick, slide or are open. With random contacts,
+/// bursts of 4 steps fail four times less often than bursts of 1 step.
 const BURST: usize = 4;
-/// Maximum ratio of the residual after accepted steps to the residual before.
+/// Maximum ratio of the residual after a burst to the residual before. A burst with a larger ratio is discarded.
 const PROGRESS: f64 = 0.7;
-/// Number of Gauss–Seidel sweeps after discarded steps. With 8 points, all these sweeps cost about as much as one step
-/// of Newton's method.
+/// Number of Gauss–Seidel sweeps after a discarded burst. With 8 points, these sweeps together cost about as much as
+/// one step of Newton's method.
 const SWEEPS: usize = 12;
-/// Number of projections per sweep for a point that slides.
+/// Number of projected iterations for the impulse of a sliding point in one sweep.
 const ALONE: usize = 4;
-/// Share of the tolerance below which the residual of a first guess is accepted. A worse guess is improved even if it
-/// meets the tolerance; otherwise the error of one time step makes the forces of the next step ripple.
+/// Fraction of the tolerance. An initial guess is accepted without iterations only if its residual is below this
+/// fraction of the tolerance. Otherwise, the errors of the guesses would make the forces fluctuate from step to step.
 const POLISHED: f64 = 1e-4;
 
-/// Outcome of a solve.
+/// Outcome of a call of the contact solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
     /// Solution with a residual within the tolerance.
@@ -61,21 +62,22 @@ pub(super) enum Outcome {
     NotSolved(f64),
 }
 
-/// Memory for contacts of up to a given number of points; matrices are stored by columns.
+/// Memory of the solver for up to a given number of points. Matrices are stored by columns.
 #[derive(Clone, Debug)]
 pub(super) struct ContactSolver {
-    /// Delassus matrix G. Shape: 3m × 3m. Written by: the caller.
+    /// Delassus matrix G of m points. Shape: 3m × 3m. Written by: the caller.
     pub G: Vec<f64>,
-    /// Velocities b for λ = 0, with the terms of the gaps (m/s). Shape: 3m. Written by: the caller.
+    /// Velocities b of the points for λ = 0, plus the terms of the gaps (m/s). Shape: 3m. Written by: the caller.
     pub b: Vec<f64>,
-    /// Impulses λ (N s): the first guess, then the solution. Shape: 3m.
+    /// Impulses λ (N s): on entry the initial guess, on exit the solution. Shape: 3m.
     pub impulses: Vec<f64>,
-    /// Velocities u = G λ + b (m/s) of the last λ. Shape: 3m. Written by: `solve`.
+    /// Velocities u = G λ + b (m/s) for the last computed λ. Shape: 3m. Written by: `solve`.
     pub velocities: Vec<f64>,
     /// Impulses after a step of Newton's method, and the velocities u for these impulses.
     candidate: Vec<f64>,
     candidate_velocities: Vec<f64>,
-    /// Slope of Newton's equation, and its right-hand side, which the solution overwrites. Shape: 3m × 3m, and 3m.
+    /// Matrix (`slope`) and right-hand side (`step`) of the linear equations of Newton's method. The solution
+    /// overwrites the right-hand side. Shape: 3m × 3m (`slope`), 3m (`step`).
     slope: Vec<f64>,
     step: Vec<f64>,
 }
@@ -96,9 +98,9 @@ impl ContactSolver {
         }
     }
 
-    /// Solves for λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). One iteration is
-    /// a burst of steps of Newton's method, plus the sweeps if these steps are discarded. λ is always inside the
-    /// friction cones.
+    /// Solves for λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). An iteration
+    /// consists of a burst of steps of Newton's method, and of sweeps if the burst is discarded. λ is inside the
+    /// friction cones even if the tolerance is not reached.
     pub(super) fn solve(&mut self, points: usize, friction: f64, tolerance: f64, max_iterations: usize) -> Outcome {
         let n = 3 * points;
         let Self { G, b, impulses, velocities, candidate, candidate_velocities, slope, step } = self;
@@ -113,7 +115,7 @@ impl ContactSolver {
             if residual <= tolerance && polished {
                 break;
             }
-            polished = residual <= tolerance; // one more step then squares the error
+            polished = residual <= tolerance; // if true, the next burst is the last one: it squares the error
             y.copy_from_slice(x);
             w.copy_from_slice(u);
             let smaller = (0..BURST).any(|_| {
@@ -148,13 +150,13 @@ impl ContactSolver {
     }
 }
 
-/// Equations of the contacts in one time step.
+/// Contact problem of one time step.
 struct Problem<'a> {
     G: &'a [f64],
     b: &'a [f64],
     n: usize,
     friction: f64,
-    /// Largest entry on the diagonal of G, or 1 if nothing can move.
+    /// Largest diagonal entry of G, or 1 if G is zero because no point can move.
     scale: f64,
 }
 
@@ -169,8 +171,8 @@ impl<'a> Problem<'a> {
         self.G[j * self.n + i]
     }
 
-    /// Returns g_t and g_n of the point whose rows begin at r. They are bounds of the eigenvalues of the point's
-    /// tangential and normal blocks of G.
+    /// Returns g_t and g_n of the point whose rows begin at r. g_t and g_n are upper bounds of the eigenvalues of the
+    /// point's tangential and normal blocks of G.
     fn stiffness(&self, r: usize) -> (f64, f64) {
         let least = LEAST * self.scale;
         ((self.entry(r, r) + self.entry(r + 1, r + 1)).max(least), self.entry(r + 2, r + 2).max(least))
@@ -189,7 +191,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Projects the impulse of each point into the friction cone: λ_n ≥ 0, then ‖λ_t‖ ≤ μ λ_n.
+    /// Projects the impulse of each point into the friction cone: first to λ_n ≥ 0, and then to ‖λ_t‖ ≤ μ λ_n.
     fn project(&self, x: &mut [f64]) {
         for x in x.chunks_exact_mut(3) {
             x[2] = x[2].max(0.0);
@@ -197,8 +199,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Returns the largest distance of an impulse from the fixed point, times g (m/s). The result is NaN if an impulse
-    /// is NaN.
+    /// Returns the residual of the impulses x (m/s): the largest difference between an impulse and its image in the
+    /// fixed-point equation, times g. The result is NaN if an impulse is NaN.
     fn residual(&self, x: &[f64], u: &[f64]) -> f64 {
         (0..self.n).step_by(3).fold(0.0, |largest: f64, r| {
             let (g_t, g_n) = self.stiffness(r);
@@ -211,23 +213,23 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Runs one Gauss–Seidel sweep. The sweep sets the impulse of each point to the solution of the contact law of this
-    /// point, with all other impulses fixed. For a sliding point, the impulse only approaches this solution.
+    /// Runs one Gauss–Seidel sweep. The sweep visits each point and solves the contact conditions of this point for its
+    /// impulse, with all other impulses fixed. For a sliding point, the solution is only approximate.
     fn sweep(&self, x: &mut [f64]) {
         for r in (0..self.n).step_by(3) {
             let mut block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| self.entry(r + i, r + j)));
             (0..3).for_each(|i| block[i][i] += LEAST * self.scale);
             let own = [x[r], x[r + 1], x[r + 2]];
-            let w = [0, 1, 2].map(|i| self.velocity(r + i, x) - dot(block[i], own)); // u without its own impulse
+            let w = [0, 1, 2].map(|i| self.velocity(r + i, x) - dot(block[i], own)); // u without this impulse
             x[r..r + 3].copy_from_slice(&self.alone(block, w, own, self.stiffness(r)));
         }
     }
 
-    /// Returns the impulse of one point. G is the point's block of the Delassus matrix, w the point's velocity without
-    /// its own impulse.
+    /// Returns the impulse that satisfies the contact conditions of one point. G is the point's block of the Delassus
+    /// matrix, and w is the point's velocity without the impulse.
     fn alone(&self, G: [[f64; 3]; 3], w: [f64; 3], mut x: [f64; 3], (g_t, g_n): (f64, f64)) -> [f64; 3] {
         if w[2] >= 0.0 {
-            return [0.0; 3]; // open: u = w
+            return [0.0; 3]; // open: λ = 0, so u = w
         }
         let stuck = solve3(G, w.map(|w| -w)); // sticking: u = 0
         if length([stuck[0], stuck[1]]) <= self.friction * stuck[2] {
@@ -292,7 +294,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Returns ‖x‖.
+/// Returns the Euclidean norm of x.
 fn length([x, y]: [f64; 2]) -> f64 {
     Scalar::sqrt(x * x + y * y)
 }
@@ -316,14 +318,14 @@ fn solve3(A: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
     [(y0 - l1 * x1 - l2 * x2) / a, x1, x2]
 }
 
-/// Returns the point nearest to z in the disc with this radius about 0.
+/// Returns the point of the disc that is nearest to z. The disc has the given radius and its centre at 0.
 fn disc(z: [f64; 2], radius: f64) -> [f64; 2] {
     let size = length(z);
     if size <= radius { z } else { z.map(|z| z * (radius / size)) }
 }
 
 /// Replaces b by the solution x of A x = b, by elimination with row exchanges. A is stored by columns and is
-/// overwritten. If a row has no pivot, the solution is not finite.
+/// overwritten. If A is singular, the solution is not finite.
 fn eliminate(A: &mut [f64], b: &mut [f64]) {
     let n = b.len();
     for k in 0..n {

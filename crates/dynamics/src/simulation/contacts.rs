@@ -1,5 +1,6 @@
-//! Step on the ground: gaps, Jacobians and Delassus matrix of the points that may touch, impulses of these points, and
-//! correction of penetration. Model and equations: [`Ground`]; impulses: `contact_solver.rs`.
+//! Step of a robot in contact with the ground. The step computes the gaps, the Jacobians and the Delassus matrix of the
+//! points that may touch, the impulses of these points, and the correction of penetration. [`Ground`] documents the
+//! model and the equations; `contact_solver.rs` computes the impulses.
 
 use super::Status;
 use super::contact_solver::{ContactSolver, Outcome};
@@ -12,16 +13,16 @@ use condyle_linalg::{Ltdl, dot};
 use condyle_model::{Error, Model};
 use condyle_spatial::{Act, Matrix, Vec3, matrix};
 
-/// Maximum distance between a point and the plane at which the point counts as touching (m). The solver's tolerance
-/// moves a resting point by less (1e-12 m per step). If such distances were corrected, the corners of a sole would
-/// carry the load in turns.
+/// Maximum distance between a point and the plane at which the point counts as touching (m). A resting point moves by
+/// less than this distance, because of the solver's tolerance (1e-12 m per step). If such small distances counted as
+/// gaps, the load would jump between the corners of a sole.
 const RESTING: f64 = 1e-7;
-/// Share of the depth by which a penetrating point is moved towards the surface in each step.
+/// Fraction of the penetration depth that is corrected in each step.
 const OUT: f64 = 0.2;
-/// Maximum speed at which a penetrating point is moved towards the surface (m/s).
+/// Maximum speed at which the correction moves a penetrating point towards the surface (m/s).
 const OUT_SPEED: f64 = 0.5;
-/// Minimum speed at which a point that hits the ground bounces, as a multiple of the speed that gravity produces in a
-/// step. Without this minimum, restitution would shake a resting point.
+/// Minimum impact speed at which a point bounces, as a multiple of the speed that gravity produces in a step. Without
+/// this minimum, a resting point with restitution would bounce in every step.
 const REST: f64 = 2.0;
 
 /// Function that computes a step on the ground: [`Contacts::advance`].
@@ -31,28 +32,28 @@ type Step = fn(&mut Contacts, &Model, &mut Data<f64>, f64, (&[f64], &[f64]), &mu
 #[derive(Clone, Debug)]
 pub(super) struct Contacts {
     pub ground: Ground,
-    /// Pointer to [`advance`](Self::advance). The call by pointer keeps the code of contacts out of programs without a
-    /// ground.
+    /// Pointer to [`advance`](Self::advance). Because the function is called through a pointer, the linker can omit the
+    /// code of contacts from programs that never set a ground.
     pub step: Step,
-    /// Two unit vectors along the plane, then its normal.
+    /// Axes of the contact forces: two unit vectors along the plane, and the normal of the plane.
     axes: [Vec3<f64>; 3],
-    /// Impulses of all points along the axes, at the end of the last step (N s). Shape: 3P. Written by: `advance`.
+    /// Impulses of all points in the last step, along `axes` (N s). Shape: 3P. Written by: `advance`.
     pub impulses: Vec<f64>,
-    /// Contacts of the last step. Shape: P. Written by: `advance`.
+    /// Contact of each point in the last step. Shape: P. Written by: `advance`.
     pub results: Vec<GroundContact>,
-    /// Velocity that is added only for the displacement of the step, to correct penetration. Shape: nv. Written by:
-    /// `advance`.
+    /// Velocity w that corrects penetration. It is added to the velocity only for the displacement of the step. Shape:
+    /// nv. Written by: `advance`.
     pub correction: Vec<f64>,
     /// Jacobian J of one point along the axes of the world. Shape: 3 × nv.
     jacobian: Matrix<f64>,
-    /// Rows of J of all points along the axes, one row after the other. Shape: 3P × nv.
+    /// Jacobians of all points along `axes`, stored by rows. Shape: 3P × nv.
     J: Vec<f64>,
-    /// Rows of J M⁻¹ for the active points, stored like `J`.
+    /// Rows of J M⁻¹ of the active points, in the order of `active`, stored like `J`.
     Y: Vec<f64>,
     /// Gaps φ, the distances of the points to the plane (m); 0 if a distance is less than `RESTING`. Shape: P.
     gaps: Vec<f64>,
     positions: Vec<Vec3<f64>>,
-    /// Indices of the active points, in the order of activation. Only the impulses of these points are solved for.
+    /// Indices of the active points, in the order of activation. The solver computes impulses for these points only.
     /// Shape: up to P.
     active: Vec<usize>,
     factor: Ltdl<f64>,
@@ -60,7 +61,7 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// Allocates memory for a ground.
+    /// Allocates memory for the contacts with a ground.
     pub(super) fn new(model: &Model, ground: Ground) -> Result<Self, Error> {
         let ground = ground.checked(model)?;
         let (points, nv) = (ground.points.len(), model.nv());
@@ -83,7 +84,7 @@ impl Contacts {
         })
     }
 
-    /// Clears the results of the last step, so that the next step depends only on the state.
+    /// Clears the results of the last step. The next step then depends only on the state.
     pub(super) fn reset(&mut self) {
         self.impulses.fill(0.0);
         let nothing = GroundContact { position: Vec3::zero(), force: Vec3::zero(), touches: false };
@@ -102,7 +103,7 @@ impl Contacts {
     ) -> Status {
         self.correction.fill(0.0);
         if !v_next.iter().all(|v| v.is_finite()) {
-            return Status::Done; // the caller detects numbers that are not finite
+            return Status::Done; // the caller reports numbers that are not finite
         }
         self.place(model, data, q);
         self.factor.factorize(crba(model, data, q));
@@ -162,7 +163,7 @@ impl Contacts {
         &self.J[(3 * i + k) * nv..][..nv]
     }
 
-    /// Activates point i and computes the rows of J M⁻¹ for it.
+    /// Activates point i and computes the point's rows of J M⁻¹.
     fn add(&mut self, i: usize) {
         let (nv, at) = (self.correction.len(), 3 * self.active.len());
         for k in 0..3 {
@@ -173,12 +174,12 @@ impl Contacts {
         self.active.push(i);
     }
 
-    /// Returns J_n v of point i, its normal speed at the velocity v.
+    /// Returns J_n v, the normal speed of point i at the velocity v.
     fn normal_speed(&self, i: usize, v: &[f64]) -> f64 {
         dot(self.row(i, 2), v)
     }
 
-    /// Returns J_n (v + M⁻¹ Jᵀ λ) of point i: its normal speed after the impulses λ of the active points.
+    /// Returns J_n (v + M⁻¹ Jᵀ λ), the normal speed of point i after the impulses λ of the active points.
     fn speed_after(&self, i: usize, v: &[f64]) -> f64 {
         let (nv, row) = (v.len(), self.row(i, 2));
         let pushes = self.Y.chunks_exact(nv.max(1)).zip(&self.solver.impulses).take(3 * self.active.len());
@@ -205,7 +206,7 @@ impl Contacts {
                 self.solver.G[a * n + c] = g;
             }
             self.solver.b[a] = b;
-            self.solver.impulses[a] = self.impulses[3 * i + k]; // first guess
+            self.solver.impulses[a] = self.impulses[3 * i + k]; // initial guess
         }
         let Ground { friction, tolerance, max_iterations, .. } = self.ground;
         self.solver.solve(points, friction, tolerance, max_iterations)
@@ -232,8 +233,8 @@ impl Contacts {
         }
     }
 
-    /// Computes the correction w = M⁻¹ J_nᵀ π. Its impulses π solve a problem of contacts without friction: 0 ≤ π ⊥ J_n
-    /// (v⁺ + w) − (share of the depth)/h ≥ 0.
+    /// Computes the correction w = M⁻¹ J_nᵀ π. The impulses π solve a contact problem without friction: 0 ≤ π ⊥ J_n (v⁺
+    /// + w) − (corrected fraction of the depth)/h ≥ 0.
     fn correct(&mut self, h: f64, v_next: &[f64]) {
         let (nv, points) = (v_next.len(), self.active.len());
         let mut deep = false;
@@ -255,9 +256,10 @@ impl Contacts {
     }
 }
 
-/// Returns two orthogonal unit vectors perpendicular to n, then n. For n = z, the first two are x and y.
+/// Returns three axes: two orthogonal unit vectors perpendicular to n, and n. For n = z, the first two axes are x and
+/// y.
 fn axes(n: Vec3<f64>) -> [Vec3<f64>; 3] {
-    // The method of Duff et al. (2017) has no cancellation for any n.
+    // The method of Duff et al. (2017) avoids cancellation for every n.
     let sign = 1f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;

@@ -1,4 +1,4 @@
-//! Semi-implicit (symplectic) Euler method.
+//! Step of the semi-implicit (symplectic) Euler method.
 
 use super::{Input, acceleration};
 use crate::data::Data;
@@ -11,7 +11,7 @@ workspace! {
     pub(super) struct Workspace<S>(size) {
         /// Efforts, including passive efforts. Written by: `velocity`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// h v'. Written by: `position`.
+        /// Displacement h v'. Written by: `position`.
         way: Array<S> = filled(S::zero, size.nv),
     }
 }

@@ -6,8 +6,8 @@ use condyle_spatial::Vec3;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Tolerance within which a normal's length counts as 1; it covers the rounding of a normalised vector. A normal within
-/// the tolerance keeps its exact bits.
+/// Tolerance of the normal's length. It covers the rounding errors of a normalised vector. If the length is 1 within
+/// this tolerance, the normal is not normalised again and keeps its exact bits.
 const UNIT: f64 = 1e-15;
 
 /// Point of a robot that may touch the ground.
@@ -34,19 +34,20 @@ pub struct GroundPoint {
 /// ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t⁺/‖u_t⁺‖ where u_t⁺ ≠ 0       Coulomb's disc: no pyramid
 /// ```
 ///
-/// A point that approaches the plane is slowed down, so that it arrives exactly at the end of a step. To first order it
-/// does not penetrate. With a restitution e, a point that would hit the plane faster than 2 h ‖g‖ leaves the plane with
-/// e times its speed instead (Newton's law). A point may be below the plane, in the initial state or because its path
-/// is curved. Then the displacement of a step is corrected by w: q⁺ = q ⊕ h (v⁺ + w). This reduces the depth by a fifth
-/// per step, at no more than 0.5 m/s. The velocity does not include w, so depth does not become speed.
+/// A point that approaches the plane is slowed down, so that it arrives at the plane exactly at the end of a step. To
+/// first order in h, the point does not penetrate the plane. With a restitution e, a point that would hit the plane
+/// faster than 2 h ‖g‖ leaves the plane with e times its impact speed instead (Newton's law). A point may be below the
+/// plane, in the initial state or because its path is curved. Then the displacement of a step is corrected by w: q⁺ = q
+/// ⊕ h (v⁺ + w). The correction reduces the depth by a fifth per step, at no more than 0.5 m/s. The velocity v⁺ does
+/// not include w, so the correction adds no kinetic energy.
 ///
-/// Limits:
+/// Limits of the model:
 ///
 /// - Errors are O(h), because contact and sliding begin and end only at the ends of steps.
-/// - Contacts store no energy and add none: λ never increases the kinetic energy. The exception is e > 0 with several
-///   contacts and friction, where Newton's law can increase the energy.
-/// - Contacts of edges, of other bodies and between bodies are not modelled, nor are rolling resistance and torsional
-///   friction. A sole resists turning by the friction of its corners.
+/// - Contacts do not store energy, and λ never increases the kinetic energy. The exception is restitution (e > 0) at
+///   several contacts with friction: there, Newton's law can increase the energy.
+/// - Only the given points touch the plane. Contacts of edges or other bodies, contacts between bodies, rolling
+///   resistance and torsional friction are not modelled. A sole resists turning by the friction at its corners.
 /// - Impulses of redundant contacts are not unique, but the sum of these impulses is.
 /// - Forces are mean values over a step.
 ///
@@ -73,8 +74,8 @@ pub struct GroundPoint {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Ground {
-    /// Direction n out of the ground, in the world's frame. [`set_ground`](super::Simulation::set_ground) normalises
-    /// it.
+    /// Normal n of the plane, pointing out of the ground, in the world's frame.
+    /// [`set_ground`](super::Simulation::set_ground) normalises it.
     pub normal: Vec3<f64>,
     /// Height of the plane along n (m): n · p for each point p of the plane.
     pub height: f64,
@@ -85,11 +86,11 @@ pub struct Ground {
     pub restitution: f64,
     /// Points of the robot that may touch the plane.
     pub points: Vec<GroundPoint>,
-    /// Maximum error in the laws of contact (m/s): a point at rest does not move faster. The error of most steps is far
-    /// smaller, since the last step of Newton's method squares the error.
+    /// Maximum error of the contact conditions (m/s). A resting point moves at most at this speed. The error of most
+    /// steps is far smaller, because the last step of Newton's method squares the error.
     pub tolerance: f64,
     /// Maximum number of iterations of the contact solver in a step. An iteration consists of a few steps of Newton's
-    /// method, followed by Gauss–Seidel sweeps if those steps fail.
+    /// method, and of Gauss–Seidel sweeps if these steps do not reduce the error.
     pub max_iterations: usize,
 }
 
@@ -132,7 +133,7 @@ impl Ground {
         self
     }
 
-    /// Checks all numbers of the ground for a robot, and normalises the normal.
+    /// Checks the ground's numbers and frames for a robot, and returns the ground with a normal of length 1.
     pub(super) fn checked(mut self, model: &Model) -> Result<Self, Error> {
         let wrong = |what: String| Err(Error::Ground { what });
         let Vec3 { x, y, z } = self.normal;
@@ -179,8 +180,8 @@ impl Ground {
 pub struct GroundContact {
     /// Position of the point in the world at the beginning of the step (m).
     pub position: Vec3<f64>,
-    /// Force of the ground on the robot at the point, along the axes of the world: the mean over the step (N).
+    /// Mean force of the ground on the robot at the point during the step, along the axes of the world (N).
     pub force: Vec3<f64>,
-    /// Whether the ground pushed the point in the step.
+    /// Whether the ground exerted a normal force on the point during the step.
     pub touches: bool,
 }

@@ -1,16 +1,18 @@
-//! Momentum ∂L/∂v and slope ∂L/∂q of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with derivatives of both.
+//! Momentum ∂L/∂v and slope ∂L/∂q of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with the derivatives of the momentum
+//! and the slope.
 //!
 //! All quantities are in the world's frame. Composite quantities are sums over all bodies that a joint carries: inertia
-//! Iᶜ, momentum hᶜ, and the force Fᶜ that holds the bodies still. Let Ψ̇ = v_λ × S and Ψ̈ = −g × S. When coordinate e
-//! of joint j changes, the bodies that j carries turn about S_e. The velocity v_i of each such body i also changes by
-//! Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see `rnea_derivatives.rs`). The turn alone changes no energy, so
+//! Iᶜ, momentum hᶜ, and the force Fᶜ that holds the bodies still. Ψ̇ = v_λ × S and Ψ̈ = −g × S, where v_λ is the
+//! velocity of the joint's parent. When coordinate e of joint j changes, the bodies that j carries turn about S_e. The
+//! velocity v_i of each such body i also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see `rnea_derivatives.rs`). The
+//! turn does not change the kinetic energy, so
 //!
 //! ```text
 //! p_e = (M v)_e = S_e · hᶜ,   ∂L/∂q_e = Ψ̇_e · hᶜ − S_e · Fᶜ
 //! ∂hᶜ/∂q_d = S_d ×* hᶜ + Iᶜ Ψ̇_d,   ∂Fᶜ/∂q_d = S_d ×* Fᶜ + Iᶜ Ψ̈_d      (Iᶜ, hᶜ, Fᶜ of the joint of d)
 //! ```
 //!
-//! and for each column d and each column e on its path to the root
+//! For each column d and each column e on the path from d to the root,
 //!
 //! ```text
 //! ∂p_d/∂q_e = Ψ̇_e · Iᶜ S_d                        ∂p_e/∂q_d = S_e · ∂hᶜ/∂q_d
@@ -23,35 +25,36 @@ use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Quantities in the world's frame; matrices are stored by columns.
+    /// Scratch for the derivatives of the Lagrangian, in the world's frame. Matrices are stored by columns.
     pub(super) struct Workspace<S>(size) {
         /// Velocities of the bodies. Written by: `pass`.
         v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Iᶜ. Written by: `pass`.
+        /// Composite inertia Iᶜ of each joint. Written by: `pass`.
         IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// hᶜ. Written by: `pass`.
+        /// Momentum hᶜ of all bodies that a joint carries. Written by: `pass`.
         hC: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Fᶜ. Written by: `pass`.
+        /// Force Fᶜ that holds still all bodies that a joint carries. Written by: `pass`.
         FC: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Ψ̇. Written by: `pass`.
+        /// Motion Ψ̇ of each column. Written by: `pass`.
         Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Ψ̈. Written by: `pass`.
+        /// Motion Ψ̈ of each column. Written by: `pass`.
         Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Momentum p = M v. Written by: `pass`.
         pub(super) p: Array<S> = filled(S::zero, size.nv),
-        /// ∂L/∂q. Written by: `pass`.
+        /// Slope ∂L/∂q of the Lagrangian. Written by: `pass`.
         pub(super) L_q: Array<S> = filled(S::zero, size.nv),
-        /// M = ∂p/∂v. Written by: `pass`.
+        /// Inertia matrix M = ∂p/∂v. Written by: `pass`.
         pub(super) M: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// ∂p/∂q, and its transpose ∂²L/∂q∂v. Written by: `pass`.
+        /// Derivative ∂p/∂q, the transpose of ∂²L/∂q∂v. Written by: `pass`.
         pub(super) p_q: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// ∂²L/∂q∂q; row i is the derivative of entry i of ∂L/∂q. Written by: `pass`.
+        /// Second derivatives ∂²L/∂q∂q of the Lagrangian; row i is the derivative of entry i of ∂L/∂q. Written by:
+        /// `pass`.
         pub(super) L_qq: Array<S> = filled(S::zero, size.nv * size.nv),
     }
 }
 
-/// Computes all quantities for bodies whose placements are known, in O(n · depth). External forces are added to ∂L/∂q
-/// like the slope of a potential, although a potential may not exist. If it does not, ∂²L/∂q∂q is not symmetric.
+/// Computes all quantities of the workspace in O(n · depth). The placements of the bodies must already be computed.
+/// External forces are added to ∂L/∂q as if they had a potential. If they have no potential, ∂²L/∂q∂q is not symmetric.
 #[inline(always)]
 pub(super) fn pass<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let (oX, S) = (&w.oX, &w.S);

@@ -1,12 +1,13 @@
 //! Dense factorisation A = L U for any scalar type, without row exchanges. Matrices are stored by columns.
 //!
-//! It is used for matrices M + O(h) near a positive definite M. The symmetric parts of such matrices are positive
-//! definite, so elimination in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
+//! The variational integrator factorises matrices M + O(h), which are close to the positive definite matrix M. The
+//! symmetric parts of these matrices are positive definite, so elimination without row exchanges is stable (Golub and
+//! Van Loan, *Matrix Computations*, section 4.3.2).
 
 use condyle_linalg::axpy::axpy;
 use condyle_spatial::Scalar;
 
-/// Replaces A by U and by L without the unit diagonal of L.
+/// Replaces A by its factors: U in the upper triangle, and L without its unit diagonal in the lower triangle.
 pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
     for j in 0..n {
         let (left, rest) = A.split_at_mut(j * n);

@@ -1,8 +1,8 @@
 //! Simulation of robots: each step computes (q, v) at the next instant. Positions are elements of the joints' Lie
 //! groups.
 //!
-//! Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). Three
-//! [`Integrator`]s compute steps; a [`Simulation`] owns the state and all scratch.
+//! The position is q(t) = q₀ ⊕ ξ(t). The equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ).
+//! One of three [`Integrator`]s computes the steps. A [`Simulation`] owns the state and all scratch.
 //!
 //! ```
 //! use condyle_dynamics::{neutral, robots};
@@ -48,24 +48,24 @@ pub use state::State;
 pub use status::Status;
 
 /// Method that computes a step. τ and the external forces are constant during a step; an external force is constant in
-/// the frame of the body on which it acts. [Passive torques](crate::passive_torque) follow position and velocity within
-/// the step.
+/// the frame of the body on which it acts. [Passive torques](crate::passive_torque) change with position and velocity
+/// during the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Integrator {
-    /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation of aba. The method is
-    /// symplectic where M is constant. Otherwise it evaluates the Coriolis forces at the beginning of the step. Bodies
-    /// that spin fast without damping then gain energy; the energy of light links can grow without bound. Suitable for
-    /// damped robots and short horizons.
+    /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation of aba per step. If M is
+    /// constant, the method is symplectic. Otherwise, the Coriolis forces are evaluated at the beginning of the step,
+    /// and bodies that spin fast without damping gain energy. The energy of light links can grow without bound.
+    /// Suitable for damped robots and short horizons.
     SemiImplicitEuler,
     /// Classical Runge–Kutta method for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta methods on
-    /// Lie groups*, 1998). Order 4, four evaluations of aba; the energy drifts by O(h⁴) per second.
+    /// Lie groups*, 1998). Order 4, four evaluations of aba per step. The energy drifts by O(h⁴) per second.
     RungeKutta4,
     /// Variational integrator of the midpoint Lagrangian, solved by Newton's method with exact derivatives. Order 2,
-    /// symmetric, symplectic: the energy oscillates by O(h²) without drift, and momentum is conserved to rounding. The
-    /// equation of a step has no solution if a velocity changes by a large multiple of its value
+    /// symmetric and symplectic: the energy oscillates by O(h²) without drift, and momentum is conserved up to
+    /// rounding. If a velocity changes by a large multiple of its value, the equation of the step has no solution
     /// ([`Status::NotConverged`]). Source: Marsden and West, *Discrete mechanics and variational integrators*, 2001; on
     /// groups: Bou-Rabee and Marsden, *Hamilton–Pontryagin integrators on Lie groups*, 2009.
     Variational,
@@ -83,8 +83,8 @@ pub struct Settings {
     /// Smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s). `None` switches off damping, friction,
     /// springs and gravity compensation of the joints.
     pub passive: Option<f64>,
-    /// Relative error of the momentum balance below which Newton's method makes one last iteration. The last iteration
-    /// squares the error.
+    /// Tolerance of Newton's method: relative error of the momentum balance. When the error is below this tolerance,
+    /// one last iteration follows, which squares the error.
     pub tolerance: f64,
     /// Maximum number of iterations of Newton's method.
     pub max_iterations: usize,
@@ -107,10 +107,10 @@ pub struct Control<'a, S> {
     pub q: &'a [S],
     /// Velocity, nv numbers.
     pub v: &'a [S],
-    /// Joint efforts during the step, nv numbers (N m, N). All efforts are 0 when the law is called.
+    /// Joint efforts during the step, nv numbers (N m, N). All efforts are 0 when the control law is called.
     pub tau: &'a mut [S],
     /// External force on each body during the step (N, N m), in the frame of the body and at the origin of this frame.
-    /// Index 0 is the world. All forces are 0 when the law is called.
+    /// Index 0 is the world. All forces are 0 when the control law is called.
     pub f_ext: &'a mut [Force<S>],
 }
 
@@ -126,12 +126,13 @@ struct Input<'a, S> {
 /// State of a robot, and all memory to compute the next states. After [`new`](Self::new) and
 /// [`set_ground`](Self::set_ground), nothing is allocated.
 ///
-/// A simulation shares its model, so it may be stored, cloned and sent to another thread. With a scalar of several
-/// lanes, it runs several simulations in parallel; Newton's method then iterates until all lanes have converged. Dual
-/// numbers give derivatives of the simulation. Only simulations of `f64` can have a ground.
+/// A simulation shares its model, so it may be stored, cloned and sent to another thread. If the scalar has several
+/// lanes, each lane is a separate simulation, and Newton's method iterates until all lanes have converged. If the
+/// scalar is a dual number, the simulation computes derivatives of its states. Only simulations of `f64` can have a
+/// ground.
 #[derive(Clone, Debug)]
 pub struct Simulation<S: Scalar = f64, R = f64> {
-    /// Integrator, step length and tolerances; may be changed between steps.
+    /// Integrator, step length and tolerances. They may be changed between steps.
     pub settings: Settings,
     model: Arc<Model<R>>,
     data: Data<S>,
@@ -156,9 +157,9 @@ impl Simulation<f64> {
     /// The state is kept, even if points are below the ground. Allocates memory for the contacts with the ground.
     ///
     /// # Errors
-    /// [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does
-    /// not exist or is fixed to the world, or the normal does not define a direction. Also if the restitution is not in
-    /// 0..=1, the friction or the tolerance is negative, or a number is not finite.
+    /// Returns [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame
+    /// does not exist or is fixed to the world, or the normal does not define a direction. The same error is returned
+    /// if the restitution is not in 0..=1, the friction or the tolerance is negative, or a number is not finite.
     pub fn set_ground(&mut self, ground: Ground) -> Result<(), Error> {
         if self.settings.integrator != Integrator::SemiImplicitEuler {
             let what =
@@ -185,7 +186,8 @@ impl Simulation<f64> {
 impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// Allocates all memory and sets the robot to [`neutral`](crate::neutral), at rest, at time 0.
     ///
-    /// model: an [`Arc`] of a model is shared, a model is moved, and a reference to a model is copied.
+    /// model: an [`Arc`] of a model, which the simulation then shares; a model, which is moved; or a reference to a
+    /// model, which is copied.
     pub fn new(model: impl Into<Arc<Model<R>>>, settings: Settings) -> Self {
         let model = model.into();
         let q: Vec<S> = crate::neutral(&model).into_iter().map(S::splat).collect();
@@ -208,7 +210,7 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         }
     }
 
-    /// Returns the robot.
+    /// Returns the robot's model.
     pub fn model(&self) -> &Arc<Model<R>> {
         &self.model
     }
@@ -230,14 +232,15 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
 
     /// Sets the position to q, the velocity to v and the time to 0. Allocates nothing.
     ///
-    /// q: nq numbers; v: nv numbers. The numbers are checked only for `f64`.
+    /// q: nq numbers; v: nv numbers. The numbers are checked only if the scalar is `f64`.
     ///
     /// # Errors
-    /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not have
-    /// length 1 up to 1e-3; [`Error::Velocity`] if a number of v is not finite. The old state is then kept.
+    /// Returns [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not
+    /// have length 1 up to 1e-3; [`Error::Velocity`] if a number of v is not finite. In this case, the old state is
+    /// kept.
     ///
     /// # Panics
-    /// If an argument has the wrong length.
+    /// Panics if an argument has the wrong length.
     #[track_caller]
     pub fn set_state(&mut self, q: &[S], v: &[S]) -> Result<(), Error> {
         check("q", q.len(), self.model.nq());
@@ -272,8 +275,9 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// ```
     ///
     /// # Panics
-    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is not a
-    /// finite number above 0. Also if the simulation has a ground and `settings.integrator` is not semi-implicit Euler.
+    /// Panics if an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt`
+    /// is not a finite number above 0. The function also panics if the simulation has a ground and
+    /// `settings.integrator` is not semi-implicit Euler.
     #[track_caller]
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
@@ -316,14 +320,14 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         status
     }
 
-    /// Computes several steps and calls a control law before each step. Stops early at a step that fails, and returns
-    /// the status of that step. Otherwise, if a step reported [`ContactsNotConverged`](Status::ContactsNotConverged),
-    /// returns this status with the largest error.
+    /// Computes several steps and calls a control law before each step. If a step fails, the function stops at this
+    /// step and returns the status of this step. Otherwise, if a step reported
+    /// [`ContactsNotConverged`](Status::ContactsNotConverged), the function returns this status with the largest error.
     ///
     /// Allocates nothing, unless the control law allocates.
     ///
     /// # Panics
-    /// As [`step`](Self::step).
+    /// Panics in the same cases as [`step`](Self::step).
     #[track_caller]
     pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
         let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));
@@ -367,7 +371,7 @@ fn on_ground(
     }
 }
 
-/// Returns aba(q, v, τ + passive torque).
+/// Returns the acceleration aba(q, v, τ + passive torque).
 #[inline(always)]
 #[track_caller]
 fn acceleration<'d, S: Scalar, R: Constant<S>>(

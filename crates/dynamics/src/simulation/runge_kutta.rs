@@ -1,13 +1,13 @@
 //! Classical Runge–Kutta method on the joints' Lie groups.
 //!
-//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀ the motion is q₀ ⊕ ξ(t). Since ∂(q₀ ⊕ ξ)/∂ξ
-//! is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹, the motion satisfies
+//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀, the motion is expressed as q₀ ⊕ ξ(t).
+//! Since ∂(q₀ ⊕ ξ)/∂ξ is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹, the motion satisfies
 //!
 //! ```text
 //! ξ̇ = J_log(ξ) v,   v̇ = aba(q₀ ⊕ ξ, v, τ),   ξ(0) = 0
 //! ```
 //!
-//! This is an ordinary differential equation in a vector space, so the classical method has order 4.
+//! These equations form an ordinary differential equation in a vector space, so the classical method has order 4.
 
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
@@ -36,7 +36,7 @@ workspace! {
 /// Time of each stage as a fraction of the step, and weight of the stage's rates.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
-/// Computes a step.
+/// Computes one step of the Runge–Kutta method.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

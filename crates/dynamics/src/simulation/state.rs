@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use condyle_model::Error;
 use condyle_spatial::{Constant, Scalar};
 
-/// Quantities that determine the next steps of a [`Simulation`], together with the robot, the settings and the ground.
+/// State of a [`Simulation`]. Together with the robot, the settings and the ground, it determines the next steps.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -16,14 +16,14 @@ pub struct State<S = f64> {
     pub q: Vec<S>,
     /// Velocity, nv numbers.
     pub v: Vec<S>,
-    /// Impulses of the ground in the last step, 3 numbers for each point of the ground (N s). They are the first guess
-    /// of the contact solver.
+    /// Impulses of the ground in the last step, 3 numbers for each point of the ground (N s). The contact solver uses
+    /// these impulses as its initial guess in the next step.
     pub impulses: Vec<f64>,
 }
 
 impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// Returns a copy of the state. A simulation that continues from the copy, after [`restore`](Self::restore),
-    /// computes the same bits.
+    /// computes bit-identical results.
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Settings, Simulation}};
@@ -43,8 +43,8 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// Sets the simulation to a stored state, which must come from a simulation of the same robot on the same ground.
     ///
     /// # Errors
-    /// [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite; other
-    /// errors as for [`set_state`](Self::set_state).
+    /// Returns [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite;
+    /// other errors as for [`set_state`](Self::set_state).
     pub fn restore(&mut self, state: &State<S>) -> Result<(), Error> {
         let impulses = self.ground.as_ref().map_or(0, |ground| ground.impulses.len());
         for (name, expected, found) in [

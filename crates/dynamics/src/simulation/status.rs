@@ -1,4 +1,4 @@
-//! Outcome of a step.
+//! Status that a simulation reports after a step.
 
 use core::fmt;
 
@@ -7,40 +7,42 @@ use core::fmt;
 #[must_use]
 #[non_exhaustive]
 pub enum Status {
-    /// Success: all steps were taken, within all tolerances.
+    /// Success: all steps were computed within all tolerances.
     Done,
-    /// Failure of Newton's method to reach the tolerance. The step was not taken, and the old state is kept. A shorter
-    /// step helps.
+    /// Failure of Newton's method to reach the tolerance. The step was discarded, and the old state is kept. A shorter
+    /// step length may help.
     NotConverged {
         /// Number of iterations of Newton's method.
         iterations: usize,
     },
-    /// Impulses of the ground that violate the laws of contact by more than the tolerance. The step was still taken
-    /// with these impulses. They only push, and are inside the friction cones. More iterations
-    /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step may help. If M is badly
-    /// conditioned, for example for bodies of some grams, rounding leaves an error. Then the
-    /// [`tolerance`](super::Ground::tolerance) should be larger.
+    /// Failure of the contact solver: the impulses of the ground violate the contact conditions by more than the
+    /// tolerance. The step was still computed with these impulses, which only push and are inside the friction cones.
+    /// More iterations ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step length may help.
+    /// If M is badly conditioned, for example with bodies of a few grams, rounding errors may exceed the tolerance.
+    /// Then the [`tolerance`](super::Ground::tolerance) should be larger.
     ContactsNotConverged {
         /// Largest error in the velocity of a point (m/s).
         error: f64,
     },
-    /// Velocity or position that is no longer finite. The step was not taken, and the old state is kept.
+    /// Failure of a step whose velocity or position is not finite. The step was discarded, and the old state is kept.
     NotFinite,
 }
 
 impl Status {
-    /// Returns whether all steps were taken, within all tolerances.
+    /// Returns whether all steps were computed within all tolerances.
     pub fn is_done(self) -> bool {
         self == Self::Done
     }
 
-    /// Returns whether all steps were taken.
+    /// Returns whether all steps were computed, including steps in which the contact solver did not reach its
+    /// tolerance.
     pub fn is_taken(self) -> bool {
         matches!(self, Self::Done | Self::ContactsNotConverged { .. })
     }
 
-    /// Returns the status of a run from the status of all earlier steps and the status `last` of the last step. If a
-    /// step was not taken, it is the status of that step. Otherwise it reports the largest error of the contacts.
+    /// Returns the status of a run of steps. `self` is the status of all earlier steps, and `last` is the status of the
+    /// last step. If a step was discarded, the result is the status of this step. Otherwise, the result reports the
+    /// largest error of the contacts.
     #[must_use = "the status of the run"]
     pub fn and(self, last: Self) -> Self {
         match (self, last) {

@@ -5,10 +5,10 @@ use condyle_model::joint::{GroupJacobian, Joint};
 use condyle_spatial::{Constant, Cross, Force, Motion, Scalar};
 use core::ops::Range;
 
-/// Maximum size of a block: the size for a free joint.
+/// Maximum size of a block. A free joint has this size.
 const SIX: usize = 6;
-/// Number of terms of a series in ad_y. It is enough for full precision if a joint turns by at most 1 rad in a step,
-/// and for ten digits up to 2.5 rad.
+/// Number of terms of a power series in ad_y. The series has full precision if a joint turns by at most 1 rad in a
+/// step, and ten correct digits up to 2.5 rad.
 const TERMS: i32 = 18;
 
 /// Returns each joint that has its own coordinates, with the offset of these coordinates in v.
@@ -16,7 +16,7 @@ fn joints<R>(model: &Model<R>) -> impl Iterator<Item = (Joint, usize)> + '_ {
     model.nodes().iter().skip(1).filter(|n| n.mimic.is_none()).map(|n| (n.joint, n.idx_v))
 }
 
-/// Returns the block of a joint at the tangent vector y, by columns; `None` if the block is the identity.
+/// Returns the block of a joint at the tangent vector y, stored by columns, or `None` if the block is the identity.
 fn block<S: Scalar>(joint: Joint, which: GroupJacobian, y: &[S]) -> Option<[[S; SIX]; SIX]> {
     let columns = joint.jacobian(which, y)?.columns();
     let mut block = [[S::zero(); SIX]; SIX];
@@ -47,7 +47,7 @@ fn blocks<'a, S: Scalar, R>(
     joints(model).map(own).filter_map(move |(joint, own)| block(joint, which, &y[own.clone()]).map(|J| (own, J)))
 }
 
-/// Computes out = J(y) x.
+/// Computes out = J(y) x, with the Jacobian `which` of the joints' groups.
 pub(super) fn multiply<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], x: &[S], out: &mut [S]) {
     out.copy_from_slice(x);
     for (own, J) in blocks(model, which, y) {
@@ -61,7 +61,7 @@ pub(super) fn multiply<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: 
     }
 }
 
-/// Computes A = A J(y), for a square matrix stored by columns.
+/// Replaces A by A J(y). A is a square matrix stored by columns.
 pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     let nv = model.nv();
     for (own, J) in blocks(model, which, y) {
@@ -77,7 +77,7 @@ pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobia
     }
 }
 
-/// Computes A = J(y)ᵀ A, for a vector or a matrix stored by columns.
+/// Replaces A by J(y)ᵀ A. A is a vector or a matrix stored by columns.
 pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     for (own, J) in blocks(model, which, y) {
         for column in A.chunks_exact_mut(model.nv()) {
@@ -90,8 +90,8 @@ pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: Gr
     }
 }
 
-/// Returns, for each joint whose group is not commutative, the indices of the joint's unit twists, and the offset of
-/// its coordinates in v.
+/// Returns two items for each joint whose group is not commutative: the indices of the joint's unit twists, and the
+/// offset of the joint's coordinates in v.
 fn twists<R>(model: &Model<R>) -> impl Iterator<Item = (&'static [usize], usize)> + '_ {
     joints(model).filter(|(joint, _)| !joint.commutes()).map(|(joint, at)| (joint.axes(), at))
 }
@@ -111,11 +111,12 @@ fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
     six
 }
 
-/// Computes f += w ×* (D w) with the armature D, block by block.
+/// Computes f += w ×* (D w) for each joint whose group is not commutative. D is the diagonal matrix of the armature,
+/// and w is the velocity.
 ///
 /// Every algorithm treats armature as D q̈, except along the linear coordinates of free joints (`free_armature.rs`). A
-/// Lagrangian with the term ½ wᵀ D w would turn the momentum D w with the body, if the group of the joint is not
-/// commutative. The force computed here cancels this effect. The force does no work.
+/// Lagrangian with the term ½ wᵀ D w would turn the momentum D w with the body if the group of the joint is not
+/// commutative. The force w ×* (D w) cancels this effect and does no work.
 pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
@@ -127,7 +128,8 @@ pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f
     }
 }
 
-/// Adds the slope of the force of [`add_rotors`] with respect to w to A, a square matrix stored by columns.
+/// Adds the derivative, with respect to w, of the force that [`add_rotors`] computes to A. A is a square matrix stored
+/// by columns.
 pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], A: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
@@ -143,10 +145,10 @@ pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &
     }
 }
 
-/// Computes A −= s ∂(J_exp(−y)ᵀ p)/∂y at constant p, for a square matrix stored by columns.
+/// Computes A −= s ∂(J_exp(−y)ᵀ p)/∂y at constant p. A is a square matrix stored by columns.
 ///
-/// J_exp(−y) is Σ ad_yᵏ/(k+1)!. Let pₖ = (ad_yᵀ)ᵏ p, with ad_yᵀ p = −y ×* p. The derivative along δ is Σ Dₖ/(k+1)!,
-/// with D₀ = 0 and Dₖ₊₁ = ad_δᵀ pₖ + ad_yᵀ Dₖ.
+/// J_exp(−y) is Σ ad_yᵏ/(k+1)!. With pₖ = (ad_yᵀ)ᵏ p and ad_yᵀ p = −y ×* p, the derivative in the direction δ is Σ
+/// Dₖ/(k+1)!, with D₀ = 0 and Dₖ₊₁ = ad_δᵀ pₖ + ad_yᵀ Dₖ.
 pub(super) fn subtract_slope<S: Scalar, R>(model: &Model<R>, y: &[S], p: &[S], s: S, A: &mut [S]) {
     for (axes, at) in twists(model) {
         let y6 = Motion::from(embed(axes, |k| y[at + k]));

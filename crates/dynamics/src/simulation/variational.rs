@@ -1,9 +1,9 @@
 //! Variational integrator of the midpoint Lagrangian, on the joints' Lie groups.
 //!
-//! The motion during a step of length h is approximated by q ⊕ t w with constant w, and the action of the step by h L(q
-//! ⊕ h w/2, w). The sum of the actions of all steps must be stationary under changes of the positions between steps,
-//! including the virtual work of τ. With y = h w, this condition gives the momentum p' after the step from the momentum
-//! p before it:
+//! During a step of length h, the motion is approximated by q ⊕ t w with constant velocity w. The action of the step is
+//! approximated by h L(q ⊕ h w/2, w). The sum of the actions of all steps, plus the virtual work of τ, must be
+//! stationary when the positions between the steps change. With y = h w, this condition determines the momentum p'
+//! after the step from the momentum p before the step:
 //!
 //! ```text
 //! M(q_m) w = J(−y)ᵀ p + h/2 J(−y/2)ᵀ f        q_m = q ⊕ y/2,   f = ∂L/∂q(q_m, w) + τ
@@ -20,8 +20,8 @@
 //!
 //! Passive efforts also depend on q, so ∂τ/∂q is added to ∂²L/∂q∂q.
 //!
-//! The map (q, p) → (q', p') is symplectic. With −h instead of h, it is its own inverse. It conserves the momentum of
-//! bodies that move freely: Ad(y)ᵀ only expresses this momentum in the body's new frame. Source: Marsden and West
+//! The map (q, p) → (q', p') is symplectic. The map for −h is the inverse of the map for h. The momentum of freely
+//! moving bodies is conserved: Ad(y)ᵀ only expresses this momentum in the body's new frame. Source: Marsden and West
 //! (2001), section 2.3, for the midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. The velocity is v =
 //! M(q)⁻¹ p.
 
@@ -39,7 +39,7 @@ use condyle_model::layout::Single;
 use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
-    /// Scratch. Fields without another statement are written by `step`.
+    /// Scratch of the variational integrator. Fields without "Written by" are written by `step`.
     pub(super) struct Workspace<S>(size, model: &Model<R>) {
         /// Momentum p before the step.
         p: Array<S> = filled(S::zero, size.nv),
@@ -58,13 +58,14 @@ workspace! {
         /// Products J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
         carried: Array<S> = filled(S::zero, size.nv),
         pushed: Array<S> = filled(S::zero, size.nv),
-        /// Residual of the equation for w, then the step of Newton's method.
+        /// Residual of the equation for w, which the step of Newton's method overwrites.
         residual: Array<S> = filled(S::zero, size.nv),
-        /// Slope of the equation for w, then the factor of this slope. Written by: `slope`.
+        /// Derivative of the equation for w, which the factor of this matrix overwrites. Written by: `slope`.
         slope: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Momenta and slopes of L at the midpoint, with derivatives. Written by: `evaluate`.
+        /// Momentum ∂L/∂v and slope ∂L/∂q of the Lagrangian L at the midpoint, with derivatives. Written by:
+        /// `evaluate`.
         lagrangian: lagrangian::Workspace<S> = lagrangian::Workspace::new(size),
-        /// Factor of M after the step.
+        /// Factor of M at the position after the step.
         M: Ltdl<S> = Ltdl::new(model),
     }
 }
@@ -112,7 +113,7 @@ fn evaluate<S: Scalar, R: Constant<S>>(
     tangent::multiply_left_transposed(model, Exp, &d.minus_x, &mut d.pushed); // J(−y/2)ᵀ f
 }
 
-/// Computes the slope of the equation for w. Overwrites derivatives that `evaluate` has computed.
+/// Computes the derivative of the equation for w. Overwrites derivatives in `d` that `evaluate` has computed.
 fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S) {
     let nv = model.nv();
     let half = h * S::splat(0.5);
@@ -141,10 +142,11 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
     tangent::subtract_slope(model, &d.x, &d.f, half * half, A); // − h²/4 ∂(J(−x)ᵀ f)/∂x
 }
 
-/// Minimum momentum (kg m²/s, kg m/s) that counts as motion.
+/// Smallest scale of momentum (kg m²/s, kg m/s) in the relative error. With this scale, Newton's method also converges
+/// for a robot at rest.
 const STILL: f64 = 1e-30;
 
-/// Computes a step.
+/// Computes one step of the variational integrator.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

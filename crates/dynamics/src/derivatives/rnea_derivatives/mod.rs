@@ -35,25 +35,25 @@ use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Vec3};
 use vectorized::Rows;
 
 workspace! {
-    /// Quantities of the bodies and of the columns of their joints, in the world's frame.
+    /// Quantities of the bodies and of the joint columns, in the world's frame.
     pub(crate) struct Bodies<S>(size) {
-        /// Velocity. Written by: `pass`.
+        /// Velocity of each body. Written by: `pass`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Iᶜ. Written by: `pass`.
+        /// Composite inertia Iᶜ of each joint. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// 2Bᶜ. Written by: `pass`.
+        /// Matrix 2B of each joint, summed over the bodies that the joint carries. Written by: `pass`.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// F. Written by: `pass`.
+        /// Force F that each joint transmits. Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Ψ̇. Written by: `pass`.
+        /// Motion Ψ̇ of each column. Written by: `pass`.
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Ψ̈. Written by: `pass`.
+        /// Motion Ψ̈ of each column. Written by: `pass`.
         pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Sum Ψ̇ + Ṡ of each column. Written by: `pass`.
         pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Numbers of each column d that all pairs (d, e) need, for `vectorized`. Written by: `pass`.
+        /// Values of each column d that `vectorized` needs for all pairs (d, e). Written by: `pass`.
         pub rows: Rows<S> = Rows::new(size.columns),
     }
 }
@@ -61,17 +61,17 @@ workspace! {
 workspace! {
     pub(crate) struct Workspace<S>(size) {
         pub bodies: Bodies<S> = Bodies::new(size),
-        /// Joint velocities accelerations. Written by: `run`, `aba_derivatives`, `rnea_derivatives`.
+        /// Joint velocities. Written by: `run`, `aba_derivatives`, `rnea_derivatives`.
         pub qd: Array<S> = filled(S::zero, size.nv),
-        /// Acceleration coordinates that a caller gave. Written by: `rnea_derivatives`.
+        /// Joint accelerations that the caller of `rnea_derivatives` has passed. Written by: `rnea_derivatives`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
-        /// Zeros that are used as joint accelerations. Written by: `new`.
+        /// Joint accelerations of zero, for derivatives at q̈ = 0. Written by: `new`.
         pub still: Array<S> = filled(S::zero, size.nv),
-        /// ∂τ/∂q. Written by: `pass`.
+        /// Derivative ∂τ/∂q of the joint efforts. Written by: `pass`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂τ/∂v. Written by: `pass`.
+        /// Derivative ∂τ/∂v of the joint efforts. Written by: `pass`.
         pub dtau_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// ∂τ/∂a. Written by: `pass`.
+        /// Derivative ∂τ/∂a of the joint efforts. Written by: `pass`.
         pub dtau_da: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
@@ -85,8 +85,8 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Computes ∂τ/∂q, ∂τ/∂v and ∂τ/∂a, for bodies whose placements are known. If `by_rows` is set, the pairs of columns of
-/// different joints are left to `vectorized`.
+/// Computes ∂τ/∂q, ∂τ/∂v and ∂τ/∂a. `w` must contain the placements of the bodies. If `by_rows` is set, the function
+/// skips pairs of columns of different joints, which `vectorized` then computes.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(
     l: &L,
@@ -163,7 +163,7 @@ pub(crate) fn pass<L: Columns>(
                 let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
                 let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
                 let M_de = S_e.dot(IS);
-                l.set_row(dq, column, e, dq_de); // stores come last, so that products stay in registers
+                l.set_row(dq, column, e, dq_de); // stored last: products stay in registers
                 l.set_row(dv, column, e, dv_de);
                 l.set_column(dq, column, e, dq_ed);
                 l.set_column(dv, column, e, dv_ed);
@@ -185,8 +185,8 @@ pub(crate) fn pass<L: Columns>(
 }
 
 kernel! {
-    /// Computes the derivatives of inverse dynamics, for bodies whose placements are known. `world` contains the
-    /// world's acceleration; if `world` is empty, the model's gravity is used.
+    /// Computes the derivatives of inverse dynamics. `w` must contain the placements of the bodies. `world` is the
+    /// world's linear acceleration; if the slice is empty, the world has the acceleration −g of the model's gravity g.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         w: &World<S>,

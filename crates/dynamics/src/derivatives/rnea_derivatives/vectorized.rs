@@ -1,8 +1,9 @@
-//! Derivatives of inverse dynamics for robots with long branches, computed for four columns at a time.
+//! Derivatives of inverse dynamics for robots with long branches. Four columns are computed at a time.
 //!
 //! Source: the equations for a pair of columns (d, e) in `rnea_derivatives`. The columns d of all joints that the joint
-//! of column e carries are contiguous. The numbers of the columns d are stored component by component. So four entries
-//! of a column of a matrix are computed at once. Operations and bits are the same as without vectors.
+//! of column e carries are contiguous. The values of the columns d are stored component by component, so a vector can
+//! load one component of four columns. Four entries of a matrix column are thus computed at once. The operations, and
+//! all bits of the results, are the same as without vectors.
 
 use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
@@ -18,8 +19,8 @@ const SIDE: usize = 4;
 /// Number of values that are stored for a column: Iᶜ S (6), 2Bᵀ S (3), `by_q` (6) and `by_v` (6).
 const NUMBERS: usize = 6 + 3 + 6 + 6;
 
-/// Values of each column that its pairs with all earlier columns need. Shape: columns / `SIDE`, rounded up, blocks of
-/// `NUMBERS` × `SIDE`.
+/// Values of each column that are used in the pairs of the column with all earlier columns. Shape: ⌈columns / `SIDE`⌉
+/// blocks of `NUMBERS` × `SIDE`.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Rows<S> {
@@ -103,13 +104,13 @@ mod vectors {
         }
     }
 
-    /// Returns the vectors of four columns, one per lane. The x components are at index k of `side`.
+    /// Returns the three-dimensional vectors of four columns, one column per lane. `side[k]` has the x components.
     #[inline(always)]
     fn vector(side: &[[FusedF64; SIDE]; NUMBERS], k: usize) -> Vec3<Four> {
         Vec3::new(Four::from_fused(&side[k]), Four::from_fused(&side[k + 1]), Four::from_fused(&side[k + 2]))
     }
 
-    /// Returns the forces of four columns, one per lane. The first components are at index k of `side`.
+    /// Returns the spatial forces of four columns, one column per lane. `side[k]` has the first components.
     #[inline(always)]
     fn force(side: &[[FusedF64; SIDE]; NUMBERS], k: usize) -> Force<Four> {
         Force::new(vector(side, k), vector(side, k + 3))

@@ -2,19 +2,20 @@
 //!
 //! Source: Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the
 //! operational-space inertia matrix* (2012), based on Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1.
-//! Let U = Iᴬ S and D be quantities of the articulated-body algorithm. A force f on a body causes the effort Y_d = S_dᵀ
-//! f at column d of its joint, and f − U_d D_d⁻¹ Y_d is passed on to the parent. If the unit forces of the rows of J
-//! are propagated to the root in this way, then
+//! U = Iᴬ S and D are quantities of the articulated-body algorithm. A force f on a body causes the effort Y_d = S_dᵀ f
+//! at column d of the body's joint. The joint transmits the force f − U_d D_d⁻¹ Y_d to the parent. If the unit forces
+//! of the rows of J are propagated to the root in this way, then
 //!
 //! ```text
 //! J M⁻¹ Jᵀ = Σ Y_d D_d⁻¹ Y_dᵀ,           J q̈ + γ = Σ Y_d D_d⁻¹ u_d + Σ f_iᵀ c_i + f₀ᵀ a₀ + γ'       for λ = 0,
 //! ```
 //!
-//! Here u and c are quantities of the articulated-body algorithm, and f_i is the force that body i passes on to the
-//! parent. a₀ is the acceleration of the world. γ' is γ without the accelerations of bodies. The last pass of the
-//! articulated-body algorithm, with u + Yᵀ λ instead of u, gives q̈ = M⁻¹ (τ − h + Jᵀ λ). Lanes of the articulated-body
-//! algorithm are limbs. Lanes of the forces are rows: the rows of one constraint on the path to the root, and all rows
-//! at the root.
+//! Here u and c are quantities of the articulated-body algorithm, and f_i is the force that the joint of body i
+//! transmits to the parent. a₀ is the acceleration of the world. γ' is γ without the terms of the bodies'
+//! accelerations. The last pass of the articulated-body algorithm, with u + Yᵀ λ instead of u, gives q̈ = M⁻¹ (τ − h +
+//! Jᵀ λ). In the articulated-body algorithm, each lane computes one limb. In the propagation of forces, each lane
+//! computes one row of J. On the path to the root, a vector contains the rows of one constraint; at the root, vectors
+//! contain the rows of all constraints.
 
 use super::forces::Left;
 use super::lanes::Four;
@@ -30,7 +31,7 @@ use condyle_spatial::gate::FusedF64;
 use condyle_spatial::gate::Rename;
 use condyle_spatial::{Scalar, moves};
 
-/// Returns xᵀ y, for x and y of N vector registers each. Each lane of the result has the same sum.
+/// Returns xᵀ y in every lane. x and y fill N vector registers each.
 #[inline(always)]
 fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
     let mut sum = Four::load(x) * Four::load(y);
@@ -41,7 +42,7 @@ fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
 }
 
 impl ConstraintLanes {
-    /// Computes J, J M⁻¹ Jᵀ, and J q̈ + γ for λ = 0.
+    /// Computes J, J M⁻¹ Jᵀ, and the value of J q̈ + γ for λ = 0.
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &mut self,
@@ -85,7 +86,7 @@ impl ConstraintLanes {
         }
     }
 
-    /// Replaces u by u + Yᵀ λ, for all columns.
+    /// Replaces u by u + Yᵀ λ, for the columns of all joints.
     #[inline(always)]
     pub(crate) fn push(&self, plan: &Plan, constraints: &[ConstraintPlan], u: &mut [f64]) {
         let All { root, nv, stride, Y, x: lambda, .. } = &self.all;
@@ -101,7 +102,7 @@ impl ConstraintLanes {
             }
         }
         for k in 0..*nv {
-            let u = &mut u[(plan.steps[plan.place(*root).0].idx_v + k) * LANES..]; // in all lanes
+            let u = &mut u[(plan.steps[plan.place(*root).0].idx_v + k) * LANES..]; // equal in all lanes
             let mut sum = Four::load(u);
             for first in (0..stride - WIDE).step_by(WIDE) {
                 sum += product::<2>(&Y[k * stride + first..], &lambda[first..]);

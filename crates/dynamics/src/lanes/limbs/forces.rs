@@ -14,7 +14,7 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::FusedF64;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 
-/// Results of the articulated-body algorithm, as slices of numbers.
+/// Results of the articulated-body algorithm that the propagation of forces reads, as slices of numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct Left<'a> {
     plan: &'a Plan,
@@ -25,7 +25,7 @@ pub(crate) struct Left<'a> {
     u: &'a [f64],
     v: &'a [f64],
     c: &'a [f64],
-    /// a₀.
+    /// Linear acceleration a₀ = −g of the world.
     world: [f64; 3],
 }
 
@@ -39,7 +39,7 @@ impl<'a> Left<'a> {
         Self { plan, oX, S, U, D_inv, u, v, c, world: (-*model.gravity()).to_array() }
     }
 
-    /// Returns the placement of a body in the world.
+    /// Returns the pose of a body in the world.
     #[inline(always)]
     pub(crate) fn pose(self, body: usize) -> Se3<FusedF64> {
         let (step, lane) = self.plan.place(body);
@@ -65,8 +65,8 @@ impl<'a> Left<'a> {
     }
 }
 
-/// Returns a slice that begins with the first number of a motion or force in a lane. Each of the other five numbers
-/// follows `LANES` entries after the previous one.
+/// Returns a slice that begins with the first of the six numbers of a motion or force in one lane. The stride between
+/// these numbers is `LANES`.
 #[inline(always)]
 pub(crate) fn six(of: &[f64], (at, lane): (usize, usize)) -> &[f64] {
     &of[6 * LANES * at + lane..][..5 * LANES + 1]
@@ -109,7 +109,7 @@ fn add<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, to: &mut Forces
     }
 }
 
-/// Returns fᵀ m.
+/// Returns the product fᵀ m of the force f of each row and the motion m.
 #[inline(always)]
 fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [V; N] {
     let mut sum = [V::zero(); N];
@@ -124,8 +124,8 @@ fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [
     sum
 }
 
-/// Passes the forces f through one column of a joint, and returns Y and Y D⁻¹. Subtracts from f the force that the
-/// joint does not pass on. Adds Y D⁻¹ u to x, the partial sum of J q̈ + γ.
+/// Computes and returns Y and Y D⁻¹ of one joint column for the forces f. Replaces f by f − U D⁻¹ Y, the force that the
+/// column transmits. Adds Y D⁻¹ u to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn take<V: Block<Number = f64>, const N: usize>(
     left: Left<'_>,
@@ -150,7 +150,7 @@ fn take<V: Block<Number = f64>, const N: usize>(
     [Y, YD]
 }
 
-/// Adds f_iᵀ c_i of body i to x, the partial sum of J q̈ + γ.
+/// Adds the term f_iᵀ c_i of body i to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64], x: &mut [V; N]) {
     let by_c = dot(f, c);
@@ -159,7 +159,7 @@ fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64],
     }
 }
 
-/// Adds f₀ᵀ a₀ of the world to x, the partial sum of J q̈ + γ.
+/// Adds the term f₀ᵀ a₀ of the world to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 3], x: &mut [V; N]) {
     for r in 0..3 {
@@ -170,14 +170,14 @@ fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 
 }
 
 impl Rows {
-    /// Computes the unit forces of a constraint's rows, and γ'.
+    /// Computes the unit forces of a constraint's rows, and γ' (γ without the terms of the bodies' accelerations).
     #[inline(always)]
     pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<FusedF64>, gamma: [FusedF64; 6]) {
         let rigid = plan.kind == ConstraintKind::Rigid;
         let axes = if plan.aligned() { Mat3::identity() } else { ends.x1.rotation }.columns();
         for (end, (x, sign)) in [(ends.x1, 1.0), (ends.x2, -1.0)].into_iter().enumerate() {
-            // A rigid constraint acts on both bodies at the same point. A point constraint acts at the position of its
-            // point on each body.
+            // A rigid constraint acts on both bodies at the origin of frame 1. A point constraint acts on body 1 at the
+            // origin of frame 1, and on body 2 at the origin of frame 2.
             let p = if rigid { ends.x1.translation } else { x.translation };
             for r in 0..3 {
                 let n = axes[r].scale(FusedF64(sign));
@@ -208,7 +208,7 @@ impl Rows {
     ) {
         let (mut x, mut whole, mut rest) = (read::<V, N>(&self.gamma), [[V::zero(); N]; 6], [[V::zero(); N]; 6]);
         for (k, way) in self.ways.iter().enumerate() {
-            let (mut f_whole, mut f) = (whole, rest); // beyond the junction of both paths
+            let (mut f_whole, mut f) = (whole, rest); // forces at the junction of both paths
             if k < 2 {
                 f_whole = read_forces(self.forces[k].as_flattened(), WIDE);
                 f = f_whole;
@@ -246,9 +246,9 @@ impl Rows {
         write(x, &mut all.x[plan.row..]);
     }
 
-    /// Adds contributions to three columns of J M⁻¹ Jᵀ. The columns start at row r of the other constraint, and the
-    /// rows belong to this constraint. The contributions come from the slots, except the root's, that both constraints
-    /// share.
+    /// Adds the products Y D⁻¹ Yᵀ of shared slots to a block of J M⁻¹ Jᵀ. The rows of the block are the rows of this
+    /// constraint. Its three columns start at row r of the other constraint. `runs` are the slots that both constraints
+    /// share, without the root's slots.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(
         &self,
@@ -278,7 +278,7 @@ impl Rows {
         }
     }
 
-    /// Returns J q̈ + γ, for the accelerations of both bodies.
+    /// Returns J q̈ + γ of this constraint for the given accelerations of its two bodies.
     #[inline(always)]
     pub(crate) fn error(&self, [one, other]: [&[f64]; 2]) -> [f64; WIDE] {
         let mut error = [0.0; WIDE];
@@ -295,7 +295,7 @@ impl Rows {
 }
 
 impl All {
-    /// Writes zeros after the last row of each array.
+    /// Writes zeros after the last row of each array, as padding of the last vector.
     #[inline(always)]
     pub(crate) fn end<V: Block<Number = f64>, const N: usize>(&mut self, rows: usize) {
         let zeros = [V::zero(); N];
@@ -306,7 +306,7 @@ impl All {
         write(zeros, &mut self.x[rows..]);
     }
 
-    /// Propagates the forces on the root to the world.
+    /// Propagates the forces on the root body through the root's joint to the world.
     #[inline(always)]
     pub(crate) fn carry_on<V: Block<Number = f64>, const N: usize>(
         &mut self,
@@ -340,7 +340,7 @@ impl All {
         }
     }
 
-    /// Sets J M⁻¹ Jᵀ to the contribution of the root's joint. The number of rows is a multiple of three.
+    /// Sets J M⁻¹ Jᵀ to the sum of Y D⁻¹ Yᵀ over the columns of the root's joint. `rows` must be a multiple of three.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(&self, rows: usize, G: &mut [f64], stride: usize) {
         for first in (0..self.stride - WIDE).step_by(WIDE) {

@@ -1,17 +1,17 @@
 //! Inverse M⁻¹ of a robot with limbs, computed without M.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. Let U = Iᴬ S and D = Sᵀ U be the
-//! quantities of the articulated-body algorithm. Consider a unit acceleration of column e that no other joint resists.
-//! It moves the bodies further out: T is the motion of a body, and starts as T = S_e. Column d moves by Z_de = −D_d⁻¹
-//! U_dᵀ T, and the motion T + S_d Z_de is passed on to the next body. Z is the inverse of L in M = Lᵀ D L. Its diagonal
-//! is 1, and it has the zeros of the tree. So
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. U = Iᴬ S and D = Sᵀ U are quantities of
+//! the articulated-body algorithm. Column e gets a unit acceleration, and no effort acts at the other columns. The
+//! bodies that the joint of e carries then move by motions T, which start with T = S_e. Column d moves by Z_de = −D_d⁻¹
+//! U_dᵀ T, and the next body moves by T + S_d Z_de. The matrix Z of these numbers is the inverse of L in M = Lᵀ D L.
+//! The diagonal of Z is 1, and Z has the zeros of the tree. So
 //!
 //! ```text
 //! M⁻¹ = Z D⁻¹ Zᵀ
 //! ```
 //!
-//! takes one product for each pair of columns and each column e that carries both. The products do not depend on one
-//! another.
+//! needs one product for each pair of columns and each column e that carries both columns. These products are
+//! independent of each other.
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, Limbs};
@@ -25,21 +25,22 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::FusedF64;
 use condyle_spatial::{Motion, Scalar};
 
-/// Number of vector registers per row that are summed at once.
+/// Number of vector registers per row that are accumulated at the same time.
 const SIDE: usize = 3;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     sizes: Sizes,
-    /// Motions T. Shape: support of all steps. Written by: `carry`.
+    /// Motions T, one per pair of a step and a column of the step's support. Shape: sum of the support sizes of all
+    /// steps. Written by: `carry`.
     T: Vec<Motion<Four>>,
-    /// Z D⁻¹, row by row; each row has the columns in order from the root. Shape: `Sizes`, plus one. Written by:
-    /// `carry`.
+    /// Matrix Z D⁻¹, stored by rows. Each row contains only the columns on the path from the root, in this order.
+    /// Shape: see `Sizes`, plus one entry. Written by: `carry`.
     ZD: Vec<f64>,
-    /// Zᵀ, row by row, including zeros and the ones on the diagonal. Shape: `Sizes`, plus one. Written by: `carry`,
-    /// `new`.
+    /// Matrix Zᵀ, stored by rows, including zeros and the ones on the diagonal. Shape: see `Sizes`, plus one entry.
+    /// Written by: `carry`, `new`.
     Zt: Vec<f64>,
-    /// M⁻¹, each row up to the diagonal. Shape: shape of `Zt`. Written by: `multiply`.
+    /// Lower triangle of M⁻¹, stored by rows. Shape: same as `Zt`. Written by: `multiply`.
     rows: Vec<f64>,
 }
 
@@ -57,7 +58,7 @@ impl Scratch {
         }
     }
 
-    /// Returns whether the scratch was made for this plan, or for a plan of the same shape.
+    /// Returns whether the scratch was made for this plan, or for a plan with the same sizes.
     pub(crate) fn fits(&self, plan: &Plan) -> bool {
         self.T.len() == plan.columns.support.len() && self.sizes == plan.columns.sizes
     }
@@ -85,7 +86,7 @@ impl Scratch {
         mirror(&self.rows, self.sizes, Minv);
     }
 
-    /// Computes Z, from the root to the tips.
+    /// Computes Z D⁻¹ and Zᵀ in one pass from the root to the tips.
     #[inline(always)]
     fn carry(&mut self, l: &Limbs<'_>, w: &World<Four>, aba: &aba::Workspace<Four>) {
         let Self { T, ZD, Zt, .. } = self;
@@ -113,8 +114,8 @@ impl Scratch {
         }
     }
 
-    /// Computes several rows of M⁻¹, up to the diagonal and slightly beyond. The constant parameter M is the number of
-    /// these rows.
+    /// Computes M rows of M⁻¹, up to the end of the vector that contains the last diagonal entry. The constant
+    /// parameter M is the number of rows.
     #[inline(always)]
     fn multiply<V: Block<Number = f64>, const M: usize>(&mut self, block: &ColumnBlock) {
         let (mut start, end) = (0, block.first + M);
@@ -129,7 +130,7 @@ impl Scratch {
         }
     }
 
-    /// Computes N vector registers in each of M rows, from column `start` on.
+    /// Computes N vectors of entries in each of M rows of M⁻¹, beginning with column `start`.
     #[inline(always)]
     fn part<V: Block<Number = f64>, const M: usize, const N: usize>(&mut self, block: &ColumnBlock, start: usize) {
         let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, rows: n }, .. } = self;
@@ -143,7 +144,7 @@ impl Scratch {
         let mut sums = [[V::zero(); N]; M];
         for (p, &e) in path.iter().enumerate() {
             if e >= start + many {
-                break; // columns that e carries come later
+                break; // columns below e have no term of e
             }
             debug_assert!(e < *n);
             // SAFETY: the plan's paths consist of columns, and Zt has one row per column.
@@ -169,7 +170,7 @@ impl Scratch {
     }
 }
 
-/// Writes the number of each lane of x to the index of the lane in `at`.
+/// Writes the number in each lane of x to entry `at[lane]`.
 #[inline(always)]
 fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
     let x = x.to_array();
@@ -180,7 +181,7 @@ fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
     }
 }
 
-/// Computes a symmetric matrix X from `rows`, which are given up to the diagonal.
+/// Computes a symmetric matrix X from its lower triangle, which `rows` contains.
 #[inline(always)]
 fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF64]) {
     assert!(n <= width && rows.len() >= n * width && X.len() >= n * n);
@@ -214,7 +215,8 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
     }
 }
 
-/// Writes the rows of a block to X: the first row at entry `at`, each other row n entries after the previous one.
+/// Writes the rows of a block to X. The first row begins at entry `at`, and each row begins n entries after the row
+/// before.
 ///
 /// # Safety
 /// The block's last row must end inside X.

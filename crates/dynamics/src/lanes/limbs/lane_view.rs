@@ -1,4 +1,4 @@
-//! Results of a pass over steps, with functions that read them body by body.
+//! Results of a pass in lanes, with functions that return the results of one body.
 
 use super::Plan;
 use super::lanes::Four;
@@ -6,7 +6,7 @@ use super::pass::Scratch;
 use condyle_spatial::block::lanes;
 use condyle_spatial::{Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// View of the results, in lanes, that the derivatives of inverse dynamics need.
+/// View of the results in lanes that the derivatives of inverse dynamics read.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LaneView<'d> {
     plan: &'d Plan,
@@ -32,8 +32,8 @@ impl<'d> LaneView<'d> {
         motion(&self.scratch.world.S[self.plan.steps[step].idx_v + k], lane)
     }
 
-    /// Returns the velocity and the acceleration of body b. The acceleration includes gravity, as if the world
-    /// accelerated upwards.
+    /// Returns the velocity and the acceleration of body b. The acceleration includes gravity as a world acceleration
+    /// of −g.
     pub(crate) fn moving<S: Scalar>(self, b: usize) -> (Motion<S>, Motion<S>) {
         let (step, lane) = self.plan.place(b);
         (motion(&self.scratch.bodies.v[step], lane), motion(&self.scratch.bodies.a[step], lane))
@@ -50,7 +50,7 @@ impl<'d> LaneView<'d> {
 }
 
 fn number<S: Scalar>(x: &Four, lane: usize) -> S {
-    // read from memory, as this code must run on processors without vectors too
+    // read from memory, because this code must also run on processors without vectors
     S::splat(lanes(core::slice::from_ref(x))[lane])
 }
 

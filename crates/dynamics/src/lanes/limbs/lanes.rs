@@ -1,4 +1,5 @@
-//! Layout for passes with steps instead of bodies and lanes instead of numbers.
+//! Layout with which passes over bodies run over steps. A step has one body per lane, and each scalar is a vector of
+//! lanes.
 #![allow(unsafe_code)]
 
 use super::{LANES, Plan};
@@ -18,7 +19,7 @@ use core::ops::{AddAssign, Range};
 pub(crate) type Four = Narrow;
 const _: () = assert!(<Four as Scalar>::LANES == LANES);
 
-/// Layout of a robot with limbs: steps instead of bodies, lanes instead of numbers.
+/// Layout of a robot with limbs, for passes over steps. A step has one body per lane.
 pub(crate) struct Limbs<'a> {
     pub(crate) steps: &'a [Step],
     pub(crate) support: &'a [LaneColumn],
@@ -33,7 +34,7 @@ pub(crate) struct Limbs<'a> {
     geometry: u64,
 }
 
-/// Returns the vector registers of which a value consists.
+/// Returns a value as a slice of the vectors of which it consists.
 ///
 /// # Safety
 /// `T` must consist of vectors only: a struct of spatial algebra or of kinematics with `repr(C)`.
@@ -47,7 +48,7 @@ unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
 /// Returns the numbers of an array of structs; the numbers of each vector are adjacent.
 ///
 /// # Safety
-/// `T` must consist of vectors, as for `vectors`.
+/// `T` must consist of vectors only: a struct of spatial algebra or of kinematics with `repr(C)`.
 #[inline(always)]
 pub(crate) unsafe fn numbers<T>(of: &[T]) -> &[f64] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
@@ -58,7 +59,7 @@ pub(crate) unsafe fn numbers<T>(of: &[T]) -> &[f64] {
 /// Returns the numbers of an array of structs as a mutable slice.
 ///
 /// # Safety
-/// `T` must consist of vectors, as for `vectors`.
+/// `T` must consist of vectors only: a struct of spatial algebra or of kinematics with `repr(C)`.
 #[inline(always)]
 pub(crate) unsafe fn numbers_mut<T>(of: &mut [T]) -> &mut [f64] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
@@ -76,7 +77,7 @@ fn moved<T: Copy>(mut x: T, by: &Move) -> T {
     x
 }
 
-/// Sums values of several steps or slots, after each number has been moved to another lane.
+/// Returns the sum of values of several steps or slots. Before the sum, each value is moved to its new lanes.
 #[inline(always)]
 fn gathered<T: Copy>(of: &[T], from: &[(usize, Move)]) -> T {
     let mut x = moved(of[from[0].0], &from[0].1);
@@ -124,7 +125,7 @@ impl Layout for Limbs<'_> {
     }
     #[inline(always)]
     fn armature(&self, i: usize, k: usize) -> Four {
-        let mut armature = [1.0; LANES]; // value for lanes without a joint, avoids a division by 0
+        let mut armature = [1.0; LANES]; // 1 in lanes without a joint, to avoid a division by 0
         let from = self.coordinates[self.steps[i].idx_v + k].from;
         for lane in 0..LANES {
             if from[lane] < self.armature.len() {
@@ -161,7 +162,7 @@ impl Layout for Limbs<'_> {
     fn stack_index(&self, i: usize) -> usize {
         i
     }
-    /// Returns all bodies if `i` is the last step, otherwise no bodies.
+    /// Returns the list `closed` of all bodies if `i` is the last step, otherwise an empty list.
     #[inline(always)]
     fn subtrees_ending_at(&self, i: usize) -> &[usize] {
         if i + 1 == self.steps.len() { self.closed } else { &[] }
@@ -229,7 +230,7 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the value of the entry that precedes an entry of the support.
+    /// Returns the value that belongs to the predecessor of an entry of the support.
     #[inline(always)]
     pub(crate) fn predecessor<T: Copy>(&self, of: &[T], entry: usize) -> T {
         match &self.predecessors[entry] {
@@ -238,7 +239,8 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the matrix indices of a pair of columns.
+    /// Returns the indices of the matrix entries for the pair of the support's column e and column k of the step's
+    /// joint.
     #[inline(always)]
     pub(crate) fn pair(&self, e: LaneColumn, k: usize) -> &Pair {
         debug_assert!(e.pair + k < self.pairs.len());
@@ -246,15 +248,15 @@ impl<'a> Limbs<'a> {
         unsafe { self.pairs.get_unchecked(e.pair + k) }
     }
 
-    /// Sets the matrix entries of a pair of columns. The entry of the first lane is written last, so that it remains if
-    /// several lanes have the same index.
+    /// Sets the matrix entries of a pair of columns, one per lane. If several lanes have the same index, the value of
+    /// the first of these lanes remains, because it is written last.
     #[inline(always)]
     fn put(matrix: &mut [FusedF64], at: &[u32; LANES], value: Four) {
         let value = value.to_fused();
         for lane in (0..LANES).rev() {
             debug_assert!((at[lane] as usize) < matrix.len());
-            // SAFETY: a plan's pairs are indices of entries in nv × nv matrices. `clear` checks that `matrix` has this
-            // size.
+            // SAFETY: the pairs of a plan contain indices of entries in nv × nv matrices. `clear` checks that `matrix`
+            // has this size.
             unsafe { *matrix.get_unchecked_mut(at[lane] as usize) = value[lane] };
         }
     }

@@ -1,4 +1,5 @@
-//! Limbs of one robot in parallel lanes: passes over the schedule of [`condyle_model::limbs`], four bodies at a time.
+//! Passes that compute the limbs of one robot in parallel lanes. The schedule of [`condyle_model::limbs`] determines
+//! the steps; each step computes four bodies.
 
 mod constrained;
 pub(crate) mod forces;

@@ -1,4 +1,4 @@
-//! Scratch of passes over steps of four bodies, and arguments in lanes.
+//! Scratch of passes in lanes, and conversion of arguments to lanes.
 #![allow(unsafe_code)]
 
 use super::lanes::Four;
@@ -25,12 +25,13 @@ pub(crate) struct Scratch {
     pub v: Array<Four>,
     pub x: Array<Four>,
     pub f_ext: Array<Force<Four>>,
-    /// Copy of an argument, with a 0 for lanes without a joint. Shape: max(nq, nv) + 1. Written by: `gather`.
+    /// Copy of an argument, followed by a 0, which lanes without a joint read. Shape: max(nq, nv) + 1. Written by:
+    /// `gather`.
     padded: Array<FusedF64>,
     pub world: World<Four>,
     pub rnea: rnea::Workspace<Four>,
     pub aba: aba::Workspace<Four>,
-    /// Composite inertias. Shape: steps. Written by: `crba::pass`.
+    /// Composite inertias. Shape: number of steps. Written by: `crba::pass`.
     pub IC: Array<Inertia<Four>>,
     pub bodies: rnea_derivatives::Bodies<Four>,
     pub inverted: inverse::Scratch,
@@ -58,7 +59,7 @@ impl Scratch {
         }))
     }
 
-    /// Returns whether the scratch was made for this plan, or for a plan of the same shape.
+    /// Returns whether the scratch was made for this plan, or for a plan with the same sizes.
     pub(crate) fn fits(&self, plan: &Plan) -> bool {
         (self.q.len(), self.v.len(), self.f_ext.len(), self.world.S.len())
             == (
@@ -76,7 +77,7 @@ impl Scratch {
 pub(crate) struct Arguments<'a, S = FusedF64> {
     pub q: &'a [S],
     pub v: &'a [S],
-    /// Accelerations or joint efforts.
+    /// Joint accelerations for inverse dynamics, or joint efforts for forward dynamics.
     pub x: &'a [S],
     pub f_ext: &'a [Force<S>],
 }
@@ -87,7 +88,7 @@ impl<'a, S> Arguments<'a, S> {
         Self { q, v: &[], x: &[], f_ext: &[] }
     }
 
-    /// Returns the same numbers with the type `FusedF64`.
+    /// Returns the same arguments with the number type `FusedF64`.
     ///
     /// # Safety
     /// `S` must be `f64`.
@@ -131,7 +132,7 @@ pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     }
 }
 
-/// Gathers the numbers of a robot's vector x into lanes.
+/// Copies the numbers of x, a vector of positions or coordinates of the robot, to the lanes of `to`.
 #[inline(always)]
 fn gather(sources: &[Source], padded: &mut [FusedF64], x: &[FusedF64], to: &mut [Four]) {
     padded[..x.len()].copy_from_slice(x);
@@ -148,14 +149,14 @@ fn gather(sources: &[Source], padded: &mut [FusedF64], x: &[FusedF64], to: &mut 
     }
 }
 
-/// Copies a vector of coordinates out of the lanes. It is the transpose of `gather`.
+/// Copies a vector of coordinates from lanes to an array in the robot's order, the inverse of `gather`.
 #[inline(always)]
 pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [FusedF64]) {
     let numbers = lanes(from);
     assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         debug_assert!(at < numbers.len());
-        // SAFETY: the plan's indices are valid for the lanes of all coordinates, whose number is checked above.
+        // SAFETY: the plan's indices are below the number of lanes of all coordinates. This number is checked above.
         *to = FusedF64(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
