@@ -81,8 +81,8 @@ impl Basis {
         }
     }
 
-    /// Maps the constraint row that consists of a 1 for `unknown` and zeros to z, and writes it as column r of `to`.
-    /// Returns the value of the row at z = 0.
+    /// Maps a row of coefficients of x to z, and writes the result as column r of `to`. The row has a 1 for `unknown`
+    /// and zeros elsewhere. Returns the value of the row at z = 0.
     pub(crate) fn map_single_row(&self, unknown: usize, to: &mut DMatrix<f64>, r: usize) -> f64 {
         let (n, ldt) = (self.others.len(), to.nrows());
         let to = &mut to.as_mut_slice()[r * ldt..][..n];
@@ -101,8 +101,8 @@ impl Basis {
         }
     }
 
-    /// Maps a row with few non-zero entries to z, and writes it as column r of `to`. Returns the value of the row at z
-    /// = 0.
+    /// Maps a row of coefficients of x with few non-zero entries to z, and writes the result as column r of `to`.
+    /// Returns the value of the row at z = 0.
     pub(crate) fn map_row(&self, from: &DMatrix<f64>, r: usize, to: &mut DMatrix<f64>) -> f64 {
         let ldt = to.nrows();
         let row = &from.as_slice()[r * from.nrows()..][..self.places.len()];
@@ -157,7 +157,8 @@ impl Elimination {
         }
     }
 
-    /// Splits the unknowns by A x = b. Uses the pivots of the last call, unless one of them has become too small.
+    /// Splits the unknowns by A x = b. Uses the pivots of the last call, unless one of these pivots has become too
+    /// small.
     pub(crate) fn split(&mut self, program: &ConeProgram, basis: &mut Basis) {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
         if self.shape != (equalities, n) || !self.eliminate(program, true) {
@@ -210,8 +211,8 @@ impl Elimination {
         Some(())
     }
 
-    /// Runs Gauss–Jordan elimination. With `again` it uses the pivots of the last call; it returns false if one of them
-    /// has become too small.
+    /// Runs Gauss–Jordan elimination. If `again` is true, it uses the pivots of the last call, and returns false if one
+    /// of these pivots has become too small.
     fn eliminate(&mut self, program: &ConeProgram, again: bool) -> bool {
         let Self { W, right, used, pivots, .. } = self;
         let (n, m, stride) = (program.size.unknowns, program.size.equalities, W.nrows());
@@ -256,7 +257,7 @@ impl Elimination {
             used[row] = true;
             at_level(Pivot { W: &mut W[..m * stride], right, stride, row, j });
         }
-        // A row that depended on others in the last call may be independent now.
+        // A row that depended on other rows in the last call may be independent now.
         !again || (0..m).all(|r| used[r] || max_abs(&W[r * stride..][..n]) <= DEPENDENT)
     }
 }

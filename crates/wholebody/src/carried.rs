@@ -1,10 +1,10 @@
-//! State of a controller that lasts from one tick to the next, as a list of numbers. Clones and saved controllers
-//! contain this list.
+//! State of a controller that lasts from one tick to the next, as a list of numbers. The list is needed to clone or to
+//! save a controller.
 //!
 //! All other numbers follow from the description (model, contacts, tasks, settings) and from the arguments of a step. A
-//! second controller with the same description can be given this list. With [`Backend::InteriorPoint`], its next
-//! commands then have the same bits. With clarabel, whose solvers are built again, its solutions are the same up to
-//! clarabel's tolerance.
+//! second controller with the same description can be given this list. With [`Backend::InteriorPoint`], the commands of
+//! both controllers then have the same bits. With clarabel, whose solvers are built again, their solutions are the same
+//! up to clarabel's tolerance.
 //!
 //! [`Backend::InteriorPoint`]: crate::Backend::InteriorPoint
 

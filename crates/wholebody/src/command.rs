@@ -10,7 +10,7 @@ use std::fmt;
 pub enum CommandSource {
     /// Solution of the program. If the solver did not finish, it is an iterate that satisfies all constraints.
     Solution,
-    /// Torques of the last solution, which is at most [`Settings::hold_ticks`](crate::Settings::hold_ticks) old.
+    /// Torques of the last solution, which is at most [`Settings::hold_ticks`](crate::Settings::hold_ticks) ticks old.
     LastSolution,
     /// Gravity compensation at the last valid state. Damping is added if this state is the current one.
     GravityCompensation,

@@ -64,7 +64,8 @@ impl Condenser {
         }
     }
 
-    /// Writes a program over z to `out`. It is equivalent to the program `full` over x with the given objective.
+    /// Writes a program over z to `out`. The written program is equivalent to the program `full` over x with the given
+    /// objective.
     pub(crate) fn condense(
         &mut self,
         full: &ConeProgram,

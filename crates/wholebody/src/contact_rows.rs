@@ -64,8 +64,8 @@ impl ContactRows {
         }
     }
 
-    /// Adds the numbers of this contact's unknowns and constraints to `all`, the size of a program in which all
-    /// contacts touch. The contact's indices in this program start at the old size.
+    /// Adds this contact to `all`, the size of a program in which all contacts touch. The contact's unknowns and
+    /// constraints get the indices from the old to the new size.
     pub(crate) fn add_to(&mut self, all: &mut Size, friction: Friction) {
         self.first = *all;
         all.unknowns += self.geometry.unknowns();

@@ -25,8 +25,8 @@ use std::fmt;
 /// violation is an error.
 const FEASIBLE: f64 = 1e-6;
 
-/// Weight of the tasks that lead joints back to their limits. These tasks replace limits that contradict other
-/// constraints.
+/// Weight of the tasks that lead joints back to their limits. If the limits contradict other constraints, these tasks
+/// replace them.
 const PULL: f64 = 1e3;
 
 /// A whole-body controller. It solves one cone program for each tick and priority; the [crate's documentation](crate)

@@ -191,8 +191,8 @@ impl From<cone_program::Status> for Status {
             cone_program::Status::Infeasible => Self::Infeasible,
             cone_program::Status::IterationLimit => Self::IterationLimit,
             cone_program::Status::TimeLimit => Self::TimeLimit,
-            // The objective is bounded below, and the input was checked. So `Unbounded` and `NotFinite` here also
-            // result from numerical failures.
+            // The objective is bounded below, and the input was checked. So `Unbounded` and `NotFinite` can only result
+            // from numerical failures here.
             cone_program::Status::Unbounded
             | cone_program::Status::NotFinite { .. }
             | cone_program::Status::NumericalError => Self::NumericalError,

@@ -1,5 +1,5 @@
-//! Program with additional unknowns r and t. They replace matrices with few zeros, R of the objective and G_d of the
-//! constraints, so the solver's matrices are sparse.
+//! Program with additional unknowns r and t. These unknowns replace R x in the objective and the rows G_d x in the
+//! constraints, whose matrices R and G_d have few zeros. The matrices of the program are then sparse.
 //!
 //! ```text
 //! minimise     ½ ‖r‖² + ½ Σ dᵢ xᵢ² + cᵀ x                over (x, r, t)

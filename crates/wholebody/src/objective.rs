@@ -15,7 +15,7 @@ pub(crate) struct ResolvedTask {
     pub frame: Option<usize>,
     /// Index of the task's target among the frames of the references.
     pub target: usize,
-    /// Index of the frame that gives the task's axes, among the frames of the kinematics.
+    /// Index of the frame whose axes the task uses, among the frames of the kinematics.
     pub axes: Option<usize>,
     /// Index of the contact whose force the task sets.
     pub contact: Option<usize>,

@@ -142,8 +142,8 @@ impl Plan {
         }
     }
 
-    /// Returns the activation of a contact at a time: 0 while it does not touch, a ramp near the beginning and end of
-    /// contact, and 1 otherwise.
+    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after the beginning
+    /// and before the end of a contact interval, and 1 otherwise.
     ///
     /// # Panics
     /// If the contact's index is out of range.

@@ -47,8 +47,7 @@ pub struct MomentumTarget {
     pub rate: Vec3<f64>,
 }
 
-/// Target of a contact, in the world's frame: activation, pose at which the contact is held, and reference of its
-/// force.
+/// Target of a contact, in the world's frame: activation, pose at which the contact is held, and reference force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactTarget {
     /// Activation α, from 0 (no contact: no force, and the frame may move) to 1 (full contact). Between 0 and 1 the

@@ -47,9 +47,9 @@ impl fmt::Display for Backend {
 pub enum Formulation {
     /// The equalities of the base and of the contacts are eliminated first.
     Condensed,
-    /// All unknowns (q̈, f), with equalities. This form is slower and serves for comparisons. With clarabel, it has
-    /// additional unknowns for limited torques and for residuals of tasks, which make its matrices sparse. Priorities
-    /// after the first are always condensed.
+    /// All unknowns (q̈, f), with equalities. This form is slower and serves for comparisons. With clarabel, this form
+    /// has additional unknowns for limited torques and for residuals of tasks. These unknowns make the matrices sparse.
+    /// Priorities after the first are always condensed.
     Full,
 }
 

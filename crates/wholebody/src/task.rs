@@ -40,9 +40,9 @@ pub enum TaskKind {
     Posture,
     /// Rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers.
     AngularMomentum,
-    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre, along its axes (t₁, t₂,
-    /// n). A point contact has only the first 3 numbers. Gains have no effect, and the task is off while the contact is
-    /// off.
+    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre, along the contact's
+    /// axes (t₁, t₂, n). A point contact has only the first 3 numbers. Gains have no effect, and the task is off while
+    /// the contact is off.
     ContactForce(String),
 }
 

@@ -1,4 +1,4 @@
-//! Solves the program priority by priority: later priorities keep the results of earlier ones.
+//! Solves the program priority by priority. Later priorities keep the results of earlier priorities.
 //!
 //! All minimisers of ½ ‖R x − b‖² over a convex set have the same R x. So the equality R x = R x*, with any minimiser
 //! x*, describes all minimisers. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014),
@@ -24,8 +24,8 @@ use condyle_linalg::max_abs;
 /// may leave rows and cones without an interior.
 const WIDENED: f64 = 1e-7;
 
-/// Threshold below which the equalities of earlier priorities already determine a row's value. It applies to the ratio
-/// of the row's coefficients after and before the elimination.
+/// Threshold below which the equalities of earlier priorities already determine a row's value. The compared number is
+/// the ratio of the row's coefficients after the elimination to the coefficients before it.
 const DECIDED: f64 = 1e-9;
 
 /// Form of the program that the solver of a priority receives.

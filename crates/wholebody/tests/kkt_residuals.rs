@@ -1,4 +1,4 @@
-//! Tests that each command satisfies dynamics, contacts and cones, and that it is optimal.
+//! Tests that each command satisfies dynamics, contacts and cones, and that each command is optimal.
 #![allow(non_snake_case)]
 
 mod common;

@@ -42,7 +42,7 @@ fn references_follow_the_plan() {
     assert!((references.frames[1].acceleration.linear.z - 0.4).abs() < 1e-9, "the foot is lifted with the trunk");
     let lift: f64 = references.contacts.iter().map(|c| c.force.linear.z).sum();
     assert!((lift - model.total_mass() * (9.81 + 0.4)).abs() < 1e-9);
-    // Before and after the plan's time span, the plan is at rest.
+    // Before and after the plan's time span, the planned robot is at rest.
     controller.track(&plan, 1.0, &mut references);
     assert_eq!((references.com.velocity.z, references.com.acceleration.z), (0.0, 0.0));
     assert!((references.com.position.z - height - 0.032).abs() < 1e-12);

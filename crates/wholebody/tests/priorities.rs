@@ -66,7 +66,7 @@ fn references_without_frames(references: &condyle_wholebody::References) -> cond
     condyle_wholebody::References { frames: Vec::new(), ..references.clone() }
 }
 
-/// Checks that all forms of a program with three priorities give the same commands with each back end.
+/// Checks that all forms of a program with three priorities give the same commands with both back ends.
 #[test]
 fn forms_agree_on_priorities() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());

@@ -59,7 +59,7 @@ fn a_state_that_is_not_finite() {
     let (mut no_q, mut no_v) = (q.clone(), v.clone());
     (no_q[8], no_v[3]) = (f64::NAN, f64::INFINITY);
     for tick in 0..20 {
-        // The controller finds no solution before tick 10.
+        // Before tick 10, all states were invalid, and no solution is stored.
         let command = controller.step(&no_q, &v, &references);
         is_safe(command, &effort);
         assert_eq!(command.status.to_string(), "`q[8]` is NaN, which is not finite");

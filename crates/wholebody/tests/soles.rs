@@ -45,8 +45,8 @@ fn a_humanoid_stands_on_soles() {
     }
 }
 
-/// Checks a strong push to the side. It moves the centre of pressure to the edge of a sole, or a force to the boundary
-/// of its friction cone.
+/// Checks a strong push to the side. The push moves the centre of pressure to the edge of a sole, or a force to the
+/// boundary of its friction cone.
 #[test]
 fn the_centre_of_pressure_stays_within() {
     let model = robots::humanoid();
@@ -200,7 +200,7 @@ fn a_hand_leans_on_a_wall() {
     assert!(f.z > 0.0 && (f.x.hypot(f.z) / (-0.4 * f.y) - 1.0).abs() < 1e-3, "at the edge of its cone: {f:?}");
 }
 
-/// Checks convex polygons with different numbers of corners, in both orders of the corners.
+/// Checks a convex polygon with six corners, whose corners are given in both directions around the polygon.
 #[test]
 fn soles_of_many_corners() {
     let model = robots::humanoid();

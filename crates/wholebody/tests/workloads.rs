@@ -18,9 +18,9 @@ const TICKS: usize = 2000;
 /// Interval between checked ticks.
 const EACH: usize = 8;
 
-/// Tolerance of objective and q̈ for solutions with tolerances 1e-14 and 1e-13, relative to 1 plus their size. An error
-/// of the objective, relative to a few hundred, causes an error of q̈ of the size of its square root. Where only the
-/// posture's weight of 0.1 determines q̈, the error of q̈ is four times larger.
+/// Tolerance of objective and q̈ for solutions with tolerances 1e-14 and 1e-13, relative to 1 plus their size. The
+/// objective is a few hundred. A relative error of the objective causes an error of q̈ of about the square root of this
+/// error. Where only the posture's weight of 0.1 determines q̈, the error of q̈ is four times larger.
 const AGREEMENT: f64 = 1e-6;
 
 /// Calls a function for each recording of each robot.

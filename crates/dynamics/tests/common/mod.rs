@@ -117,7 +117,7 @@ impl Tree {
         tree
     }
 
-    /// Creates a random robot like [`random`](Self::random), with additional joints that follow other joints. Followers
+    /// Creates a random robot like `random` does, with additional joints that follow other joints. Followers
     /// are in the leader's branch and in other branches, a leader may have several followers, and ratios may be
     /// negative.
     pub(crate) fn random_with_mimics(rng: &mut StdRng) -> Self {

@@ -1,4 +1,5 @@
-//! Tests of velocities, accelerations and rates of Jacobians. They are compared with time derivatives by dual numbers.
+//! Tests of velocities, accelerations and rates of Jacobians. The results are compared with time derivatives by dual
+//! numbers.
 
 use crate::common;
 
@@ -174,7 +175,7 @@ fn accelerations() {
 }
 
 /// Checks that results with accelerations also contain velocities and placements, and results with velocities also
-/// contain placements. All must have the same bits.
+/// contain placements. Equal quantities must have the same bits.
 #[test]
 fn one_hierarchy() {
     for model in all_models(2) {

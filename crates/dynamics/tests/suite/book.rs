@@ -33,8 +33,8 @@ struct Book<'a> {
     model: &'a Model,
     /// Placement of each body i in its parent λ.
     X: Vec<Se3<f64>>,
-    /// Motion subspaces, 6 × nv each. For a joint that follows another joint, the column of the leader's coordinate is
-    /// used.
+    /// Motion subspaces, 6 × nv each. The column of a joint that follows another joint is at the index of the leader's
+    /// coordinate.
     S: Vec<Matrix6xX<f64>>,
 }
 

@@ -1,5 +1,5 @@
-//! Tests of centre of mass, centroidal momentum, energies, and the function that computes all terms at once. They are
-//! compared with time derivatives by dual numbers and with other algorithms.
+//! Tests of centre of mass, centroidal momentum, energies, and the function that computes all terms at once. The
+//! results are compared with time derivatives by dual numbers and with other algorithms.
 
 use crate::common;
 
@@ -136,7 +136,7 @@ fn energies() {
     }
 }
 
-/// Checks that all terms of the common function equal the results of the single algorithms.
+/// Checks the function that computes all terms at once: each term must equal the result of the single algorithm.
 #[test]
 fn all_terms() {
     let mut worst = Worst::new("compute_all_terms", ROUNDING);

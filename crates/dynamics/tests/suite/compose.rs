@@ -128,7 +128,7 @@ fn ways_between_positions() {
         difference(&model, &a.q, &b.q, &mut rest);
         assert!((whole - rest.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < ROUNDING * (1.0 + whole));
         interpolate(&model, &a.q, &b.q, 0.3, &mut d, &mut q);
-        // The motion from q₀ to q₁ has constant velocity, so the remaining length is proportional to the remaining
+        // The interpolated motion has constant velocity, so the remaining distance is proportional to the remaining
         // time.
         assert!((distance(&model, &q, &b.q, &mut rest) - 0.7 * whole).abs() < 1e-10 * (1.0 + whole));
         let mut long: Vec<f64> = q.clone();

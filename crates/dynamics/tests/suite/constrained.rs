@@ -204,8 +204,8 @@ fn redundant_constraints() {
     }
 }
 
-/// Checks the forces of redundant points on a line. With the proximal parameter μ, they must be the smallest possible
-/// forces, which are computed from M⁻¹ and a pseudo-inverse.
+/// Checks the forces of redundant points on a line. With the proximal parameter μ, these forces must be the smallest
+/// possible forces. The test computes the smallest forces from M⁻¹ and a pseudo-inverse.
 #[test]
 fn smallest_forces() {
     let mut builder = ModelBuilder::new("box");

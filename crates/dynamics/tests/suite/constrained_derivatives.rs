@@ -1,5 +1,5 @@
-//! Tests of the analytical derivatives of constrained dynamics and of impacts. They are compared with dual numbers and
-//! with finite differences.
+//! Tests of the analytical derivatives of constrained dynamics and of impacts. The results are compared with dual
+//! numbers and with finite differences.
 
 use crate::common;
 
@@ -18,8 +18,8 @@ use num_dual::Dual64;
 const EXACT: f64 = 1e-11;
 /// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
-/// Tolerance of central differences. Their error is a rounding error of 1e-16 / step, plus step² times a third
-/// derivative.
+/// Tolerance of central differences. The error of a difference is a rounding error of 1e-16 / step, plus step² times a
+/// third derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
@@ -113,7 +113,7 @@ fn by_duals<A: Algorithm>(
     out
 }
 
-/// Computes the same derivatives by central differences.
+/// Computes the derivatives with respect to q, v and τ by central differences.
 fn by_differences<A: Algorithm>(
     model: &Model,
     s: &State,

@@ -1,4 +1,4 @@
-//! Tests of analytical derivatives. They are compared with dual numbers and with finite differences.
+//! Tests of analytical derivatives. The results are compared with dual numbers and with finite differences.
 
 use crate::common;
 
@@ -13,8 +13,8 @@ const EXACT: f64 = 1e-11;
 /// Tolerance for long chains. The condition number of M grows with the cube of a chain's length: it is 1e7 for 90
 /// links. Since the error is relative to the largest entries, most of this growth cancels.
 const LONG: f64 = 1e-9;
-/// Tolerance of central differences. Their error is a rounding error of 1e-16 / step, plus step² times a third
-/// derivative.
+/// Tolerance of central differences. The error of a difference is a rounding error of 1e-16 / step, plus step² times a
+/// third derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;

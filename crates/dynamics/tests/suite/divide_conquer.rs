@@ -11,10 +11,10 @@ use condyle_dynamics::{
 };
 use num_dual::Dual64;
 
-/// Tolerance: some hundred rounding errors times the condition number of M. The condition number is 1e2 to 1e5 for the
-/// robots. It grows with the cube of a chain's length: it is 1e8 for 300 links, and `aba` itself loses as many digits.
-/// The error is relative to the largest accelerations, which are the accelerations of the light tips and grow in the
-/// same way.
+/// Tolerance of some hundred rounding errors times the condition number of M. The condition number is 1e2 to 1e5 for
+/// the robots. For a chain, the condition number grows with the cube of the length: it is 1e8 for 300 links, and `aba`
+/// itself loses as many digits. The error is relative to the largest accelerations, which are the accelerations of the
+/// light tips and grow in the same way.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 

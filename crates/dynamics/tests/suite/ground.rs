@@ -1,5 +1,5 @@
-//! Tests of a simulation's contacts with the ground: landing, standing, sliding, sticking, lift-off and energy. They
-//! are compared with closed forms.
+//! Tests of a simulation's contacts with the ground: landing, standing, sliding, sticking, lift-off and energy. The
+//! results are compared with closed forms.
 
 use crate::common::{normal3, random_rotation, relative, rng};
 use crate::counting::allocations;
@@ -56,8 +56,8 @@ fn energy(model: &Model, simulation: &Simulation<f64>) -> f64 {
 
 fn passive(_: &mut Control<'_, f64>) {}
 
-/// Checks a sliding box along different directions. Its deceleration must be exactly μ g. It stops after a distance of
-/// v²/(2 μ g), minus half the distance of the first step.
+/// Checks a sliding box along different directions. The box must decelerate with exactly μ g. It must stop after a
+/// distance of v²/(2 μ g), minus half the distance of the first step.
 #[test]
 fn a_box_slides_to_a_stop() {
     let model = free_box();
@@ -275,9 +275,9 @@ fn placed(model: &Model, q: &[f64]) -> Se3<f64> {
     forward_kinematics(model, &mut Data::new(model), q).body(1)
 }
 
-/// Returns a controller that holds a posture and compensates the weight. Its stiffness is the maximum that an explicit
-/// integrator allows for the inertia at each joint. For a joint that carries a light limb, this inertia is M_kk. With
-/// `heavy`, for joints with heavy bodies on both sides, it is 1/(M⁻¹)_kk.
+/// Returns a controller that holds a posture and compensates the weight. The stiffness at each joint is the maximum
+/// that an explicit integrator allows for the inertia at this joint. For a joint that carries a light limb, the inertia
+/// is M_kk. With `heavy`, for joints with heavy bodies on both sides, the inertia is 1/(M⁻¹)_kk.
 fn posture(model: &Model, q0: &[f64], heavy: bool) -> impl FnMut(&mut Control<'_, f64>) + use<> {
     let (mut data, q0) = (Data::new(model), q0.to_vec());
     let inertia: Vec<f64> = if heavy {
@@ -403,8 +403,8 @@ fn steps_do_not_allocate() {
     assert!(simulation.contacts().iter().any(|contact| contact.touches));
 }
 
-/// Checks a contact solver without iterations. It must report the failure and the error. Its impulses must still push
-/// only, within the friction cones.
+/// Checks a contact solver without iterations. It must report the failure and the error. The impulses must still push,
+/// and not pull, and lie within the friction cones.
 #[test]
 fn a_solver_that_is_stopped_says_so() {
     let model = free_box();

@@ -166,7 +166,7 @@ fn the_order_of_constraints_changes_nothing() {
     let [v, tau] = [(); 2].map(|()| normal(&mut rng, whole.nv()));
     let mut all: Vec<_> = parts.iter().enumerate().flat_map(|(k, part)| contacts(k, part, &whole)).collect();
     let [one, other] = ["1_LF_foot", "3_right_sole"].map(|name| whole.frame(name).unwrap());
-    all.insert(5, ContactConstraint { other: Some(other), ..ContactConstraint::point(one) }); // after the quadruped's contacts
+    all.insert(5, ContactConstraint { other: Some(other), ..ContactConstraint::point(one) }); // after the quadruped's
     let mut turned = all.clone();
     turned.rotate_left(3);
     let (last, middle) = (turned.len() - 1, turned.len() / 2);
@@ -231,8 +231,8 @@ fn four() -> Model {
     builder.build().unwrap()
 }
 
-/// Returns the islands for given contacts. Each contact is given by the name of a frame and, if it connects two frames,
-/// the name of the second frame.
+/// Returns the islands for given contacts. Each contact is given by the name of a frame and, if the contact connects
+/// two frames, by the name of the second frame.
 fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Range<usize>)> {
     let frame = |name: &str| model.frame(name).unwrap();
     let contact = |(one, other): &(&str, Option<&str>)| ContactConstraint {

@@ -1,4 +1,4 @@
-//! Tests of the Jacobians of frames and of the configuration space. They are compared with dual numbers.
+//! Tests of the Jacobians of frames and of the configuration space. The results are compared with dual numbers.
 
 use crate::common;
 

@@ -19,9 +19,9 @@ fn floats(value: &Value) -> Vec<f64> {
     all.flat_map(|x| x.as_f64().map_or_else(|| floats(x), |x| vec![x])).collect()
 }
 
-/// Checks that placements, efforts, M and effort limits equal Pinocchio's. The file has every pair of joint types that
-/// Pinocchio supports as leader and follower. Here, position limits, velocity limits and losses of a follower act on
-/// the leader, but Pinocchio ignores them.
+/// Checks that placements, efforts, M and effort limits equal Pinocchio's. The file `mimic.urdf` has every pair of
+/// joint types that Pinocchio supports as leader and follower. Here, position limits, velocity limits and losses of a
+/// follower act on the leader, but Pinocchio ignores them.
 #[test]
 fn as_in_pinocchio() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");

@@ -1,5 +1,5 @@
-//! Tests of analytical derivatives of the motion of frames, momentum, energies and static efforts. They are compared
-//! with dual numbers.
+//! Tests of analytical derivatives of the motion of frames, momentum, energies and static efforts. The results are
+//! compared with dual numbers.
 
 use crate::common;
 

@@ -49,7 +49,7 @@ fn takes_power() {
     }
 }
 
-/// Checks that friction follows Coulomb's law except at small speeds. It must be zero at rest, and odd in v.
+/// Checks that friction follows Coulomb's law except at small speeds. The friction must be zero at rest, and odd in v.
 #[test]
 fn friction_is_smoothed() {
     let model = chain(true);

@@ -1,5 +1,5 @@
-//! Tests of points on bodies and frames. They are compared with frames at these points, and with derivatives by dual
-//! numbers.
+//! Tests of points on bodies and frames. The results are compared with frames at these points, and with derivatives by
+//! dual numbers.
 
 use crate::common::{State, all_models, dual, eps, lift, moved, normal3, relative, rng};
 use condyle_dynamics::{

@@ -161,8 +161,8 @@ fn a_model_in_a_model_is_drakes() {
     drake(&model, &[0.3, -0.4], &[0.5, 0.7], (&M, &h), ("inner::tip", tip));
 }
 
-/// Checks a merged model. It keeps its model frame, which is placed by a placement frame inside the model. The
-/// reference numbers come from Drake 1.51.
+/// Checks a model that is merged into another model. The merged model keeps its model frame, which is placed by a
+/// placement frame inside the model. The reference numbers come from Drake 1.51.
 #[test]
 fn a_merged_model_is_drakes() {
     let folder = std::env::temp_dir().join(format!("condyle_merged_{}", std::process::id()));

@@ -1,4 +1,4 @@
-//! Tests of analytical second derivatives. They are compared with hyper-dual numbers and with each other.
+//! Tests of analytical second derivatives. The results are compared with hyper-dual numbers and with each other.
 
 use crate::common;
 

@@ -75,8 +75,8 @@ fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     assert!((observed - order).abs() < ORDER, "{what}: {observed}");
 }
 
-/// Checks the order of each integrator on a free symmetric body. Its motion has a closed form: with L = I ω, the
-/// attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
+/// Checks the order of each integrator on a free symmetric body. The motion of this body has a closed form: with L = I
+/// ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
 #[test]
 fn order_on_a_free_body() {
     let model = top();

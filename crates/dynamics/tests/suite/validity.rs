@@ -36,7 +36,8 @@ fn other_inertias_are_judged_anew() {
     assert!(cured.singular_joints().is_empty() && cured.warnings().is_empty());
     let a: Vec<f64> = aba(&cured, &mut Data::new(&cured), &[0.1, 0.2], &[0.0; 2], &[0.0; 2], &[]).to_vec();
     assert!(a.iter().all(|a: &f64| a.is_finite()));
-    // Without this inertia, the robot is singular again. It is then rejected like a robot that was built singular.
+    // Without this inertia, the robot is singular again. The robot is then rejected like a robot that was built
+    // singular.
     let again = cured.with_inertias(|body, I| if body == 2 { Inertia::<f64>::zero() } else { I }).unwrap();
     assert_eq!((again.singular_joints(), again.warnings()), (sick.singular_joints(), sick.warnings()));
     let refused = catch_unwind(|| aba(&again, &mut Data::new(&again), &[0.0; 2], &[0.0; 2], &[0.0; 2], &[]).to_vec());
@@ -131,8 +132,8 @@ fn impossible_numbers_are_refused_by_name() {
     assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 0.9, expected 1");
 }
 
-/// Checks that intended massless bodies give no warnings. They are between the joints of a chain that replaces one
-/// joint, also in models that are made from the chain.
+/// Checks that intended massless bodies give no warnings. Such bodies are between the joints of a chain that replaces
+/// one joint. Models that are made from the chain must not have warnings either.
 #[test]
 fn chains_stay_without_warnings() {
     let mut builder = ModelBuilder::new("chain");
@@ -151,8 +152,8 @@ fn chains_stay_without_warnings() {
     assert!(made.iter().all(|model| model.warnings().is_empty() && model.singular_joints().is_empty()));
 }
 
-/// Checks that warnings about elements that were left out of a file are kept. They follow the warnings about unusual
-/// properties, in the same order for all sources.
+/// Checks that warnings about elements that were left out of a file are kept. These warnings must follow the warnings
+/// about unusual properties, in the same order for all sources.
 #[test]
 fn warnings_keep_their_order() {
     let text = r#"<mujoco><worldbody><body name="a"><joint axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/>

@@ -1,4 +1,4 @@
-//! Tests of derivatives by dual numbers in lanes, one direction per lane. They are compared with the analytical
+//! Tests of derivatives by dual numbers in lanes, one direction per lane. The results are compared with the analytical
 //! derivatives.
 
 use crate::common::table::Input;

@@ -25,7 +25,7 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Token for the vector types that this test names.
+/// Token that gives this test access to the vector types of all SIMD levels.
 struct Here;
 
 // SAFETY: `each_level` only runs SIMD levels that this processor supports.

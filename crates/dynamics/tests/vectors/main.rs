@@ -1,5 +1,5 @@
-//! Tests of several states in a vector register, and of several limbs of one state in parallel lanes. They run at every
-//! SIMD level of this processor.
+//! Tests of several states in a vector register, and of several limbs of one state in parallel lanes. The tests run at
+//! every SIMD level of this processor.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]
@@ -21,8 +21,8 @@ use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 /// several tests use the best level at the same time.
 static LEVEL: RwLock<()> = RwLock::new(());
 
-/// Returns robots of all kinds, for which single calls do not compute limbs in parallel lanes. Parallel limbs would
-/// change the order of sums.
+/// Returns robots of all kinds, for which single calls do not compute limbs in parallel lanes. Sums over parallel limbs
+/// have another order.
 fn models(trees: u64) -> Vec<Model> {
     common::all_models(trees).into_iter().map(|model| model.with_limbs(false)).collect()
 }

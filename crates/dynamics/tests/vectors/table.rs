@@ -60,7 +60,7 @@ impl<T: Copy> Found<T> {
     }
 }
 
-/// Result of a function that can be stored in a [`Found`], for one state or for many states.
+/// Result of a function that can be stored in a `Found`, for one state or for many states.
 trait Put<T> {
     fn put(self, to: &mut Found<T>);
 }

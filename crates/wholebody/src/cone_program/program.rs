@@ -3,7 +3,7 @@
 use super::Status;
 use nalgebra::DMatrix;
 
-/// Sizes of a program: numbers of unknowns and constraints. It holds the numbers in use or the maximum numbers.
+/// Sizes of a program: numbers of unknowns and constraints. They are either the numbers in use or the maximum numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Size {
     /// Length of x.

@@ -3,7 +3,7 @@
 
 use condyle_wholebody::{KktResiduals, References, WholeBodyController};
 
-/// Tolerance of the first three errors in [`KktResiduals`]. The documentation of [`KktResiduals`] gives the reason for
+/// Tolerance of the first three errors in [`KktResiduals`]. The documentation of this type gives the reason for
 /// 1e-7.
 pub const OPTIMALITY: f64 = 1e-7;
 const GAP: f64 = 1e-6;

@@ -54,7 +54,7 @@ fn a_clone_has_the_same_bits() {
 /// solvers again.
 #[test]
 fn a_clone_with_clarabel_has_the_same_solution() {
-    // Each force and effort is determined to this accuracy only by these weights and this tolerance.
+    // With these weights and this tolerance, forces and efforts are accurate enough to be compared.
     let (backend, tolerance) = (Backend::Clarabel, 1e-11);
     let settings = Settings { backend, tolerance, force_weight: 1e-5, ..Settings::default() };
     let mut controller = WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks(), settings).unwrap();

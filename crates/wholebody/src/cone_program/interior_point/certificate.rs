@@ -9,8 +9,8 @@ use condyle_linalg::{dot, max_abs};
 /// `REDUCED_TOLERANCE` applies if the iterates stop improving.
 const TOLERANCE: f64 = 1e-9;
 pub(super) const REDUCED_TOLERANCE: f64 = 1e-5;
-/// Minimum size of an iterate x that may prove an unbounded objective. In their units, the unknowns of a solution have
-/// size about one.
+/// Minimum size of an iterate x that may prove an unbounded objective. In the units of the method, the unknowns of a
+/// solution have size about one.
 const FAR: f64 = 1e3;
 /// Minimum decrease of the objective along a direction of size one that proves an unbounded objective.
 const FALL: f64 = 1e-6;

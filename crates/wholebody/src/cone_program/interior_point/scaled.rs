@@ -8,8 +8,6 @@
 //! cost is divided by the greatest of |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So one tolerance serves weights that differ by many orders
 //! of magnitude, such as the weights of tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone, have
 //! length one.
-//! |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So one tolerance serves weights that differ by many orders of magnitude, such as the weights of
-//! tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone, have length one.
 
 use crate::cone_program::{ConeProgram, Size, Status};
 use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};

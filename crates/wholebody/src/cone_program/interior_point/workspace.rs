@@ -75,7 +75,7 @@ pub(super) struct Measure {
     /// ‖P x + c − Kᵀ z − E y‖∞.
     pub dual: f64,
     /// Greatest of the relative residuals and the relative gap. Each is relative to the terms from which it is
-    /// computed. It is NaN if a residual or the gap is not finite.
+    /// computed. The result is NaN if a residual or the gap is not finite.
     pub error: f64,
     /// Status that the iterate proves, or `None` without a proof.
     pub certificate: Option<Status>,
