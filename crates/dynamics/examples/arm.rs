@@ -1,4 +1,4 @@
-//! Prints the efforts that `examples/embedded` computes, as computed on this machine, for comparison.
+//! Computes on this machine the efforts that `examples/embedded` computes, and prints them for comparison.
 
 #[path = "../../../examples/embedded/src/arm.rs"]
 mod arm;

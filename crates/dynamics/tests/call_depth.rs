@@ -1,8 +1,8 @@
-//! Number of function calls between a public function and the recursion that it runs.
+//! Test of the number of function calls between a public function and the recursion that computes its result.
 //!
-//! A scalar whose arithmetic captures a backtrace shows the calls. A call with `f64` takes the same path, except that a
-//! kernel runs the function that is compiled for the SIMD level, in place of `Scalar::enter`. Inlined functions appear
-//! only with debug information.
+//! The test uses a scalar whose arithmetic captures backtraces, which show the calls. The calls with `f64` are the
+//! same, with one exception: instead of `Scalar::enter`, a kernel runs the function that is compiled for the SIMD
+//! level. A backtrace shows inlined functions only with debug information.
 #![allow(non_snake_case)]
 
 mod common;
@@ -17,10 +17,11 @@ use std::cell::{Cell, RefCell};
 /// Maximum number of calls between a public function and its recursion.
 const MOST_CALLS: usize = 6;
 
-/// Number of operations from one backtrace to the next: prime, so that every loop of a pass is seen.
+/// Number of operations from one backtrace to the next. It is prime, so that backtraces are captured in every loop of a
+/// pass.
 const PERIOD: u64 = 61;
 
-/// Functions that are recursions over bodies, columns or entries: the file, and the function in it.
+/// Functions that are recursions over bodies, columns or entries. Each is given by its file and its name.
 const RECURSIONS: [&str; 17] = [
     "aba::factorize",
     "aba::inward",
@@ -41,7 +42,7 @@ const RECURSIONS: [&str; 17] = [
     "tree_solve::sweep",
 ];
 
-/// Files of the public functions.
+/// Names of the files that contain the public functions.
 const CALLS: [&str; 5] = ["derivatives", "forward_dynamics", "inertia", "inverse_dynamics", "second_derivatives"];
 
 thread_local! {
@@ -49,7 +50,7 @@ thread_local! {
     static TRACES: RefCell<Vec<Backtrace>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Captures a backtrace at some of the operations.
+/// Counts an operation, and captures a backtrace at every `PERIOD`-th operation.
 #[inline(never)]
 fn trace(value: f64) -> Traced {
     OPERATIONS.set(OPERATIONS.get() + 1);
@@ -59,7 +60,7 @@ fn trace(value: f64) -> Traced {
     Traced(value)
 }
 
-/// Number whose operations are traced.
+/// Scalar whose operations are counted and traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Traced(f64);
 
@@ -131,8 +132,8 @@ impl Scalar for Traced {
     }
 }
 
-/// Returns the functions of a backtrace, the innermost first, each with the name of its file. Inlined functions have no
-/// other path.
+/// Returns the functions of a backtrace, each with the name of its file. The innermost function comes first. The file
+/// is needed because inlined functions have no module path.
 fn functions(trace: &Backtrace) -> Vec<String> {
     let text = trace.to_string();
     let mut found: Vec<String> = Vec::new();
@@ -148,7 +149,7 @@ fn functions(trace: &Backtrace) -> Vec<String> {
     found
 }
 
-/// Returns a function's name without its number, its path and its parameters.
+/// Returns a function's name without its hash, its module path and its generic parameters.
 fn base(name: &str) -> &str {
     let (mut depth, mut start) = (0, 0);
     for (at, c) in name.char_indices() {
@@ -167,7 +168,8 @@ fn base(name: &str) -> &str {
     &name[start..]
 }
 
-/// Returns the calls from the public function to the recursion, both included, of the backtrace with most of them.
+/// Returns the functions from the public function to the recursion, both included. They are from the backtrace with the
+/// largest number of such functions.
 fn deepest(public: &str, work: impl FnOnce()) -> Vec<String> {
     TRACES.take();
     work();

@@ -1,4 +1,4 @@
-//! Computation of several knots of a horizon side by side: generic code also runs on scalars with lanes.
+//! Test of generic code on scalars with several lanes, which compute several knots of a horizon at the same time.
 #![allow(non_snake_case)]
 
 mod common;
@@ -9,7 +9,7 @@ use condyle_dynamics::level::{Level, pin};
 use condyle_dynamics::{Data, Force, Scalar};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Scalar with two lanes: two numbers side by side.
+/// Scalar with two lanes, for two numbers that are computed at the same time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lanes2([f64; 2]);
 
@@ -110,14 +110,15 @@ fn bits(x: &[f64]) -> Vec<u64> {
     x.iter().map(|x| x.to_bits()).collect()
 }
 
-/// Tolerance of Newton's method. It is so small that one more iteration after convergence changes only rounding.
+/// Tolerance of Newton's method. With this small tolerance, one more iteration after convergence changes the result
+/// only by rounding errors.
 const CONVERGED: f64 = 1e-12;
 
-/// Each lane has the same bits as a single call, on every joint type, even if the other lane contains NaN. Functions
-/// that couple the lanes (`in_step`) give the same numbers up to rounding.
+/// Checks on every joint type that each lane has the same bits as a single call, even if the other lane contains NaN.
+/// Functions that couple the lanes (`in_step`) must give the same numbers up to rounding.
 #[test]
 fn lanes_are_single_calls() {
-    pin(Level::Baseline).unwrap(); // a level without fused operations, as in `Lanes2`
+    pin(Level::Baseline).unwrap(); // a level without fused operations, like `Lanes2`
     for (seed, model) in all_models(15).iter().enumerate() {
         let mut rng = rng(seed as u64);
         let knots = [Input::<f64>::random(model, &mut rng), Input::random(model, &mut rng)];

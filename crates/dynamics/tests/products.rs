@@ -1,9 +1,9 @@
-//! Products with every matrix that a call or a batch returns. The factors are vectors and matrices, and the results are
-//! compared with plain loops.
+//! Tests of products with every matrix that a call or a batch returns. The other factors are vectors and matrices. The
+//! results are compared with plain loops.
 //!
 //! nalgebra multiplies without checking bounds, so it must support the layout of each matrix. (In nalgebra's issue
 //! 1616, a product with a view whose rows are not adjacent writes out of bounds.) This program is small, because
-//! `tests/products.sh` compiles it with AddressSanitizer and runs it at every SIMD level of the machine.
+//! `tests/products.sh` compiles it with AddressSanitizer. The script then runs it at every SIMD level of the machine.
 #![allow(non_snake_case)]
 
 use condyle_dynamics::level::level;
@@ -11,10 +11,10 @@ use condyle_dynamics::*;
 use nalgebra::{DMatrix, DVector, DVectorView, Dim, Dyn, Matrix, Storage};
 use std::collections::BTreeSet;
 
-/// Tolerance of a few roundings in sums of few terms, relative to the largest product.
+/// Tolerance relative to the largest product: a few rounding errors in sums of few terms.
 const ROUNDING: f64 = 1e-12;
 
-/// Number of states of a batch. They fill several groups of lanes, but not the last group.
+/// Number of states of a batch. The states fill several groups of lanes, but not the last group.
 const STATES: usize = 19;
 
 /// Returns pseudo-random numbers between −1 and 1.
@@ -30,7 +30,7 @@ fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_vec(rows, columns, numbers(rows * columns, 2))
 }
 
-/// Computes A B by three plain loops.
+/// Computes A B by three nested loops.
 fn plain(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
     let mut C = DMatrix::zeros(A.nrows(), B.ncols());
     for i in 0..A.nrows() {
@@ -59,7 +59,7 @@ fn equal<R: Dim, C: Dim>(found: &Matrix<f64, R, C, impl Storage<f64, R, C>>, exp
     }
 }
 
-/// Multiplies a matrix of nalgebra with all kinds of factors for which nalgebra has separate code.
+/// Multiplies a matrix of nalgebra with all types of factors for which nalgebra has separate code.
 fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) {
     let (m, n) = M.shape();
     let copy = DMatrix::from_fn(m, n, |i, j| M[(i, j)]);
@@ -133,7 +133,7 @@ fn multiply_state(what: &str, M: StateMatrix<'_, f64>) {
     }
 }
 
-/// Multiplies the first, a middle and the last of the matrices of a batch.
+/// Multiplies the first, a middle and the last matrix of a batch.
 fn multiply_all(what: &str, matrices: Matrices<'_, f64>) {
     assert_eq!(matrices.len(), STATES, "{what}");
     [0, STATES / 2, STATES - 1].into_iter().for_each(|k| multiply_state(what, matrices.at(k)));
@@ -161,7 +161,7 @@ fn chain(n: usize) -> Model {
     builder.build().unwrap()
 }
 
-/// Creates a floating trunk with four legs of three joints. Single calls compute the legs side by side in lanes.
+/// Creates a floating trunk with four legs of three joints. Single calls compute the four legs in parallel lanes.
 fn walker() -> Model {
     let mut builder = ModelBuilder::new("walker");
     let trunk = builder.body("trunk", WORLD, Joint::FreeFlyer, Se3::identity(), rod());
@@ -201,7 +201,7 @@ fn contacts(model: &Model) -> Vec<ContactConstraint> {
     if model.nv() < 6 { Vec::new() } else { frames.map(ContactConstraint::point).collect() }
 }
 
-/// Multiplies the given fields of a result.
+/// Calls a function that multiplies matrices, for each of the given fields of a result.
 macro_rules! multiply {
     ($name:literal, $result:expr, $multiply:ident: $($($member:ident).+),+) => {{
         let r = $result;
@@ -209,7 +209,7 @@ macro_rules! multiply {
     }};
 }
 
-/// Tests every single call that returns a matrix.
+/// Checks the matrices of every single call that returns a matrix.
 fn single_calls(model: &Model) {
     let States { q, v, x, f_ext } = &States::new(model, 1);
     let (m, d, nv) = (model, &mut Data::<f64>::new(model), model.nv());
@@ -243,7 +243,7 @@ fn single_calls(model: &Model) {
     multiply!("constrained_inverse_dynamics_derivatives", inverse, multiply:
         M, dtau_dq, dtau_dv, dacceleration_dq, dacceleration_dv);
 
-    // next: functions that write to matrices of the caller
+    // The following functions write to matrices of the caller.
     let mut J = DMatrix::zeros(c.rows(), nv);
     c.jacobian(&mut J);
     multiply("jacobian of constraints", &J);
@@ -284,7 +284,7 @@ fn single_calls(model: &Model) {
     multiply("factor of Cholesky", dense.lower());
 }
 
-/// Tests every function of a batch that returns matrices, and returns the names of these functions.
+/// Checks the matrices of every function of a batch that returns matrices. Returns the names of these functions.
 fn batches(model: &Model) -> BTreeSet<&'static str> {
     let States { q, v, x, f_ext } = &States::new(model, STATES);
     let (m, b) = (model, &mut Batch::new(model, STATES, 1));
@@ -352,7 +352,7 @@ fn batches(model: &Model) -> BTreeSet<&'static str> {
     called
 }
 
-/// Returns the names of the functions of a batch whose results have matrices, read from the source files.
+/// Reads from the source files the names of the functions of a batch whose results contain matrices.
 fn functions_with_matrices() -> BTreeSet<String> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/batch");
     let mut names = BTreeSet::new();
@@ -387,7 +387,7 @@ fn products() {
     assert_eq!(called, functions_with_matrices());
 }
 
-/// A robot without coordinates has matrices without entries, and products of the right sizes.
+/// Checks that a robot without coordinates has matrices without entries, and products of the right sizes.
 #[test]
 fn empty_products() {
     let model = ModelBuilder::new("nothing").build().unwrap();

@@ -1,9 +1,9 @@
-//! Every function of a batch of `f32`: it has twice as many lanes as with `f64`, and the accuracy that seven digits
-//! allow.
+//! Tests every function of a batch of `f32`. Such a batch has twice as many lanes as a batch of `f64`, and the accuracy
+//! of seven digits.
 #![allow(non_snake_case)]
 
 mod common;
-#[allow(dead_code)] // only the tests of `f64` compare bits with single calls
+#[allow(dead_code)] // only the tests of `f64` use the functions that compare bits
 #[path = "vectors/table.rs"]
 mod table;
 
@@ -13,13 +13,14 @@ use condyle_dynamics::level::{Level, pin};
 use condyle_dynamics::{Batch, ContactConstraint, Data, Model, ProximalSettings, crba};
 use table::{Found, States, table};
 
-/// Tolerance of 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
+/// Tolerance of 1e3 rounding errors of the largest number. It is for sums over about twenty bodies with terms that
+/// cancel.
 const ROUNDINGS: f64 = 1e3 * f32::EPSILON as f64;
 /// Number of states. It is odd, and larger than the number of lanes of a vector register.
 const STATES: usize = 19;
 
-/// Functions whose result depends on M⁻¹. The relative error of such a result may be a rounding times the condition
-/// number of M.
+/// Functions whose result depends on M⁻¹. The relative error of such a result may be a rounding error times the
+/// condition number of M.
 const INVERTS: [&str; 11] = [
     "aba",
     "minv",
@@ -56,7 +57,7 @@ fn contact(model: &Model) -> Vec<ContactConstraint> {
 fn every_function_in_single_precision() {
     let mut worst = Vec::new();
     for model in embedded().map(|model| model.with_limbs(false)) {
-        // use states that both precisions represent exactly
+        // Use states that both precisions represent exactly.
         let mut rng = common::rng(3);
         let narrow: Vec<Input<f32>> =
             (0..STATES).map(|_| Input::<f64>::random(&model, &mut rng).map(|x| x as f32)).collect();

@@ -1,16 +1,16 @@
-//! Splits the unknowns x by equalities into basic unknowns x_B = p − T z and other unknowns z, and maps rows of
-//! coefficients of x to z.
+//! Splits the unknowns x of a program by its equalities. The basic unknowns follow from the other unknowns z as x_B = p
+//! − T z. A row of coefficients of x becomes a row of coefficients of z.
 
 use crate::cone_program::ConeProgram;
 use crate::numbers::Reader;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, add_product_vector, at_level, max_abs, product_without_slack};
 use nalgebra::DMatrix;
 
-/// Smallest usable pivot, relative to the row's largest entry before the elimination. A row without a usable pivot
-/// depends linearly on other rows.
+/// Minimum size of a pivot, relative to the largest entry of the pivot's row before the elimination. A row without such
+/// a pivot depends linearly on other rows.
 const DEPENDENT: f64 = 1e-8;
 
-/// Smallest pivot of the last tick that is used again, relative to the largest entry of its row.
+/// Minimum size of a pivot of the last tick that is used again, relative to the largest entry of the pivot's row.
 const KEEP: f64 = 0.05;
 
 /// Index of an unknown in the list of basic unknowns or in the list of other unknowns.
@@ -22,12 +22,12 @@ enum Place {
 
 /// Basic unknowns, other unknowns (z), and the map from z to x.
 pub(crate) struct Basis {
-    /// Basic unknowns, as indices in x.
+    /// Indices in x of the basic unknowns.
     pub basic: Vec<usize>,
-    /// Other unknowns (z), as indices in x.
+    /// Indices in x of the other unknowns (z).
     pub others: Vec<usize>,
     places: Vec<Place>,
-    /// T, other × basic, with padding rows.
+    /// T of the equation x_B = p − T z. Shape: other unknowns × basic unknowns, with padding rows.
     T: DMatrix<f64>,
     /// p.
     pub p: Vec<f64>,
@@ -47,13 +47,13 @@ impl Basis {
         }
     }
 
-    /// Returns column i of T: minus the coefficients of z in basic unknown i.
+    /// Returns column i of T. Basic unknown i is pᵢ minus the product of this column and z.
     pub(crate) fn column(&self, i: usize) -> &[f64] {
         &self.T.as_slice()[i * self.T.nrows()..][..self.others.len()]
     }
 
-    /// Computes (G_N − G_B T)ᵀ and G_B p for the first rows of G, which are the columns of `from`. `particular`, for
-    /// G_B p, needs padding.
+    /// Computes (G_N − G_B T)ᵀ and G_B p for the first `count` rows of G, which are the columns of `from`. `particular`
+    /// gets G_B p and needs padding.
     pub(crate) fn map_dense_rows(
         &mut self,
         from: &DMatrix<f64>,
@@ -81,7 +81,8 @@ impl Basis {
         }
     }
 
-    /// Writes the row that has a 1 for one unknown as column r of `to`, in terms of z. Returns its value at z = 0.
+    /// Maps a row of coefficients of x to z, and writes the result as column r of `to`. The row has a 1 for `unknown`
+    /// and zeros elsewhere. Returns the value of the row at z = 0.
     pub(crate) fn map_single_row(&self, unknown: usize, to: &mut DMatrix<f64>, r: usize) -> f64 {
         let (n, ldt) = (self.others.len(), to.nrows());
         let to = &mut to.as_mut_slice()[r * ldt..][..n];
@@ -100,7 +101,8 @@ impl Basis {
         }
     }
 
-    /// Maps a row with few non-zero entries to z and writes it as column r of `to`. Returns its value at z = 0.
+    /// Maps a row of coefficients of x with few non-zero entries to z, and writes the result as column r of `to`.
+    /// Returns the value of the row at z = 0.
     pub(crate) fn map_row(&self, from: &DMatrix<f64>, r: usize, to: &mut DMatrix<f64>) -> f64 {
         let ldt = to.nrows();
         let row = &from.as_slice()[r * from.nrows()..][..self.places.len()];
@@ -155,7 +157,8 @@ impl Elimination {
         }
     }
 
-    /// Splits the unknowns by A x = b. Uses the pivots of the last call, unless one of them has become too small.
+    /// Splits the unknowns by A x = b. Uses the pivots of the last call, unless one of these pivots has become too
+    /// small.
     pub(crate) fn split(&mut self, program: &ConeProgram, basis: &mut Basis) {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
         if self.shape != (equalities, n) || !self.eliminate(program, true) {
@@ -174,7 +177,7 @@ impl Elimination {
         }
     }
 
-    /// Writes into `basis` which unknowns are basic: those with a pivot.
+    /// Lists in `basis` the unknowns with a pivot, which are basic, and the other unknowns.
     fn place(&self, basis: &mut Basis) {
         basis.basic.clear();
         basis.basic.extend(self.pivots.iter().map(|pivot| pivot.1));
@@ -184,7 +187,7 @@ impl Elimination {
         basis.basic.iter().enumerate().for_each(|(i, &j)| basis.places[j] = Place::Basic(i));
     }
 
-    /// Writes the pivots of the last call, which the next call tries first.
+    /// Appends the pivots of the last call to `out`. The next call tries these pivots first.
     pub(crate) fn write(&self, out: &mut Vec<f64>) {
         let (rows, unknowns) = self.shape;
         out.extend([rows, unknowns, self.pivots.len()].map(|x| x as f64));
@@ -208,8 +211,8 @@ impl Elimination {
         Some(())
     }
 
-    /// Runs Gauss–Jordan elimination. With `again` it uses the pivots of the last call; it returns false if one of them
-    /// has become too small.
+    /// Runs Gauss–Jordan elimination. If `again` is true, it uses the pivots of the last call, and returns false if one
+    /// of these pivots has become too small.
     fn eliminate(&mut self, program: &ConeProgram, again: bool) -> bool {
         let Self { W, right, used, pivots, .. } = self;
         let (n, m, stride) = (program.size.unknowns, program.size.equalities, W.nrows());
@@ -254,13 +257,13 @@ impl Elimination {
             used[row] = true;
             at_level(Pivot { W: &mut W[..m * stride], right, stride, row, j });
         }
-        // A row that depended on others in the last call may be independent now.
+        // A row that depended on other rows in the last call may be independent now.
         !again || (0..m).all(|r| used[r] || max_abs(&W[r * stride..][..n]) <= DEPENDENT)
     }
 }
 
-/// One step of the elimination: divides row `row` by its coefficient of unknown j and subtracts it from the other rows,
-/// so that it alone contains j.
+/// One step of the elimination. It divides row `row` by the row's coefficient of unknown j. Then it subtracts multiples
+/// of this row from the other rows, so that only this row contains unknown j.
 struct Pivot<'a> {
     W: &'a mut [f64],
     right: &'a mut [f64],

@@ -1,9 +1,10 @@
-//! Numbers that a controller carries from one tick to the next. They are needed to clone a controller or to save it.
+//! State of a controller that lasts from one tick to the next, as a list of numbers. The list is needed to clone or to
+//! save a controller.
 //!
-//! All other numbers follow from the description (model, contacts, tasks, settings) and from the arguments of a step.
-//! With [`Backend::InteriorPoint`], a controller that is made from the same description and given these numbers
-//! continues with the same bits. With clarabel, whose solvers are built again, it continues with the same solution up
-//! to clarabel's tolerance.
+//! All other numbers follow from the description (model, contacts, tasks, settings) and from the arguments of a step. A
+//! second controller with the same description can be given this list. With [`Backend::InteriorPoint`], the commands of
+//! both controllers then have the same bits. With clarabel, whose solvers are built again, their solutions are the same
+//! up to clarabel's tolerance.
 //!
 //! [`Backend::InteriorPoint`]: crate::Backend::InteriorPoint
 
@@ -16,16 +17,16 @@ use crate::task_hierarchy::TaskHierarchy;
 use crate::warm_start::WarmStart;
 use condyle_spatial::{Force, Vec3};
 
-/// Names of arguments and references in a [`Status`]; a name is written as its index in this list.
+/// Names of arguments and references in a [`Status`]. A name is stored as its index in this list.
 const NAMES: [&str; 8] = ["q", "v", "com", "frames", "posture", "momentum", "contacts", "posture.q"];
 
-/// Sources of a command; a source is written as its index in this list.
+/// Sources of a command. A source is stored as its index in this list.
 const SOURCES: [CommandSource; 3] =
     [CommandSource::Solution, CommandSource::LastSolution, CommandSource::GravityCompensation];
 
 impl Clone for WholeBodyController {
-    /// Returns a controller with its own memory that continues as this one does, with the same bits. With clarabel,
-    /// whose solvers are built again, it continues with the same solution up to clarabel's tolerance.
+    /// Returns a copy of the controller with its own memory. The copy's next commands have the same bits as the
+    /// original's. With clarabel, whose solvers are built again, the solutions are the same up to clarabel's tolerance.
     fn clone(&self) -> Self {
         let contacts: Vec<_> = self.equations.contacts.iter().map(|contact| contact.description.clone()).collect();
         let tasks: Vec<_> = self.objective.tasks.iter().map(|task| task.task.clone()).collect();

@@ -8,11 +8,11 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CommandSource {
-    /// The program's solution; or an iterate that satisfies all constraints, if the solver did not finish.
+    /// Solution of the program. If the solver did not finish, it is an iterate that satisfies all constraints.
     Solution,
-    /// The last solution, at most [`Settings::hold_ticks`](crate::Settings::hold_ticks) old.
+    /// Torques of the last solution, which is at most [`Settings::hold_ticks`](crate::Settings::hold_ticks) ticks old.
     LastSolution,
-    /// Gravity compensation with damping, at the last valid state.
+    /// Gravity compensation at the last valid state. Damping is added if this state is the current one.
     GravityCompensation,
 }
 
@@ -26,7 +26,7 @@ impl fmt::Display for CommandSource {
     }
 }
 
-/// Command of a tick. Whatever the status, its numbers are finite and `tau` is within the limits.
+/// Command of a tick. With every status, all numbers of the command are finite and `tau` is within the limits.
 ///
 /// Constraints hold up to the solver's tolerance: with the default tolerance, a force may leave its friction cone by
 /// about 1e-7 N.
@@ -41,20 +41,19 @@ pub struct Command {
     /// q̈, the acceleration that results if the contacts hold: nv numbers (rad/s², m/s²). A safe command repeats the
     /// value of the last solution.
     pub a: Vec<f64>,
-    /// Force of the environment on the robot at each contact, about the frame's origin, along the world's axes (N, N
-    /// m). A safe command repeats the forces of the last solution.
+    /// Force of the environment on the robot at each contact (N, N m). The moment is about the frame's origin, and all
+    /// components are along the world's axes. A safe command repeats the forces of the last solution.
     pub forces: Vec<Force<f64>>,
-    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). A safe command repeats the value of the
-    /// last solution.
+    /// Acceleration of the centre of mass, c̈ = J q̈ + J̇ v, in the world's frame (m/s²). A safe command repeats the
+    /// value of the last solution.
     pub com_acceleration: Vec3<f64>,
-    /// Violation of the constraint that is violated most (N, N m, m/s²). A safe command repeats the value of the last
-    /// solution.
+    /// Largest violation of a constraint (N, N m, m/s²). A safe command repeats the value of the last solution.
     pub violation: f64,
     /// Iterations of the solver.
     pub iterations: u32,
     /// Whether the solver met only its reduced tolerance, not [`Settings::tolerance`](crate::Settings::tolerance).
     pub reduced_accuracy: bool,
-    /// Whether joint limits were relaxed in favour of dynamics, contacts and torques.
+    /// Whether joint limits were relaxed, because they contradicted dynamics, contacts and torque limits.
     pub limits_relaxed: bool,
 }
 

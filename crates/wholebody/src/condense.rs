@@ -1,8 +1,9 @@
 //! Eliminates equalities from a program, so that fewer unknowns remain.
 //!
-//! Gauss–Jordan elimination with complete pivoting splits x into basic unknowns, one for each independent equality, and
-//! the others, z: x_B = p − T z. Equalities that depend on others (for example redundant contacts) have no pivot and
-//! are left out. The program over z, with n_B = number of basic unknowns:
+//! Gauss–Jordan elimination with complete pivoting splits x into basic unknowns x_B and other unknowns z. There is one
+//! basic unknown for each independent equality: x_B = p − T z. Equalities that depend on others (for example redundant
+//! contacts) have no pivot and are left out. Index B marks columns of basic unknowns, and index N marks the other
+//! columns. The program over z:
 //!
 //! ```text
 //! minimise     ½ ‖(R_N − R_B T) z − (b − R_B p)‖² + …
@@ -31,7 +32,7 @@ pub(crate) struct Known<'a> {
     pub places: &'a Places,
 }
 
-/// The elimination of one priority's equalities, with memory for the largest program.
+/// Elimination of the equalities in the program of one priority. Its memory suffices for the largest program.
 pub(crate) struct Condenser {
     pub elimination: Elimination,
     pub basis: Basis,
@@ -51,7 +52,7 @@ impl Condenser {
     pub(crate) fn new(capacity: Size, objective: usize) -> Self {
         let Size { unknowns, equalities, rows, .. } = capacity;
         let tall = unknowns + SLACK;
-        let most = objective + equalities; // plus a row for the own weight of each basic unknown
+        let most = objective + equalities; // plus one row for the diagonal cost of each basic unknown
         Self {
             elimination: Elimination::new(unknowns, equalities),
             basis: Basis::new(unknowns, equalities, rows.max(objective)),
@@ -63,7 +64,8 @@ impl Condenser {
         }
     }
 
-    /// Writes the program over z. It is equivalent to the program `full` over x with an objective over x.
+    /// Writes a program over z to `out`. The written program is equivalent to the program `full` over x with the given
+    /// objective.
     pub(crate) fn condense(
         &mut self,
         full: &ConeProgram,
@@ -98,7 +100,7 @@ impl Condenser {
         self.objective(objective, out);
     }
 
-    /// Returns z, the entries of x that are not basic.
+    /// Returns z, the entries of x that are not basic unknowns.
     pub(crate) fn reduce(&mut self, x: &[f64]) -> &[f64] {
         let z = &mut self.z[..self.basis.others.len()];
         for (z, &j) in z.iter_mut().zip(&self.basis.others) {

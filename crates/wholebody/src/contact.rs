@@ -3,13 +3,13 @@
 use crate::error::Error;
 use condyle_spatial::{Mat3, Vec3};
 
-/// Direction in which the environment pushes: a vector of any length except 0.
+/// Direction in which the environment pushes the robot: a vector of any length except 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Normal {
-    /// Along the world's axes: the direction stays the same when the foot turns. Suits points.
+    /// Direction along the world's axes. It stays the same when the foot turns. It suits point contacts.
     World(Vec3<f64>),
-    /// Along the axes of the contact's frame: the direction turns with the frame.
+    /// Direction along the axes of the contact's frame. It turns with the frame.
     Frame(Vec3<f64>),
 }
 
@@ -35,21 +35,24 @@ pub enum SurfaceForces {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shape {
-    /// The origin of the contact's frame: it is held, and the frame may turn about it.
+    /// Point: the contact holds the origin of its frame, and the frame may turn about the origin.
     Point,
-    /// A surface of the contact's frame: an edge (two corners; the frame may turn about it) or a convex polygon (three
-    /// or more corners; the frame is held).
+    /// Surface in the contact's frame: an edge or a convex polygon. An edge has two corners, and the frame may turn
+    /// about the edge. A polygon has three or more corners, and the contact holds the whole frame.
     Surface {
-        /// Corners in the frame (m), in order around the polygon, in one plane perpendicular to the normal.
+        /// Corners in the contact's frame (m), in order around the polygon. All corners lie in one plane perpendicular
+        /// to the normal.
         corners: Vec<Vec3<f64>>,
         /// Unknowns that describe the force.
         forces: SurfaceForces,
     },
 }
 
-/// A contact with friction. Its point or surface is held, and each contact force f lies in the cone ‖f_t‖ ≤ μ f_n.
+/// Contact with friction. The contact holds its point or surface, and each contact force f lies in the cone ‖f_t‖ ≤ μ
+/// f_n.
 ///
-/// [`ContactTarget::activation`](crate::ContactTarget) sets whether the contact touches at a tick, and how strongly.
+/// [`ContactTarget::activation`](crate::ContactTarget) sets at each tick whether the contact touches. An activation
+/// below 1 also limits the normal force.
 ///
 /// ```
 /// use condyle_wholebody::{FrictionContact, Normal};
@@ -67,9 +70,9 @@ pub struct FrictionContact {
     pub normal: Normal,
     /// μ, Coulomb's friction coefficient; above 0.
     pub friction: f64,
-    /// γ (m), the bound |yaw moment| ≤ γ f_n of a [wrench](SurfaceForces::Wrench). `None` means ⅔ μ r, where r is the
-    /// radius of the largest circle inside the polygon about the mean of the corners (exact for a uniformly loaded
-    /// disc). For an edge of length 2 l, `None` means ½ μ l.
+    /// Length γ (m) in the bound |yaw moment| ≤ γ f_n of a [wrench](SurfaceForces::Wrench). For a polygon, `None` means
+    /// ⅔ μ r, which is exact for a uniformly loaded disc. Here r is the radius of the largest circle inside the polygon
+    /// about the mean of the corners. For an edge of length 2 l, `None` means ½ μ l.
     pub yaw_friction: Option<f64>,
     /// Minimum normal force of the whole contact (N); at least 0.
     pub min_force: f64,
@@ -85,7 +88,7 @@ impl FrictionContact {
         Self { frame, shape, normal, friction, yaw_friction: None, min_force: 0.0, max_force: f64::INFINITY }
     }
 
-    /// Creates a contact whose surface is the convex polygon (or the edge) with these corners, given in the frame. The
+    /// Creates a surface contact from the corners of a convex polygon or of an edge, given in the contact's frame. The
     /// normal is the frame's z axis, and the unknown force is a wrench.
     pub fn surface(frame: &str, friction: f64, corners: &[Vec3<f64>]) -> Self {
         let shape = Shape::Surface { corners: corners.to_vec(), forces: SurfaceForces::Wrench };
@@ -172,8 +175,8 @@ impl FrictionContact {
         };
         let turns: Vec<f64> = (0..flat.len()).map(turn).collect();
         let edge = flat.len() == 2;
-        // All turns are to the left, and together they make one round (a star makes more). The centre is then to the
-        // left of each edge.
+        // A polygon is convex if all its turns are to the left and add up to one revolution. (The turns of a star add
+        // up to more.) The centre is then to the left of each edge, which is checked below.
         let left = turns.iter().all(|&t| t > 0.0);
         if !edge && !left {
             if !turns.iter().all(|&t| t < 0.0) {
@@ -202,12 +205,14 @@ impl FrictionContact {
 pub(crate) struct Geometry {
     /// Mean of the corners, in the frame.
     pub centre: Vec3<f64>,
-    /// (t₁, t₂, n), right-handed; in the world if the normal is given along the world's axes, otherwise in the frame.
+    /// Contact axes (t₁, t₂, n), right-handed. If the normal is given along the world's axes, they are vectors in the
+    /// world, otherwise in the contact's frame.
     pub axes: Mat3<f64>,
     /// Corners along t₁ and t₂ from the centre, counterclockwise about n; empty for a point.
     pub corners: Vec<[f64; 2]>,
     pub by_corners: bool,
-    /// Components of the six-dimensional motion that the contact holds; the wrench has the same components.
+    /// Indices of the components of the frame's six-dimensional motion that the contact holds. The contact's wrench has
+    /// the components with the same indices.
     pub motion: &'static [usize],
     /// γ.
     pub yaw: f64,
@@ -219,14 +224,15 @@ impl Geometry {
         if self.by_corners { 3 * self.corners.len() } else { self.motion.len() }
     }
 
-    /// Returns the number of friction cones; cone k acts on unknowns 3 k to 3 k + 2: t₁, t₂, n.
+    /// Returns the number of friction cones. Cone k limits unknowns 3 k to 3 k + 2, which are forces along t₁, t₂ and
+    /// n.
     pub(crate) fn cones(&self) -> usize {
         if self.by_corners { self.corners.len() } else { 1 }
     }
 
-    /// Returns the weight of the square of unknown j, relative to the weight of a force. For a moment it is 1 / r²,
-    /// where r is the root mean square of the corners' distances from the moment's axis. A moment then costs as much as
-    /// the corner forces that cause it.
+    /// Returns the weight of the square of unknown j, relative to the weight of a force. The weight of a moment is 1 /
+    /// r², where r is the root mean square of the corners' distances from the moment's axis. A moment then costs as
+    /// much as the corner forces that cause it.
     pub(crate) fn weight(&self, j: usize) -> f64 {
         let (row, count) = (self.motion[j % self.motion.len()], self.corners.len() as f64);
         let mean = |square: &dyn Fn(&[f64; 2]) -> f64| self.corners.iter().map(square).sum::<f64>() / count;
@@ -239,7 +245,8 @@ impl Geometry {
         }
     }
 
-    /// Returns the half-planes (a, b, c) with a x + b y + c ≥ 0 that contain the centre of pressure of a wrench.
+    /// Returns the half-planes that contain the centre of pressure (x, y) of a wrench. Each (a, b, c) requires a x + b
+    /// y + c ≥ 0.
     pub(crate) fn edges(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let count = if self.by_corners { 0 } else { self.corners.len() };
         (0..count).map(move |k| {
@@ -266,8 +273,8 @@ impl Geometry {
     }
 }
 
-/// Returns (a, b, c) of the line through two corners: a x + b y + c is the signed distance of (x, y) from the line,
-/// positive to the left of it.
+/// Returns (a, b, c) of the line through two corners. The signed distance of (x, y) from the line is a x + b y + c,
+/// which is positive to the left of the line.
 fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
     let (x, y) = (to[0] - from[0], to[1] - from[1]);
     let length = x.hypot(y);
@@ -277,7 +284,7 @@ fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
 
 /// Returns unit vectors (t₁, t₂, n), right-handed, for a unit vector n.
 fn axes(n: Vec3<f64>) -> Mat3<f64> {
-    // The axis (x or y) that is farther from n gives a vector perpendicular to n.
+    // Take t₁ perpendicular to n and to x or y, whichever of x and y makes the larger angle with n.
     let (x, y) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0));
     let t = if n.x.abs() < n.y.abs() { n.cross(x) } else { y.cross(n) };
     let t1 = t.scale(1.0 / norm(t));

@@ -1,4 +1,4 @@
-//! Numbers of a contact at one state: its Jacobian, the acceleration at which it is held, and the rows and cones of its
+//! Quantities of a contact at one state: its Jacobian, the required acceleration, and the rows and cones that limit its
 //! force.
 
 use crate::cone_program::{ConeProgram, Size};
@@ -10,7 +10,8 @@ use crate::warm_start::Places;
 use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
 use nalgebra::DMatrix;
 
-/// A contact with its numbers. The rows are along the contact's axes (t₁, t₂, n), at its centre.
+/// Contact and its quantities at the current state. The rows of its Jacobian refer to the contact's centre and the
+/// contact's axes (t₁, t₂, n).
 pub(crate) struct ContactRows {
     pub description: FrictionContact,
     pub geometry: Geometry,
@@ -20,17 +21,17 @@ pub(crate) struct ContactRows {
     pub active: bool,
     /// Index in x of the force's first unknown, if the contact is active.
     pub column: usize,
-    /// Activation, at most 1.
+    /// Activation α of the contact, at most 1.
     activation: f64,
     /// Offsets of the contact's unknowns and constraints in a program in which all contacts touch.
     first: Size,
     /// Axes, in the world.
     axes: Mat3<f64>,
-    /// Vector from the frame's origin to the contact's centre, in the world.
+    /// Vector from the frame's origin to the contact's centre, along the world's axes.
     arm: Vec3<f64>,
     /// Jᵀ, nv × number of held rows.
     pub Jt: DMatrix<f64>,
-    /// a* − J̇ v, the value that J q̈ must have.
+    /// Required value of J q̈, which is a* − J̇ v.
     pub held: [f64; 6],
     /// Reference value of each unknown of the force.
     pub reference: Vec<f64>,
@@ -63,7 +64,8 @@ impl ContactRows {
         }
     }
 
-    /// Reserves indices for this contact at the end of a program in which all contacts touch.
+    /// Adds this contact to `all`, the size of a program in which all contacts touch. The contact's unknowns and
+    /// constraints get the indices from the old to the new size.
     pub(crate) fn add_to(&mut self, all: &mut Size, friction: Friction) {
         self.first = *all;
         all.unknowns += self.geometry.unknowns();
@@ -72,8 +74,8 @@ impl ContactRows {
         all.cone_rows += if friction == Friction::Cone { 3 * self.geometry.cones() } else { 0 };
     }
 
-    /// Adds the indices of this contact's unknowns and constraints to `places`, in the order of the program, and the
-    /// scale of each unknown.
+    /// Appends the indices of this contact's unknowns and constraints to `places`, in the order of the program. Also
+    /// appends the scale of each unknown.
     pub(crate) fn add_places(&self, places: &mut Places, friction: Friction) {
         let Size { unknowns, equalities, rows, cone_rows } = self.first;
         let end = rows + self.max_rows(friction);
@@ -86,7 +88,7 @@ impl ContactRows {
         }
     }
 
-    /// Returns whether the contact's first row is in use: it bounds the normal force.
+    /// Returns whether the contact's first row, which bounds the normal force, is in use.
     fn has_bounds(&self) -> bool {
         let [least, most] = self.bounds;
         least > 0.0 || most < f64::INFINITY
@@ -104,7 +106,7 @@ impl ContactRows {
         frame.pose.rotation * self.geometry.centre
     }
 
-    /// Computes all numbers of an active contact, with its frame at `frame`.
+    /// Computes all quantities of an active contact from the motion `frame` of its frame.
     pub(crate) fn update(&mut self, frame: &FrameMotion, target: &ContactTarget, settings: &Settings, weight: f64) {
         let R = frame.pose.rotation;
         let (centre, axes, motion) = (self.geometry.centre, self.geometry.axes, self.geometry.motion);
@@ -123,7 +125,7 @@ impl ContactRows {
                 self.Jt[(j, r)] = along[row];
             }
         }
-        // a* = k (X_ref ⊖ X) − d v of the contact's centre, limited to the maximum correction
+        // required acceleration a* = k (X_ref ⊖ X) − d v of the contact's centre, limited to the maximum correction
         let gains = settings.contact_gains;
         let (v, w) = (frame.velocity.linear, frame.velocity.angular);
         let turn: Mat3<f64> = target.pose.rotation * R.transpose();
@@ -147,7 +149,8 @@ impl ContactRows {
         for (held, &row) in self.held.iter_mut().zip(motion) {
             *held = along[row];
         }
-        // References of the force. The target's wrench is about the frame's origin.
+        // Compute the reference forces. The target's wrench is about the frame's origin, and `self.wrench` is about the
+        // contact's centre.
         let Force { linear, angular } = target.force;
         self.wrench = self.along(linear, angular - self.arm.cross(linear));
         let (wrench, share) = (self.wrench, 1.0 / self.geometry.cones() as f64);
@@ -158,7 +161,7 @@ impl ContactRows {
         self.bounds = [min_force, max_force];
         self.activation = target.activation.min(1.0);
         if target.activation < 1.0 {
-            // f_n ≤ α times the maximum force; if that is infinite, the robot's weight replaces it
+            // f_n ≤ α times the maximum force; the robot's weight replaces an infinite maximum force
             let most = if max_force.is_finite() { max_force } else { weight };
             self.bounds = [min_force, most].map(|bound| bound * target.activation);
         }
@@ -169,7 +172,7 @@ impl ContactRows {
         [a.x, a.y, a.z, b.x, b.y, b.z]
     }
 
-    /// Subtracts Jᵀ f, the effect of the force on each coordinate's effort, from the columns of Eᵀ.
+    /// Writes the coefficients of the contact's force in each coordinate's effort, −Jᵀ, into the columns of Eᵀ.
     pub(crate) fn add_effort(&self, support: &[usize], Et: &mut DMatrix<f64>) {
         let (rows, stride, nv) = (self.geometry.motion, Et.nrows(), self.Jt.nrows());
         let (J, Et) = (self.Jt.as_slice(), Et.as_mut_slice());
@@ -199,8 +202,8 @@ impl ContactRows {
         }
     }
 
-    /// Adds the rows of the force: bounds, friction cones or pyramids, bounds of the centre of pressure, and bounds of
-    /// the yaw moment.
+    /// Adds the rows and cones that limit the force: bounds, friction cones or pyramids, bounds of the centre of
+    /// pressure, and bounds of the yaw moment.
     pub(crate) fn add_force_rows(&self, program: &mut ConeProgram, friction: Friction) {
         let Geometry { by_corners, yaw, motion, .. } = self.geometry;
         let mu = self.description.friction;
@@ -216,7 +219,8 @@ impl ContactRows {
         if !by_corners && motion.len() > 3 {
             let (f_n, moments) = (self.column + 2, self.column + motion.len() - 2);
             for [a, b, c] in self.geometry.edges() {
-                // Centre of pressure p, f_n p = (−τ₂, τ₁): −a τ₂ + b τ₁ + c f_n ≥ 0.
+                // The centre of pressure p satisfies f_n p = (−τ₂, τ₁). So the half-plane a x + b y + c ≥ 0 becomes −a
+                // τ₂ + b τ₁ + c f_n ≥ 0.
                 let row = add_row(program, 0.0, f64::INFINITY);
                 program.Gt[(moments, row)] = -a;
                 if b != 0.0 {

@@ -1,4 +1,4 @@
-//! The controller. It allocates memory once. At each tick it computes the constraints and tasks, solves the program,
+//! Controller. Its constructor allocates all memory. Each tick computes the constraints and tasks, solves the program,
 //! and checks the command.
 
 use crate::command::{Command, CommandSource};
@@ -25,7 +25,8 @@ use std::fmt;
 /// violation is an error.
 const FEASIBLE: f64 = 1e-6;
 
-/// Weight of the task that leads joints back which cannot be kept within their limits.
+/// Weight of the tasks that lead joints back to their limits. If the limits contradict other constraints, these tasks
+/// replace them.
 const PULL: f64 = 1e3;
 
 /// A whole-body controller. It solves one cone program for each tick and priority; the [crate's documentation](crate)
@@ -162,9 +163,9 @@ impl WholeBodyController {
         })
     }
 
-    /// Writes the references of a plan at time t. The joints follow the plan. The centre of mass, momentum and frames
-    /// follow from the joints. Contacts get the plan's activation and pose, and their shares of the force that the
-    /// plan's c̈ requires.
+    /// Writes the references of a plan at time t. The joints follow the plan. The references of centre of mass,
+    /// momentum and frames follow from the joints. Each contact gets the plan's activation and pose. The force that the
+    /// plan's acceleration of the centre of mass requires is divided among the contacts.
     ///
     /// # Panics
     /// If the references were made for another controller, or the plan for a robot with other bodies and joints.
@@ -213,14 +214,15 @@ impl WholeBodyController {
         }
     }
 
-    /// Computes efforts, acceleration and contact forces at the state (q, v). It always returns a command: without a
-    /// solution the command is a safe one, and its status tells the cause. A number that is not finite gives
-    /// [`Status::NotFinite`]. A quaternion or a pair (cos, sin) without length 1, or an invalid rotation in a
-    /// reference, gives [`Status::InvalidState`]. The safe command is then computed from the last valid state.
+    /// Computes efforts, acceleration and contact forces at the state (q, v). It always returns a command. If the
+    /// program has no solution, the result is a safe command, and its status tells the cause. A number that is not
+    /// finite gives [`Status::NotFinite`]. A quaternion or a pair (cos, sin) without length 1, or an invalid rotation
+    /// in a reference, gives [`Status::InvalidState`]. In both cases the safe command is computed from the last valid
+    /// state.
     ///
     /// q: nq numbers; v: nv. Later calls of [`command`](Self::command) return the same command. A step allocates
-    /// nothing with [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of
-    /// contacts.
+    /// nothing with [`Backend::InteriorPoint`](crate::Backend). With clarabel, each step allocates once, and a new set
+    /// of contacts causes more allocations.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.
@@ -300,7 +302,8 @@ impl WholeBodyController {
         command.iterations = outcome.iterations;
         command.reduced_accuracy = outcome.reduced;
         let status = outcome.stopped.map_or(Status::Solved, Status::from);
-        // Use an iterate that satisfies all constraints, or the result of an earlier priority, as the solution.
+        // If the solver stopped early, use an iterate that satisfies all constraints, or the result of an earlier
+        // priority.
         let may_serve = done > 0 || matches!(status, Status::IterationLimit | Status::TimeLimit);
         let x = &hierarchy.x[..n];
         let violation = equations.violation(x);

@@ -25,12 +25,12 @@ pub(crate) struct Equations {
     pub free: Vec<usize>,
     /// Coordinates that are not in `free`.
     pub actuated: Vec<usize>,
-    /// Coordinates whose motor has a limit, and these limits.
+    /// Coordinates whose motor has an effort limit, each with its minimum and maximum effort.
     pub limited: Vec<(usize, [f64; 2])>,
     pub bounds: AccelerationBounds,
-    /// Coordinates that have a row of `bounds`.
+    /// Coordinates with limits of position or velocity. Each has a row of G for the bounds on its acceleration.
     bounded: Vec<usize>,
-    /// Eᵀ with τ = E x + h and E = [M, −Jᵀ]: a column for each coordinate.
+    /// Eᵀ of the equation τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate.
     pub Et: DMatrix<f64>,
     /// Constraints of the whole program; the solver fills in P and c.
     pub program: ConeProgram,
@@ -41,7 +41,7 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// Allocates warm_start, with space for `held` additional equalities.
+    /// Allocates all memory, with space for `held` additional equalities.
     pub(crate) fn new(
         kinematics: Kinematics,
         mut contacts: Vec<ContactRows>,
@@ -147,8 +147,8 @@ impl Equations {
         }
     }
 
-    /// Removes the joints' limits from the rows. A joint that should be led back into its limits gets a task with this
-    /// weight.
+    /// Removes the joints' limits from the rows. If the bounds exclude zero acceleration, the joint gets a task of this
+    /// weight for the nearest allowed acceleration.
     pub(crate) fn relax(&mut self, objective: &mut LeastSquares, weight: f64) {
         for (k, &(i, lower, upper)) in self.bounds.bounds.iter().enumerate() {
             let row = self.limited.len() + k;

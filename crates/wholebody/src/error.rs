@@ -36,7 +36,7 @@ pub enum Error {
     Contact {
         /// The frame.
         frame: String,
-        /// The field of [`FrictionContact`](crate::FrictionContact).
+        /// Name of the invalid field of [`FrictionContact`](crate::FrictionContact).
         name: &'static str,
         /// The invalid value.
         value: f64,
@@ -46,9 +46,9 @@ pub enum Error {
     /// A weight or gain of a task lies outside of its range.
     #[error("task `{task}`: {name} is {value}, but it must be {allowed}")]
     Task {
-        /// `com`, `posture`, `angular momentum`, or the frame.
+        /// Name of the task: `com`, `posture`, `angular momentum`, or the task's frame.
         task: String,
-        /// The field of the task.
+        /// Name of the invalid field of the task.
         name: &'static str,
         /// The invalid value.
         value: f64,
@@ -58,7 +58,7 @@ pub enum Error {
     /// A setting lies outside of its range.
     #[error("setting `{name}` is {value}, but it must be {allowed}")]
     Setting {
-        /// The field of [`Settings`](crate::Settings).
+        /// Name of the invalid field of [`Settings`](crate::Settings).
         name: &'static str,
         /// The invalid value.
         value: f64,
@@ -80,7 +80,7 @@ pub enum Error {
     Knot {
         /// Index of the knot.
         knot: usize,
-        /// The error of the state; it names the joint and the numbers.
+        /// Error of the state. It names the joint and the invalid numbers.
         error: condyle_dynamics::Error,
     },
     /// A vector does not have the length that the model requires.
@@ -121,9 +121,9 @@ pub enum Status {
     /// A number of the state or of the references is infinite or NaN. Nothing was solved.
     #[error("`{name}[{index}]` is {value}, which is not finite")]
     NotFinite {
-        /// `q`, `v`, or the field of [`References`](crate::References).
+        /// Name of the argument: `q`, `v`, or the field of [`References`](crate::References).
         name: &'static str,
-        /// Index of the number in the flattened argument.
+        /// Index of the number in the argument, whose numbers are counted in memory order.
         index: usize,
         /// The number.
         value: f64,
@@ -140,30 +140,30 @@ pub enum Status {
 pub enum InvalidRotation {
     /// A quaternion or a pair (cos, sin) whose length differs from 1 by more than 1e-3.
     Joint {
-        /// `q`, or `posture.q` of the references.
+        /// Name of the argument: `q`, or `posture.q` of the references.
         name: &'static str,
         /// Index of the body that the rotating joint moves.
         body: usize,
         /// Index of the rotation's first number in q.
         first: usize,
-        /// Index in q after the rotation's last number.
+        /// Index in q that follows the rotation's last number.
         end: usize,
         /// Length of the quaternion or of the pair.
         length: f64,
     },
     /// A matrix in the pose of a reference differs from a rotation by more than 1e-2.
     Pose {
-        /// `frames` or `contacts` of the references.
+        /// Name of the list: `frames` or `contacts` of the references.
         name: &'static str,
-        /// Index of the frame or of the contact.
+        /// Index of the frame or of the contact in this list.
         index: usize,
-        /// Distance from a rotation: [`Mat3::rotation_error`](condyle_spatial::Mat3::rotation_error).
+        /// Distance of the matrix from a rotation: [`Mat3::rotation_error`](condyle_spatial::Mat3::rotation_error).
         error: f64,
     },
 }
 
 impl InvalidRotation {
-    /// Returns a description of the error with its numbers, but without the joint or the frame.
+    /// Returns a description of the error with its numbers, but without the name of the joint or frame.
     pub(crate) fn fault(&self) -> String {
         match *self {
             Self::Joint { name, first, end, length, .. } => {
@@ -191,8 +191,8 @@ impl From<cone_program::Status> for Status {
             cone_program::Status::Infeasible => Self::Infeasible,
             cone_program::Status::IterationLimit => Self::IterationLimit,
             cone_program::Status::TimeLimit => Self::TimeLimit,
-            // These statuses report numerical failures: the objective is bounded below, and the input numbers were
-            // checked.
+            // The objective is bounded below, and the input was checked. So `Unbounded` and `NotFinite` can only result
+            // from numerical failures here.
             cone_program::Status::Unbounded
             | cone_program::Status::NotFinite { .. }
             | cone_program::Status::NumericalError => Self::NumericalError,

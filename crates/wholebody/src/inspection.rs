@@ -5,7 +5,8 @@ use crate::controller::WholeBodyController;
 use crate::references::References;
 use nalgebra::{DMatrix, DVector};
 
-/// Numbers of a program: min ½ xᵀ P x + cᵀ x with A x = b, l ≤ G x ≤ u and h + F x in a product of second-order cones.
+/// Matrices and vectors of a program: min ½ xᵀ P x + cᵀ x with A x = b, l ≤ G x ≤ u and h + F x in a product of
+/// second-order cones.
 #[derive(Clone, Debug)]
 pub struct Program {
     /// P, the quadratic cost; symmetric.
@@ -60,7 +61,7 @@ impl Program {
 pub struct Optimum {
     /// x: accelerations, and forces of the contacts that touch.
     pub x: DVector<f64>,
-    /// Unknowns of the solver. They are the unknowns in x that were not eliminated, or x with additional unknowns.
+    /// Unknowns of the solver: the unknowns in x that were not eliminated, or x with additional unknowns.
     pub z: DVector<f64>,
     /// Multipliers of the equalities that were not eliminated.
     pub equalities: DVector<f64>,

@@ -1,5 +1,4 @@
-//! Kinematics and dynamics of a tick, computed by one pass of `compute_all_terms`, and the motion of the requested
-//! frames.
+//! Kinematics and dynamics of a tick from one pass of `compute_all_terms`, and the motion of the requested frames.
 
 use condyle_dynamics::{Data, Force, Model, Motion, ReferenceFrame, Se3, Vec3, compute_all_terms};
 use nalgebra::DMatrix;
@@ -13,7 +12,7 @@ pub(crate) struct FrameMotion {
     pub pose: Se3<f64>,
     /// (ṗ, ω) = J v.
     pub velocity: Motion<f64>,
-    /// (p̈, ω̇) at q̈ = 0: J̇ v.
+    /// Acceleration (p̈, ω̇) at q̈ = 0, which is J̇ v.
     pub drift: Motion<f64>,
     /// J, 6 × nv.
     pub J: DMatrix<f64>,
@@ -33,13 +32,13 @@ pub(crate) struct Kinematics {
     pub com: Vec3<f64>,
     /// ċ.
     pub com_velocity: Vec3<f64>,
-    /// c̈ at q̈ = 0.
+    /// Acceleration c̈ of the centre of mass at q̈ = 0.
     pub com_drift: Vec3<f64>,
     /// Momentum about the centre of mass.
     pub momentum: Force<f64>,
-    /// Rate of the momentum at q̈ = 0.
+    /// Time derivative of the momentum at q̈ = 0.
     pub momentum_drift: Force<f64>,
-    /// Centroidal momentum matrix, 6 × nv: rows 0 to 2 are m times the Jacobian of c.
+    /// Centroidal momentum matrix, 6 × nv. Rows 0 to 2 are the mass times the Jacobian of the centre of mass.
     pub Ag: DMatrix<f64>,
     /// Mass of all moving bodies (kg).
     pub mass: f64,

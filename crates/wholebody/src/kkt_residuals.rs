@@ -7,13 +7,14 @@ use nalgebra::{DVector, DVectorView};
 
 /// Errors in the Karush–Kuhn–Tucker conditions, for the program of a step's first priority. At the default
 /// [`tolerance`](crate::Settings::tolerance) the first three errors are below 1e-7, and the last is below 1e-5. The
-/// solver's tolerance applies to numbers scaled to size one; here forces of 1000 N are compared with accelerations of 1
-/// m/s².
+/// solver applies its tolerance to numbers scaled to size one. These errors are not scaled: forces of 1000 N are
+/// compared with accelerations of 1 m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KktResiduals {
     /// Gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
     pub stationarity: f64,
-    /// Violation of the worst equality, bound or cone, relative to the norm of its row and to the unknowns.
+    /// Largest violation of an equality, bound or cone. Each violation is relative to the norm of the constraint's row
+    /// times 1 plus the norm of x.
     pub primal: f64,
     /// Distance of the cones' multipliers from their cones, relative to these multipliers.
     pub dual: f64,
@@ -65,7 +66,7 @@ fn errors(program: &Program, optimum: &Optimum) -> KktResiduals {
     let terms = [P * x, c.clone(), -G.transpose() * z, -F.transpose() * w];
     let gradient = terms.iter().sum::<DVector<f64>>();
     let size = 1.0 + terms.iter().map(DVector::amax).fold(0.0, f64::max);
-    let Q = A.transpose().qr().q(); // removes from the gradient what Aᵀ y can cancel
+    let Q = A.transpose().qr().q(); // Q: basis of the gradients that Aᵀ y can cancel
     let stationarity = (&gradient - &Q * Q.tr_mul(&gradient)).amax() / size;
 
     let norm = |M: &nalgebra::DMatrix<f64>, i: usize| M.row(i).norm() * (1.0 + x.norm());
@@ -77,7 +78,7 @@ fn errors(program: &Program, optimum: &Optimum) -> KktResiduals {
     for i in 0..g.len() {
         let (below, above) = (g[i] - lower[i], upper[i] - g[i]);
         primal = primal.max(f64::max(-below, -above) / norm(G, i));
-        // z⁺ is the multiplier of the lower bound and z⁻ of the upper bound, if the bound exists.
+        // The multiplier of the lower bound is z⁺, and the multiplier of the upper bound is z⁻, if the bound exists.
         for (z, slack) in [(z[i].max(0.0), below), ((-z[i]).max(0.0), above)] {
             if z > 0.0 {
                 gap += z * slack;

@@ -1,14 +1,14 @@
-//! An objective as a sum of squares: ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x.
+//! Objective of the form ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x.
 
 use crate::cone_program::ConeProgram;
 use nalgebra::DMatrix;
 
-/// Rows of one priority, with memory for all tasks and unknowns.
+/// Objective of one priority, with memory for all tasks and unknowns.
 #[derive(Clone, Debug)]
 pub(crate) struct LeastSquares {
-    /// Rᵀ, with a column for each row of R; each column is multiplied by √w of its task.
+    /// Rᵀ, with a column for each row of R. Each column is multiplied by √w, where w is the weight of the row's task.
     pub Rt: DMatrix<f64>,
-    /// b; each entry is multiplied by √w of its task.
+    /// Right side b. Each entry is multiplied by √w, where w is the weight of the row's task.
     pub b: Vec<f64>,
     /// Number of rows in use.
     pub count: usize,
@@ -16,7 +16,7 @@ pub(crate) struct LeastSquares {
     pub diagonal: Vec<f64>,
     /// c.
     pub linear: Vec<f64>,
-    /// Unknowns whose entry of d comes from a task, not only from the regularisation.
+    /// Unknowns with a cost dᵢ xᵢ² from a task, and not only from the regularisation.
     pub single: Vec<usize>,
     /// Number of unknowns.
     unknowns: usize,
@@ -84,7 +84,7 @@ impl LeastSquares {
     }
 }
 
-/// Returns xᵀ y over the length of y, which must not be longer than x. Uses eight partial sums.
+/// Returns Σ xᵢ yᵢ over the entries of y, computed with eight partial sums. y must not be longer than x.
 pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let x = &x[..y.len()];
     let ((xs, x), (ys, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());

@@ -17,26 +17,27 @@
 //!
 //! The efforts τ are eliminated: their limits become rows in x. [`Task`]s move the centre of mass, frames, joints,
 //! angular momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v). Tasks have weights or strict
-//! priorities. [`References`] set the targets of each tick, and tell which contacts touch. A step always returns a
-//! [`Command`] that is finite and within the torque limits. Its [`Status`] tells whether it is the solution. Invalid
-//! states and references also give a status: a quaternion without length 1, a matrix that is not a rotation, a number
-//! that is not finite.
+//! priorities. [`References`] set the targets of each tick and the contacts that touch. A step always returns a
+//! [`Command`] that is finite and within the torque limits. The command's [`Status`] tells whether the command is the
+//! solution of the program. Invalid states and references are also reported by a status: a quaternion without length 1,
+//! a matrix that is not a rotation, a number that is not finite.
 //!
 //! # Conventions
-//! - q, v, τ as in [condyle_dynamics]. Coordinates of free-flyers are not actuated; all others are.
-//! - A contact is a point, an edge or a convex polygon in a frame. Its force acts from the environment on the robot.
+//! - q, v and τ are defined as in [condyle_dynamics]. Coordinates of free-flyers are not actuated; all others are.
+//! - A contact is a point, an edge or a convex polygon in a frame. The contact force acts from the environment on the
+//!   robot.
 //! - Positions, velocities and accelerations of tasks and contacts are along the world's axes. Accelerations are
 //!   classical: the second derivative of the position.
-//! - [`WholeBodyController::new`] allocates the warm_start.
+//! - [`WholeBodyController::new`] allocates the memory of all steps.
 //! - An invalid description makes `new` return an [`Error`]; an argument of the wrong length causes a panic.
 //!
 //! # Features
 //! On by default: `loaders` (reads robots from files, and has embedded robots) and `threads` (uses rayon). Off by
 //! default: `clarabel`, which adds `Backend::Clarabel`, a second solver for comparison, and its dependencies.
 //!
-//! Sources: Sentis and Khatib (2005), operational tasks under contact; Herzog et al. (2016), inverse dynamics as a
-//! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift; Caron, Pham and
-//! Nakamura (2015), the wrench of a sole.
+//! Sources: Sentis and Khatib (2005) for operational tasks under contact; Herzog et al. (2016) for inverse dynamics as
+//! a program in (q̈, f); Lobo et al. (1998) for friction as a second-order cone; Baumgarte (1972) for the correction of
+//! drift; Caron, Pham and Nakamura (2015) for the wrench of a sole.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![allow(non_snake_case)]
 
@@ -69,7 +70,7 @@ mod task;
 mod task_hierarchy;
 mod warm_start;
 
-/// Solver that [`Backend::Clarabel`] uses, for programs that also call it directly.
+/// The crate of the solver behind [`Backend::Clarabel`], for programs that also call this solver directly.
 #[cfg(feature = "clarabel")]
 pub use clarabel;
 pub use command::{Command, CommandSource};
@@ -82,7 +83,7 @@ pub use references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, Post
 pub use settings::{Backend, Formulation, Friction, JointLimits, Settings};
 pub use task::{Axes, Gains, Task, TaskKind};
 
-/// Code block of the README, run as a doctest.
+/// Runs the code block of the README as a doctest.
 #[cfg(all(doctest, feature = "loaders"))]
 #[doc = include_str!("../README.md")]
 mod readme {}

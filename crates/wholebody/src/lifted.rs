@@ -1,25 +1,26 @@
-//! The program with additional unknowns that replace rows with few zeros. Its matrices then have many zeros.
+//! Program with additional unknowns r and t. These unknowns replace R x in the objective and the rows G_d x in the
+//! constraints, whose matrices R and G_d have few zeros. The matrices of the program are then sparse.
 //!
 //! ```text
 //! minimise     ½ ‖r‖² + ½ Σ dᵢ xᵢ² + cᵀ x                over (x, r, t)
 //! subject to   R x − r = b,  G_d x − t = 0,  l ≤ t ≤ u,  and the equalities, the other rows and the cones of x
 //! ```
 //!
-//! The product RᵀR is not formed, and a row with two bounds is stored once. The multipliers of rows and cones do not
-//! change.
+//! The product RᵀR is not formed, and a row with two bounds is stored once. The multipliers of rows and cones are the
+//! same as in the original program.
 
 use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
 use crate::least_squares::LeastSquares;
 
-/// The lifted program, with memory for the largest one.
+/// Program in lifted form, with memory for the largest program.
 pub(crate) struct Lifted {
     pub program: ConeProgram,
 }
 
 impl Lifted {
-    /// Allocates memory for programs up to this size, whose first `dense` rows have few zeros, and for objectives up to
-    /// this number of rows.
+    /// Allocates memory for programs up to the size `capacity` and objectives of up to `objective` rows. The first
+    /// `dense` rows of a program have few zeros.
     pub(crate) fn new(capacity: Size, dense: usize, objective: usize) -> Self {
         let more = dense + objective;
         let capacity = Size { unknowns: capacity.unknowns + more, equalities: capacity.equalities + more, ..capacity };

@@ -3,7 +3,7 @@
 use crate::settings::JointLimits;
 use condyle_dynamics::{Joint, Model};
 
-/// Minimum width of an interval of accelerations (rad/s²); a narrower one is widened, because the solver needs an
+/// Minimum width of an interval of accelerations (rad/s²). A narrower interval is widened, because the solver needs an
 /// interior.
 const WIDTH: f64 = 1e-3;
 

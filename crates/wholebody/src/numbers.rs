@@ -1,7 +1,7 @@
 //! Reads numbers from a list, one by one, with checks.
 
-/// Reader of numbers from the front of a slice. Its methods return `None` if too few numbers are left, or if one is
-/// invalid.
+/// Reader of numbers from the front of a slice. Its methods return `None` if too few numbers are left, or if the next
+/// number is invalid.
 pub(crate) struct Reader<'a>(&'a [f64]);
 
 impl<'a> Reader<'a> {

@@ -1,4 +1,4 @@
-//! Tasks at one state, row by row: J q̈ = a* − J̇ v.
+//! Rows of the tasks at one state. Each row has the form J q̈ = a* − J̇ v.
 
 use crate::contact_rows::ContactRows;
 use crate::kinematics::{FrameMotion, Kinematics};
@@ -8,14 +8,14 @@ use crate::settings::Settings;
 use crate::task::{Axes, Gains, Task, TaskKind};
 use condyle_dynamics::{Mat3, Quaternion, Vec3, difference, lie};
 
-/// A task in which indices replace the names.
+/// Task with the indices of its frames and contact instead of their names.
 pub(crate) struct ResolvedTask {
     pub task: Task,
     /// Index of the frame that the task moves, among the frames of the kinematics.
     pub frame: Option<usize>,
     /// Index of the task's target among the frames of the references.
     pub target: usize,
-    /// Index of the frame that gives the task's axes, among the frames of the kinematics.
+    /// Index of the frame whose axes the task uses, among the frames of the kinematics.
     pub axes: Option<usize>,
     /// Index of the contact whose force the task sets.
     pub contact: Option<usize>,
@@ -83,7 +83,7 @@ impl ResolvedTask {
         }
     }
 
-    /// Adds rows `from` to `from` + 2 of the centroidal momentum matrix, along the given axes.
+    /// Adds rows `from` to `from` + 2 of the centroidal momentum matrix to the objective, with components along `axes`.
     fn add_map(&self, k: &Kinematics, axes: Mat3<f64>, from: usize, scale: f64, b: Vec3<f64>, out: &mut LeastSquares) {
         for (e, _) in axes.columns().into_iter().zip(self.task.mask).filter(|(_, counts)| *counts) {
             let s = e.scale(scale);
@@ -127,7 +127,7 @@ impl ResolvedTask {
         self.add_jacobian(frame, axes, mask, 3, a - frame.drift.angular, out);
     }
 
-    /// Adds rows `from` to `from` + 2 of the frame's Jacobian, along the given axes.
+    /// Adds rows `from` to `from` + 2 of the frame's Jacobian to the objective, with components along `axes`.
     fn add_jacobian(
         &self,
         frame: &FrameMotion,
@@ -169,7 +169,8 @@ impl Objective {
 
     /// Computes the rows of all tasks at the state (q, v).
     ///
-    /// Each priority is regularised with ½ w_a ‖q̈‖² + ½ w_f Σ ‖f − f_ref‖².
+    /// Each priority is regularised with ½ w_a ‖q̈‖² + ½ w_f Σ ‖f − f_ref‖², where w_a and w_f are the weights of
+    /// acceleration and force in the settings.
     pub(crate) fn update(
         &mut self,
         q: &[f64],
@@ -221,7 +222,7 @@ impl Objective {
 }
 
 impl ResolvedTask {
-    /// Returns the name of the frame that gives a task's axes: the frame that the task moves, or another one.
+    /// Returns the name of the frame that gives a task's axes: the frame that the task moves, or another frame.
     pub(crate) fn axes_name(task: &Task) -> Option<&str> {
         match &task.axes {
             Axes::World => None,

@@ -1,15 +1,16 @@
-//! A planned motion, given as plain arrays, which becomes references over time.
+//! Planned motion, given as plain arrays. A controller computes its references at each time from the plan.
 
 use crate::error::Error;
 use condyle_dynamics::{Joint, Model, difference, interpolate};
 use condyle_linalg::check;
 
-/// A planned motion: states at given times, efforts and gains between these times, and the intervals in which contacts
-/// touch.
+/// Planned motion: states at given times (knots), efforts and gains between these times, and the intervals in which
+/// contacts touch.
 ///
-/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references from a plan. Between knots, the
-/// position of each joint is interpolated in the joint's Lie group (for example along a rotation), v is interpolated
-/// linearly, and a = Δv / Δt. Two knots may have the same time: the velocity then jumps at this time (an impact).
+/// [`WholeBodyController::track`](crate::WholeBodyController::track) computes references from a plan. Between knots,
+/// the position of each joint is interpolated in the joint's Lie group (for example along a rotation). The velocity v
+/// is interpolated linearly, and a = Δv / Δt. Two knots may have the same time: the velocity then jumps at this time
+/// (an impact).
 ///
 /// ```
 /// use condyle_dynamics::{neutral, robots};
@@ -40,7 +41,7 @@ pub struct PlanData {
     pub states: Vec<f64>,
     /// Efforts of the actuated coordinates from each knot to the next, flat: N·nu; or empty.
     pub controls: Vec<f64>,
-    /// K of u = ū + K (x ⊖ x̄), row by row, flat: N·nu·2 nv; or empty.
+    /// Gains K of the control u = ū + K (x ⊖ x̄) from each knot to the next, row by row, flat: N·nu·2 nv; or empty.
     pub gains: Vec<f64>,
     /// Whether each contact touches from each knot to the next, flat: N·contacts.
     pub touches: Vec<bool>,
@@ -108,8 +109,8 @@ impl Plan {
         [self.data.times[0], self.data.times[self.data.times.len() - 1]]
     }
 
-    /// Returns the index of the interval between knots that contains time t, and how far t lies in this interval, from
-    /// 0 to 1.
+    /// Returns the index of the interval between knots that contains time t. Also returns the position of t in this
+    /// interval, from 0 at its start to 1 at its end.
     fn step(&self, t: f64) -> (usize, f64) {
         let times = &self.data.times;
         let after = times.partition_point(|&x| x <= t).clamp(1, times.len() - 1);
@@ -117,8 +118,7 @@ impl Plan {
         (after - 1, if to > from { ((t - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 })
     }
 
-    /// Panics unless the plan fits: it must have been made for this number of contacts, and for this robot or one with
-    /// the same bodies and joints.
+    /// Panics unless the plan was made for this number of contacts, and for a robot with the same bodies and joints.
     #[track_caller]
     pub(crate) fn check(&self, model: &Model, contacts: usize) {
         let same = self.model.tree_hash() == model.tree_hash();
@@ -142,8 +142,8 @@ impl Plan {
         }
     }
 
-    /// Returns the activation of a contact at a time: 0 while it does not touch, a ramp near the beginning and end of
-    /// contact, and 1 otherwise.
+    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after the beginning
+    /// and before the end of a contact interval, and 1 otherwise.
     ///
     /// # Panics
     /// If the contact's index is out of range.
@@ -162,8 +162,8 @@ impl Plan {
         ramp(begin.map_or(f64::INFINITY, |k| t - times[k + 1])).min(ramp(end.map_or(f64::INFINITY, |k| times[k] - t)))
     }
 
-    /// Computes the control u = ū + K (x ⊖ x̄) of the plan at a state. `tau` gets the efforts of all coordinates (nv
-    /// numbers), 0 at a free-flyer.
+    /// Computes the control u = ū + K (x ⊖ x̄) of the plan at time t and state (q, v). `tau` gets the efforts of all
+    /// coordinates (nv numbers), 0 at a free-flyer.
     ///
     /// # Errors
     /// [`Error::Model`] for a state that is not finite, or with a quaternion or a pair (cos, sin) that does not have

@@ -1,4 +1,4 @@
-//! References of a tick.
+//! References of a tick: the targets of tasks and contacts.
 
 use crate::error::{InvalidRotation, Status, finite};
 use condyle_dynamics::{Model, PositionFault, ROTATION_ROUNDING};
@@ -47,17 +47,17 @@ pub struct MomentumTarget {
     pub rate: Vec3<f64>,
 }
 
-/// Target of a contact, in the world's frame: activation, pose at which the contact is held, and reference of its
-/// force.
+/// Target of a contact, in the world's frame: activation, pose at which the contact is held, and reference force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactTarget {
-    /// α, from 0 (no contact: no force, and the frame may move) to 1 (full contact). Between 0 and 1 the frame is held,
-    /// and the normal force is at most α times the contact's `max_force`. If `max_force` is infinite, the robot's
-    /// weight replaces it. A ramp of α over several ticks loads or unloads the contact without a jump in the torques.
+    /// Activation α, from 0 (no contact: no force, and the frame may move) to 1 (full contact). Between 0 and 1 the
+    /// frame is held, and the normal force is at most α times the contact's `max_force`. The robot's weight replaces an
+    /// infinite `max_force`. A ramp of α over several ticks loads or unloads the contact without a jump in the torques.
     /// Numbers below 0 or above 1 are clamped.
     pub activation: f64,
-    /// Pose at which the frame is held. It acts only if [`Settings::contact_gains`](crate::Settings::contact_gains)
-    /// have a stiffness. For a point contact, only the translation acts.
+    /// Pose at which the frame is held. The pose has an effect only if
+    /// [`Settings::contact_gains`](crate::Settings::contact_gains) have a stiffness. For a point contact, only the
+    /// translation has an effect.
     pub pose: Se3<f64>,
     /// Reference force of the environment on the robot, about the frame's origin (N, N m): a planned force, or a share
     /// of the weight.
@@ -119,7 +119,7 @@ impl References {
     }
 }
 
-/// Yields the numbers of the translation, then of the rotation matrix column by column.
+/// Yields the numbers of a pose: the translation, then the rotation matrix column by column.
 fn pose(Se3 { rotation, translation }: Se3<f64>) -> impl Iterator<Item = f64> {
     [translation, rotation.x, rotation.y, rotation.z].into_iter().flat_map(Vec3::to_array)
 }
@@ -131,7 +131,7 @@ pub(crate) fn valid_rotations(name: &'static str, model: &Model, q: &[f64]) -> R
     Err(Status::InvalidState(InvalidRotation::Joint { name, body, first, end, length }))
 }
 
-/// Returns `Ok` if the rotation of a target's pose is valid. The numbers must be finite.
+/// Returns `Ok` if the rotation of the target pose is valid. The numbers must be finite.
 fn rotates(name: &'static str, index: usize, pose: &Se3<f64>) -> Result<(), Status> {
     let error = pose.rotation.rotation_error();
     if error <= ROTATION_ROUNDING {

@@ -1,5 +1,5 @@
-//! Safe command for ticks without a solution. For some ticks it repeats the last solution; then it is gravity
-//! compensation with damping.
+//! Safe command for ticks without a solution. In the first ticks after a solution it repeats the torques of that
+//! solution. Later it is gravity compensation with damping.
 
 use crate::contact_rows::ContactRows;
 use crate::kinematics::Kinematics;
@@ -47,7 +47,7 @@ impl Safety {
         }
     }
 
-    /// Stores the state of a tick, or notes that it is invalid (`None`).
+    /// Stores the state of a tick, or stores that the state is invalid (`None`).
     pub(crate) fn see(&mut self, state: Option<(&[f64], &[f64])>) {
         self.current = state.is_some();
         if let Some((q, v)) = state {
@@ -93,13 +93,13 @@ impl Safety {
         }
         free.iter().for_each(|&i| tau[i] = 0.0);
         self.clip(tau);
-        // Positions and velocities of 1e300 overflow: their torques become 0.
+        // At positions and velocities of 1e300, torques overflow: replace these torques by 0.
         tau.iter_mut().filter(|tau| !tau.is_finite()).for_each(|tau| *tau = 0.0);
         false
     }
 
-    /// Computes τ = g − Jᵀ f. The forces f are the smallest forces of the active contacts that carry the base, S (g −
-    /// Jᵀ f) = 0.
+    /// Computes τ = g − Jᵀ f, with the gravity torques g and forces f of the active contacts. These are the smallest
+    /// forces that carry the base: S (g − Jᵀ f) = 0, where S selects the base's coordinates.
     fn gravity_compensation(
         &mut self,
         kinematics: &mut Kinematics,
@@ -114,7 +114,7 @@ impl Safety {
         let frames = &kinematics.frames;
         let rows = |c: &ContactRows| if c.geometry.motion.len() == 3 { 3 } else { 6 };
         let active = || contacts.iter().filter(|c| c.active);
-        // f = J_b λ, where (Σ J_bᵀ J_b) λ = g_b
+        // f = J_b λ, where (Σ J_bᵀ J_b) λ = g_b; index b selects the base's coordinates
         let mut gram = Matrix6::identity() * 1e-9;
         for c in active() {
             for r in 0..rows(c) {

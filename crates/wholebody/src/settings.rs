@@ -5,13 +5,13 @@ use crate::task::Gains;
 use condyle_dynamics::{Joint, Model};
 use std::fmt;
 
-/// Description of friction.
+/// Model of friction: cones or pyramids.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Friction {
     /// ‖f_t‖ ≤ μ f_n, a second-order cone.
     Cone,
-    /// A pyramid instead of the cone, for comparison.
+    /// A pyramid instead of the cone, for comparisons.
     Pyramid {
         /// Number of faces; at least 3.
         sides: usize,
@@ -47,9 +47,9 @@ impl fmt::Display for Backend {
 pub enum Formulation {
     /// The equalities of the base and of the contacts are eliminated first.
     Condensed,
-    /// All unknowns (q̈, f), with equalities. This form is slower; it is for comparison. Clarabel gets additional
-    /// unknowns for limited torques and for residuals of tasks, so that its matrices have more zeros. Priorities after
-    /// the first are always condensed.
+    /// All unknowns (q̈, f), with equalities. This form is slower and serves for comparisons. With clarabel, this form
+    /// has additional unknowns for limited torques and for residuals of tasks. These unknowns make the matrices sparse.
+    /// Priorities after the first are always condensed.
     Full,
 }
 
@@ -61,12 +61,12 @@ pub enum Formulation {
 ///            (the distance d obeys d̈ ≥ −(2 / T) ḋ − d / T²)
 /// ```
 ///
-/// A lower bound is at most a_max, and an upper bound is at least −a_max. So a joint that is beyond its limit, or
-/// approaches it too fast, is led back with at most a_max. If the bounds of position and velocity contradict each
-/// other, the bound of the position holds. A joint approaches its limit no faster than a critically damped spring with
-/// time constant T would, and does not pass the limit (an exponential control barrier function: Nguyen and Sreenath,
-/// 2016). If dynamics, contacts and torques allow no acceleration within these bounds, the bounds become tasks of large
-/// weight at that tick.
+/// A lower bound is at most a_max, and an upper bound is at least −a_max. So a joint beyond its limit, or too fast
+/// towards its limit, is led back with at most a_max. If the bounds of position and velocity contradict each other, the
+/// bound of the position holds. A joint approaches its limit no faster than a critically damped spring with time
+/// constant T would, and does not pass the limit (an exponential control barrier function: Nguyen and Sreenath, 2016).
+/// If dynamics, contacts and torques allow no acceleration within these bounds, the bounds become tasks of large weight
+/// at that tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
     /// T (s), the look-ahead time; at least the duration of several ticks.
@@ -103,19 +103,20 @@ pub struct Settings {
     /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench costs as
     /// much as the corner forces that cause it, so that the pressure stays away from the edges.
     pub force_weight: f64,
-    /// Baumgarte gains: the acceleration of a contact is k (X_ref ⊖ X) − d v instead of 0.
+    /// Baumgarte gains k and d. The acceleration of a contact with pose X and velocity v is k (X_ref ⊖ X) − d v instead
+    /// of 0.
     pub contact_gains: Gains,
     /// Maximum acceleration that `contact_gains` may cause (m/s², rad/s²): a foot that lands fast is stopped over
     /// several ticks.
     pub max_correction: f64,
-    /// Description of friction: cones or pyramids.
+    /// Model of friction: cones or pyramids.
     pub friction: Friction,
     /// Maximum effort of each coordinate, nv numbers (N m, N); infinite for no limit. `None` takes the limits of the
     /// model. The effort of each actuated coordinate is above 0.
     pub effort: Option<Vec<f64>>,
     /// Limits of the joints' positions and velocities; `None` for no limits.
     pub joint_limits: Option<JointLimits>,
-    /// Number of ticks after the last solution in which its torques serve as the safe command.
+    /// Maximum number of ticks after the last solution in which the solution's torques serve as the safe command.
     pub hold_ticks: u32,
     /// Damping of the safe command after `hold_ticks`: −D v, where D is this factor (s/rad) times the maximum effort.
     pub damping: f64,
@@ -184,7 +185,7 @@ impl Settings {
         }
         let (nq, nv) = (model.nq(), model.nv());
         for (name, numbers, expected, least) in [
-            ("effort", &self.effort, nv, None), // `check_effort` checks its numbers
+            ("effort", &self.effort, nv, None), // `check_effort` checks the numbers
             ("joint_limits.lower", &limits.lower, nq, Some(f64::NEG_INFINITY)),
             ("joint_limits.upper", &limits.upper, nq, Some(f64::NEG_INFINITY)),
             ("joint_limits.velocity", &limits.velocity, nv, Some(0.0)),
@@ -212,7 +213,7 @@ impl Settings {
             let coordinates = body.idx_v..body.idx_v + body.joint.nv();
             let mut limits = coordinates.flat_map(|i| [-least[i], greatest[i]]);
             if body.joint == Joint::FreeFlyer {
-                // Finds an invalid limit of a coordinate on which no motor acts
+                // Find an invalid limit of a coordinate on which no motor acts.
                 let wrong = limits.find(|&x| x.is_nan() || x < 0.0);
                 let error = |value: f64| Error::Setting { name: "effort", value, allowed: "at least 0" };
                 wrong.map_or(Ok(()), |value| Err(error(value)))?;

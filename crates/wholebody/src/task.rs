@@ -1,4 +1,4 @@
-//! Tasks of a controller, which stay the same for all ticks.
+//! Tasks of a controller. They stay the same for all ticks.
 
 use crate::error::Error;
 
@@ -40,8 +40,9 @@ pub enum TaskKind {
     Posture,
     /// Rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers.
     AngularMomentum,
-    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre, along its axes (t₁, t₂,
-    /// n). A point contact has only the first 3. Gains have no effect, and the task is off while the contact is off.
+    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre, along the contact's
+    /// axes (t₁, t₂, n). A point contact has only the first 3 numbers. Gains have no effect, and the task is off while
+    /// the contact is off.
     ContactForce(String),
 }
 
@@ -65,7 +66,7 @@ impl TaskKind {
     }
 }
 
-/// Axes along which the numbers of a task are measured; the mask selects among these numbers.
+/// Axes along which the components of a task are measured. The task's mask selects among these components.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Axes {
@@ -77,11 +78,11 @@ pub enum Axes {
     Frame(String),
 }
 
-/// A quantity to be controlled, with the cost ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². The [`References`](crate::References)
-/// contain its target.
+/// Task: a quantity to be controlled, with the cost ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². The
+/// [`References`](crate::References) contain its target.
 ///
 /// Tasks of priority 0 come first. Tasks of priority 1 determine only the motion that priority 0 leaves open, and so on
-/// (lexicographic). Within a priority the weights decide, and only their ratios matter.
+/// (lexicographic). Within a priority only the ratios of the weights matter.
 ///
 /// ```
 /// use condyle_wholebody::{Axes, Gains, Task};
@@ -97,12 +98,12 @@ pub struct Task {
     pub kind: TaskKind,
     /// w, the weight; at least 0. A task with weight 0 has no effect.
     pub weight: f64,
-    /// Gains from errors of position and velocity to acceleration.
+    /// Gains k and d of the errors of position and velocity.
     pub gains: Gains,
-    /// Selects the numbers of the task that count. Tasks with 3 numbers use the first 3 entries; the posture uses
-    /// `joints` instead.
+    /// Selection of the task's components that enter the cost. Tasks with 3 components use the first 3 entries; the
+    /// posture uses `joints` instead.
     pub mask: [bool; 6],
-    /// Axes of the task's numbers.
+    /// Axes of the task's components.
     pub axes: Axes,
     /// Priority: 0 is the highest, at most 2.
     pub priority: usize,
@@ -116,8 +117,8 @@ impl Task {
         Self { kind, weight, gains, mask: [true; 6], axes: Axes::World, priority: 0, joints: Vec::new() }
     }
 
-    /// Creates a task for the centre of mass, with weight 10. Like all tasks here, it is critically damped with k =
-    /// 100/s².
+    /// Creates a task for the centre of mass, with weight 10. The task is critically damped with k = 100/s², like the
+    /// tasks of all constructors of this type.
     pub fn com() -> Self {
         Self::new(TaskKind::Com, 10.0)
     }

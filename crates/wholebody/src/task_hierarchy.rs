@@ -1,4 +1,4 @@
-//! Solves the program priority by priority: later priorities keep the results of earlier ones.
+//! Solves the program priority by priority. Later priorities keep the results of earlier priorities.
 //!
 //! All minimisers of ½ ‖R x − b‖² over a convex set have the same R x. So the equality R x = R x*, with any minimiser
 //! x*, describes all minimisers. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014),
@@ -20,12 +20,12 @@ use crate::warm_start::WarmStart;
 use condyle_linalg::max_abs;
 
 /// Amount by which bounds and cones are widened for later priorities: relative to 1 + |bound| for rows, in N for cones.
-/// The equalities that hold earlier priorities may leave rows and cones without an interior, which interior-point
-/// methods need.
+/// Interior-point methods need constraints with an interior. The equalities that keep the results of earlier priorities
+/// may leave rows and cones without an interior.
 const WIDENED: f64 = 1e-7;
 
-/// Ratio of a row's coefficients after and before the elimination, below which the equalities of earlier priorities
-/// already determine the row's value.
+/// Threshold below which the equalities of earlier priorities already determine a row's value. The compared number is
+/// the ratio of the row's coefficients after the elimination to the coefficients before it.
 const DECIDED: f64 = 1e-9;
 
 /// Form of the program that the solver of a priority receives.
@@ -51,8 +51,8 @@ pub(crate) struct TaskHierarchy {
 }
 
 impl TaskHierarchy {
-    /// Allocates memory for programs up to this size, whose first `dense` rows have few zeros, and for objectives with
-    /// these numbers of rows.
+    /// Allocates memory for programs up to the size `capacity`, whose first `dense` rows have few zeros. The objective
+    /// of each priority has up to `rows[priority]` rows.
     pub(crate) fn new(
         capacity: Size,
         #[cfg_attr(not(feature = "clarabel"), expect(unused_variables))] dense: usize,
@@ -84,8 +84,8 @@ impl TaskHierarchy {
         Self { solvers, given, warm_starts, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
     }
 
-    /// Minimises one objective after the other subject to a program, and returns the number of minimised objectives. x
-    /// is the best solution found, and finite.
+    /// Minimises one objective after the other subject to a program, and returns the number of minimised objectives.
+    /// Afterwards, the field `x` is the best solution found, and finite.
     pub(crate) fn solve(
         &mut self,
         program: &mut ConeProgram,
@@ -113,7 +113,7 @@ impl TaskHierarchy {
         (all, done)
     }
 
-    /// Writes the program of the first priority for its solver.
+    /// Writes the program of the first priority in the form that its solver receives.
     pub(crate) fn assemble(&mut self, program: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         self.given[0].write(program, known, objective);
     }
@@ -191,7 +191,7 @@ impl Given {
         }
     }
 
-    /// Returns the elimination of the first priority. The next tick tries its pivots first.
+    /// Returns the elimination of the first priority. The next tick tries the pivots of this elimination first.
     pub(crate) fn elimination(&self) -> Option<&Elimination> {
         if let Given::Condensed(condenser, _) = self { Some(&condenser.elimination) } else { None }
     }
@@ -215,7 +215,7 @@ impl Given {
         }
     }
 
-    /// Gives the solver x and the multipliers as its start.
+    /// Passes x and the multipliers to the solver as its starting point.
     fn start_from(&mut self, x: &[f64], multipliers: Multipliers<'_>, solver: &mut dyn Solver) {
         match self {
             Given::Condensed(condenser, _) => {

@@ -1,8 +1,8 @@
-//! The last solution. The next solve starts from it, even if contacts have changed.
+//! Last solution. The next solve starts from it, even if the set of contacts has changed.
 //!
 //! Every unknown and every constraint has a fixed index, from a numbering in which all contacts touch. Forces are
 //! stored divided by their contact's activation, so that a force at a ramped limit stays at the limit. When a contact
-//! begins, its forces start from the values that they had when it last ended.
+//! begins, the starting values of its forces are the values at the end of its last contact phase.
 
 use crate::cone_program::{Multipliers, Size};
 
@@ -80,7 +80,7 @@ impl WarmStart {
         self.known = false;
     }
 
-    /// Stores a solution. Equalities that the solver did not receive have no multipliers.
+    /// Stores a solution. Equalities that were not passed to the solver have no multipliers.
     pub(crate) fn keep(&mut self, places: &Places, x: &[f64], multipliers: Multipliers<'_>) {
         let Point { x: all_x, equalities, rows, cones } = &mut self.all;
         for (all, places, values) in [

@@ -1,4 +1,4 @@
-//! A step allocates nothing, unless clarabel is the back end.
+//! Tests that a step does not allocate memory, except with clarabel.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]
@@ -9,8 +9,8 @@ use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Settings, Task, WholeBodyController};
 use counting::allocated;
 
-/// The assembly and Condyle's own solver allocate nothing, for all contacts. Clarabel allocates once in a solve, and
-/// more for a new set of contacts.
+/// Checks that the assembly and Condyle's own solver do not allocate memory with any set of contacts. Clarabel
+/// allocates once in a solve, and more often for a new set of contacts.
 #[test]
 fn assembly_allocates_nothing() {
     let model = robots::humanoid();
@@ -29,14 +29,15 @@ fn assembly_allocates_nothing() {
                 }
                 let before = allocated();
                 controller.step(&q, &v, &references).solved().unwrap();
-                // Clarabel allocates once for each priority, unless earlier priorities leave no freedom.
+                // Clarabel allocates once for each priority that is solved. A priority is not solved if earlier
+                // priorities leave no freedom.
                 let allowed = if backend == Backend::Clarabel { priority + 1 } else { 0 };
                 if round > 0 || backend == Backend::InteriorPoint {
                     assert!(allocated() - before <= allowed, "set {set}: {}", allocated() - before);
                 }
             }
         }
-        // A step with a safe command allocates nothing, too.
+        // A step with a safe command must not allocate either.
         references.com.position.x = f64::NAN;
         for _ in 0..10 {
             let before = allocated();

@@ -1,4 +1,4 @@
-//! Each command satisfies dynamics, contacts and cones, and is optimal.
+//! Tests that each command satisfies dynamics, contacts and cones, and that each command is optimal.
 #![allow(non_snake_case)]
 
 mod common;
@@ -16,7 +16,8 @@ fn standing_still() {
     let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
-    // All tasks can be met at rest, except the equal shares of the weight, which have a weight of 1e-7.
+    // All tasks can be satisfied at rest. Only the reference forces, equal shares of the weight, contradict them, with
+    // a weight of 1e-7.
     assert!(max_abs(command.a.iter().copied()) < 1e-2, "{:?}", command.a);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
         assert!(margin(contact, f) > 10.0, "{f:?}");
@@ -54,7 +55,8 @@ fn a_humanoid_on_two_points() {
     }
 }
 
-/// A single task for the centre of mass is met exactly. So q̈ is a minimiser, whatever the solver reports.
+/// Checks that a single task for the centre of mass is satisfied exactly. Then q̈ is a minimiser, whatever the solver
+/// reports.
 #[test]
 fn a_feasible_task_is_met() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -67,27 +69,27 @@ fn a_feasible_task_is_met() {
     assert!(norm(c - references.com.acceleration) < 1e-5, "{c:?}");
 }
 
-/// On ice, the requested push needs more friction than is available. So the forces lie on the boundaries of their
-/// cones.
+/// Checks the forces on ice: the task needs more friction than the ice allows. So the forces must lie on the boundaries
+/// of their cones.
 #[test]
 fn little_friction_tilts_forces_to_the_cone() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.1);
     let mut controller = controller(&model, &contacts);
     let mut references = controller.hold(&q).unwrap();
-    references.com.acceleration.x = 3.0; // 0.1 · 9.81 would be feasible
+    references.com.acceleration.x = 3.0; // an acceleration of 0.1 · 9.81 would be feasible
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
         assert!(margin(contact, f) < 1e-4 * f.linear.z, "{f:?} is inside of its cone");
         assert!(f.linear.x > 0.0);
     }
-    // ẍ = Σ f_x / m = μ Σ f_z / m, if all forces point forward
+    // If all forces point forward, ẍ = Σ f_x / m = μ Σ f_z / m.
     let c = command.com_acceleration;
     assert!((c.x - 0.1 * (c.z + 9.81)).abs() < 0.02, "{c:?}");
 }
 
-/// Friction is a cone, not a pyramid: the greatest friction force is equal in all directions.
+/// Checks that friction is a cone and not a pyramid: the greatest friction force is equal in all directions.
 #[test]
 fn friction_has_no_preferred_direction() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -134,19 +136,19 @@ fn force_bounds_bind() {
     assert!(command.forces[0].linear.z < 50.0 + EQUALITY && command.forces[3].linear.z > 95.0 - EQUALITY);
 }
 
-/// A robot on tilted ground and the same robot in a tilted world get the same result.
+/// Checks that a robot on tilted ground and the same robot in a tilted world get the same result.
 #[test]
 fn a_slope_is_a_tilted_world() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let slope = 0.3f64;
     let (sin, cos) = slope.sin_cos();
-    // In the first case the ground is level, and gravity leans backwards.
+    // In the first case the ground is level, and the gravity vector leans backwards.
     let leaning = model.clone().with_gravity(Vec3::new(-9.81 * sin, 0.0, -9.81 * cos)).unwrap();
     let contacts = feet(0.5);
     let mut level = controller(&leaning, &contacts);
     let references = level.hold(&q).unwrap();
     let expected = level.step(&q, &v, &references).solved().unwrap().clone();
-    // In the second case gravity is vertical, and base and normals are rotated by −slope about y.
+    // In the second case gravity is vertical. The base and the normals are rotated by −slope about y.
     let mut turned = q.clone();
     let (s, c) = (-slope / 2.0).sin_cos();
     let (x, z) = (q[0], q[2]);
@@ -199,8 +201,9 @@ fn what_cannot_be_is_infeasible() {
     assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // the knees have only 80 N m
 }
 
-/// Without an active inequality, the command solves a linear system. The test builds this system from other functions:
-/// columns of M and of Jacobians are differences of RNEA and of accelerations along a path.
+/// Checks commands without active inequalities against the solution of a linear system. The test builds this system
+/// without functions of the controller: columns of M are differences of RNEA, and columns of Jacobians are differences
+/// of accelerations along a path.
 #[test]
 fn inside_all_cones_the_kkt_system_is_solved() {
     let (model, contacts) = (robots::quadruped(), feet(2.0));
@@ -214,7 +217,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
         assert!(margin(contact, f) > 1.0, "the state is chosen inside of all cones: {f:?}");
     }
 
-    let (nv, n, rows) = (18, 30, 18); // x = (q̈, f), rows of the free base and of four feet
+    let (nv, n, rows) = (18, 30, 18); // x = (q̈, f); rows of the free base and of four feet
     let mut data = Data::new(&model);
     let mut at = |a: &[f64]| {
         let (feet, com) = accelerations(&model, &contacts, &q, &v, a);
@@ -239,11 +242,11 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     (0..6).for_each(|i| b[i] = -h[i]);
     (0..12).for_each(|i| b[6 + i] = -feet_bias[i]);
 
-    let mut Jw = DMatrix::zeros(6, nv); // The root's ω is R ω_b, so its ω̇ at q̈ = 0 is R (ω_b × ω_b) = 0.
+    let mut Jw = DMatrix::zeros(6, nv); // ω of the root is R ω_b, so its ω̇ at q̈ = 0 is R (ω_b × ω_b) = 0.
     let placements = forward_kinematics(&model, &mut data, &q);
     placements.frame_jacobian(model.frame("trunk").unwrap(), ReferenceFrame::LocalWorldAligned, &mut Jw);
     let (Jw, v) = (Jw.rows(3, 3).into_owned(), DVector::from_vec(v));
-    let damping = 20.0; // the damping of all tasks; errors of position are zero
+    let damping = 20.0; // damping of all tasks; errors of position are zero
     let com = DVector::from_column_slice(&references.com.acceleration.to_array())
         - DVector::from_column_slice(&com_bias)
         - damping * &Jc * &v;
@@ -265,8 +268,8 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     let right = DVector::from_iterator(n + rows, c.iter().map(|c| -c).chain(b.iter().copied()));
     let x = K.lu().solve(&right).unwrap();
     let found = command.a.iter().copied().chain(command.forces.iter().flat_map(|f| f.linear.to_array()));
-    // A duality gap of 1e-9 bounds the error of forces, which only w_f = 1e-5 determines, by √(1e-9 / 1e-5) = 1e-2 N.
-    // The last Newton step of an interior-point method squares this error.
+    // The tolerance follows from the duality gap of 1e-9. Where only w_f = 1e-5 determines a force, this gap bounds the
+    // force's error by √(1e-9 / 1e-5) = 1e-2 N. The last Newton step of an interior-point method squares this error.
     let error = max_abs(found.zip(&x).map(|(found, x)| found - x));
     assert!(error < 1e-4, "{error:.1e}");
 }

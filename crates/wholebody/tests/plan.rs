@@ -1,4 +1,4 @@
-//! Plans: a controller computes references from plain arrays.
+//! Tests of plans: a controller computes references from plain arrays.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,8 +7,8 @@ use common::*;
 use condyle_dynamics::{Joint, Model, UrdfOptions, integrate, robots};
 use condyle_wholebody::{Plan, PlanData, Settings, Task, WholeBodyController};
 
-/// Returns a plan with five knots, 0.1 s apart. The trunk accelerates upwards with 0.4 m/s² from rest. The first foot
-/// is off in the third step.
+/// Returns a plan with five knots, 0.1 s apart. The trunk accelerates upwards from rest with 0.4 m/s². In the third
+/// interval the first foot does not touch.
 fn data(model: &Model) -> PlanData {
     let mut states = Vec::new();
     for k in 0..5 {
@@ -22,7 +22,7 @@ fn data(model: &Model) -> PlanData {
     assert_eq!(model.nv(), 18);
     let controls = (0..48).map(f64::from).collect();
     let mut gains = vec![0.0; 4 * 12 * 36];
-    gains[2] = 100.0; // gain from the height to the first joint, in the first step
+    gains[2] = 100.0; // in the first interval: gain from the trunk's height to the first joint's effort
     PlanData { times: (0..5).map(|k| 0.1 * f64::from(k)).collect(), states, controls, gains, touches, fade: 0.05 }
 }
 
@@ -42,7 +42,7 @@ fn references_follow_the_plan() {
     assert!((references.frames[1].acceleration.linear.z - 0.4).abs() < 1e-9, "the foot is lifted with the trunk");
     let lift: f64 = references.contacts.iter().map(|c| c.force.linear.z).sum();
     assert!((lift - model.total_mass() * (9.81 + 0.4)).abs() < 1e-9);
-    // Outside of its time span, the plan is at rest.
+    // Before and after the plan's time span, the planned robot is at rest.
     controller.track(&plan, 1.0, &mut references);
     assert_eq!((references.com.velocity.z, references.com.acceleration.z), (0.0, 0.0));
     assert!((references.com.position.z - height - 0.032).abs() < 1e-12);
@@ -92,7 +92,7 @@ fn wrong_arrays_are_named() {
     );
 }
 
-/// A plan is rejected if a rotation in a knot does not have length 1, or if a number is not finite.
+/// Checks that a plan is rejected if a rotation in a knot does not have length 1, or if a number is not finite.
 #[test]
 fn states_are_checked() {
     let model = robots::quadruped();
@@ -129,7 +129,7 @@ fn a_plan_of_other_contacts_is_refused() {
     controller.track(&plan, 0.1, &mut references);
 }
 
-/// A plan is rejected for a robot that has the same number of coordinates but sliding knees.
+/// Checks that a plan is rejected for another robot: with the same number of coordinates, but with sliding knees.
 #[test]
 #[should_panic(expected = "plan: made for another model (`sliding`) than `quadruped`")]
 fn a_plan_of_another_robot_is_refused() {

@@ -1,4 +1,4 @@
-//! Later priorities do not change the results of earlier priorities.
+//! Tests that later priorities do not change the results of earlier priorities.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,12 +7,12 @@ use common::*;
 use condyle_dynamics::{Vec3, robots};
 use condyle_wholebody::{Axes, Backend, Formulation, Gains, Settings, Task, TaskKind, WholeBodyController};
 
-/// Tolerance of q̈, relative to 1 and the largest number of q̈. It is slightly above the square root of the solver's
-/// tolerance of 1e-11, because only the regularisation determines some directions of q̈.
+/// Tolerance of q̈, relative to 1 plus the largest entry of q̈. Only the regularisation determines some directions of
+/// q̈. So the tolerance is slightly above the square root of the solver's tolerance of 1e-11.
 const AGREEMENT: f64 = 1e-5;
 
-/// The targets of the trunk's height and of the centre of mass contradict each other. The order of the priorities
-/// decides, not the weights.
+/// Checks two tasks that contradict each other: the trunk's height and the centre of mass. The order of their
+/// priorities decides, not their weights.
 #[test]
 fn order_beats_weight() {
     let model = robots::quadruped();
@@ -39,8 +39,8 @@ fn order_beats_weight() {
     assert!(missed(1, 0, 10.0) > 1.0);
 }
 
-/// A first priority at the limit of friction leaves no freedom to the next priority. The next priority is solved
-/// nevertheless.
+/// Checks a first priority at the limit of friction, which leaves no freedom to the next priority. The program of the
+/// next priority must be solved nevertheless.
 #[test]
 fn a_first_priority_at_its_limit() {
     let model = robots::humanoid();
@@ -66,7 +66,7 @@ fn references_without_frames(references: &condyle_wholebody::References) -> cond
     condyle_wholebody::References { frames: Vec::new(), ..references.clone() }
 }
 
-/// Solves a program with three priorities in each form and with each back end. The commands agree.
+/// Checks that all forms of a program with three priorities give the same commands with both back ends.
 #[test]
 fn forms_agree_on_priorities() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -112,7 +112,7 @@ fn forms_agree_on_priorities() {
     }
 }
 
-/// Tests a task for one axis of the hand's position, along the hand's own axes and along other axes.
+/// Checks a task for one axis of the hand's position, along the hand's own axes and along other axes.
 #[test]
 fn masks_and_axes() {
     let model = robots::humanoid();
@@ -142,12 +142,12 @@ fn masks_and_axes() {
     }
 }
 
-/// Tests tasks for angular momentum, velocities and forces.
+/// Checks tasks for angular momentum, velocities and forces.
 #[test]
 fn momentum_velocity_and_force() {
     let model = robots::humanoid();
     let (q, v, contacts) = (squat(&model), vec![0.0; 38], soles(0.7));
-    let gains = Gains { stiffness: 1e9, damping: 10.0 }; // the stiffness does not act on a velocity
+    let gains = Gains { stiffness: 1e9, damping: 10.0 }; // the task of a velocity must ignore the stiffness
     let tasks = [
         Task::com(),
         Task { weight: 100.0, ..Task::angular_momentum() },
@@ -167,7 +167,7 @@ fn momentum_velocity_and_force() {
     let hand = condyle_wholebody::FrictionContact::point("left_hand", 1.0);
     let (a, _) = accelerations(&model, &[hand], &q, &v, &command.a);
     assert!(norm(a[0] - Vec3::new(0.0, 1.0, 0.0)) < 0.1, "{:?}", a[0]);
-    // The rate of the angular momentum is the moment of all forces about the centre of mass.
+    // The time derivative of the angular momentum is the moment of all forces about the centre of mass.
     let com = controller.hold(&q).unwrap().com.position;
     let command = controller.step(&q, &v, &references);
     let mut rate = Vec3::zero();

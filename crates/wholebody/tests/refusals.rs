@@ -1,5 +1,5 @@
-//! Errors name what is invalid. A description gives an `Error`, a state or a failed solve gives a `Status`, and a wrong
-//! length gives a panic.
+//! Tests that errors name the invalid argument. An invalid description gives an `Error`. An invalid state or a failed
+//! solve gives a `Status`. A wrong length gives a panic.
 
 mod common;
 #[path = "../../../tests/common/panics.rs"]
@@ -94,8 +94,8 @@ fn lengths() {
     let _ = controller.step(&stance(), &[0.0; 18], &references);
 }
 
-/// A joint with an effort limit of 0 cannot be controlled. The error names the joint, and a setting can replace the
-/// limit.
+/// Checks that an effort limit of 0 is an error, because the joint cannot be controlled. The error names the joint, and
+/// a setting can replace the limit.
 #[test]
 fn efforts_are_above_0() {
     let model = robots::quadruped();
@@ -123,7 +123,7 @@ fn efforts_are_above_0() {
     }
 }
 
-/// A panic reports the location of the call.
+/// Checks that the message of a panic gives the line of the caller.
 #[test]
 fn panics_point_at_the_caller() {
     let model = robots::quadruped();
@@ -166,7 +166,7 @@ fn a_controller_is_shared_between_threads() {
     is_usual::<Status>();
 }
 
-/// Before the first step, the command is not a solution.
+/// Checks that the command before the first step is not reported as a solution.
 #[test]
 fn nothing_is_solved_before_the_first_step() {
     let model = robots::quadruped();

@@ -1,4 +1,5 @@
-//! States with all joints beyond a limit, in which the held feet prevent a return: each state has a solution.
+//! Tests states in which all joints are beyond a limit, and the held feet prevent their return. The program of each
+//! state must have a solution.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,13 +8,13 @@ use common::*;
 use condyle_dynamics::{Model, robots};
 use condyle_wholebody::{Backend, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController};
 
-/// Tolerance of accelerations, relative to the greatest one. Objectives that agree to 1e-9 leave an error of about the
-/// square root of 1e-9 in accelerations, times the ratio of the weights of limits and forces.
+/// Tolerance of accelerations, relative to the greatest acceleration. The objectives of two solutions agree to 1e-9.
+/// Accelerations then agree to about the square root of 1e-9, times the ratio of the weights of limits and forces.
 const APART: f64 = 5e-3;
 const STATES: u64 = 96;
 
-/// Compares the commands of both back ends in many states: at rest in the stance, near the stance, and far from it with
-/// high velocities. The joints are slightly or far beyond their limits.
+/// Compares the commands of both back ends in many states: at rest in the stance, near the stance, and far from the
+/// stance with high velocities. The joints are slightly or far beyond their limits.
 fn both_solve(model: &Model, contacts: &[FrictionContact], tasks: &[Task], stance: &[f64]) {
     let mut relaxed = 0;
     for seed in 0..STATES {

@@ -1,4 +1,4 @@
-//! Every step gives a command that is finite and within the torque limits, and a status.
+//! Tests that every step gives a status, and a command that is finite and within the torque limits.
 #![allow(non_snake_case)]
 
 #[path = "safety/clones.rs"]
@@ -13,7 +13,7 @@ use condyle_wholebody::{
     Backend, Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
 };
 
-/// Checks that a command is finite, and within the limits without any tolerance.
+/// Checks that a command is finite, and within the effort limits without any tolerance.
 fn is_safe(command: &Command, effort: &[f64]) {
     let numbers = command.tau.iter().chain(&command.a).copied();
     let forces = command.forces.iter().flat_map(|f| f.to_array());
@@ -41,7 +41,7 @@ fn the_last_solution_then_gravity_compensation() {
             assert_eq!((command.source, &command.tau), (CommandSource::LastSolution, &good.tau));
         } else {
             assert_eq!(command.source, CommandSource::GravityCompensation);
-            // Four feet carry the robot. The torques are the same, except for the torques of internal forces.
+            // Four feet carry the robot. Only the torques of internal forces may differ.
             let apart = max_abs(command.tau.iter().zip(&good.tau).map(|(a, b)| a - b));
             assert!(apart < 2.0, "{apart} N m");
         }
@@ -59,7 +59,7 @@ fn a_state_that_is_not_finite() {
     let (mut no_q, mut no_v) = (q.clone(), v.clone());
     (no_q[8], no_v[3]) = (f64::NAN, f64::INFINITY);
     for tick in 0..20 {
-        // The first solution is found at tick 10, below.
+        // Before tick 10, all states were invalid, and no solution is stored.
         let command = controller.step(&no_q, &v, &references);
         is_safe(command, &effort);
         assert_eq!(command.status.to_string(), "`q[8]` is NaN, which is not finite");
@@ -72,7 +72,7 @@ fn a_state_that_is_not_finite() {
     }
 }
 
-/// Tests impossible requirements, and solvers that stop early, in random states.
+/// Checks commands in random states with impossible requirements, and with solvers that stop early.
 #[test]
 fn nothing_breaks_the_limits() {
     let model = robots::humanoid();
@@ -93,7 +93,7 @@ fn nothing_breaks_the_limits() {
     }
 }
 
-/// Each back end reports a time limit of almost zero as too short.
+/// Checks that each back end returns the status of a time limit if the limit is almost zero.
 #[test]
 fn too_slow_is_a_status() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -110,7 +110,7 @@ fn too_slow_is_a_status() {
     }
 }
 
-/// In the air, gravity compensation consists of the torques of gravity.
+/// Checks that gravity compensation in the air consists of the torques of gravity.
 #[test]
 fn compensation_without_contacts() {
     let model = robots::quadruped();
@@ -124,8 +124,8 @@ fn compensation_without_contacts() {
     assert_eq!((&command.tau[..6], &command.tau[6..]), (&zero[..], &g[6..]));
 }
 
-/// A simulated free fall with moving targets: joints beyond the limits are led back, and others stay within their
-/// limits.
+/// Simulates a free fall with moving targets. Joints beyond their limits must be led back, and the other joints must
+/// stay within their limits.
 #[test]
 fn joints_stay_within_their_limits() {
     let model = robots::quadruped();
@@ -161,8 +161,8 @@ fn joints_stay_within_their_limits() {
             integrate(&model, &q, &step, &mut next);
             q = next;
             assert!(beyond || v[6..].iter().all(|v| v.abs() < 5.0 + 1e-6));
-            // After 0.5 s, a joint is outside of its limits by at most a fifth of its initial distance. A joint that
-            // started inside its limits never leaves them.
+            // After 0.5 s, the distance of a joint from its limit is at most a fifth of the initial distance. A joint
+            // that started within its limits never leaves them.
             for i in 7..19 {
                 let out = (q[i] - upper[i]).max(lower[i] - q[i]);
                 assert!(
@@ -182,7 +182,7 @@ fn joints_stay_within_their_limits() {
     }
 }
 
-/// In this stance, a joint limit contradicts the held feet.
+/// Checks a stance in which a joint limit contradicts the held feet: the limit is relaxed.
 #[test]
 fn limits_give_way_to_contacts() {
     let (model, q) = (robots::quadruped(), stance());

@@ -1,4 +1,4 @@
-//! Soles, edges and pyramids; both forms of the program give the same command.
+//! Tests of soles, edges and pyramids. Both forms of the program must give the same command.
 #![allow(non_snake_case)]
 
 mod common;
@@ -10,7 +10,7 @@ use condyle_wholebody::{
     WholeBodyController,
 };
 
-/// Tolerance of q̈, relative to 1 and the largest number of q̈, for two solvers with tolerance 1e-10.
+/// Tolerance of q̈ for two solvers with tolerance 1e-10, relative to 1 plus the largest entry of q̈.
 const AGREEMENT: f64 = 1e-6;
 
 fn solve(
@@ -45,8 +45,8 @@ fn a_humanoid_stands_on_soles() {
     }
 }
 
-/// A strong push to the side moves the centre of pressure to the edge of a sole, or a force to the boundary of its
-/// friction cone.
+/// Checks a strong push to the side. The push moves the centre of pressure to the edge of a sole, or a force to the
+/// boundary of its friction cone.
 #[test]
 fn the_centre_of_pressure_stays_within() {
     let model = robots::humanoid();
@@ -61,9 +61,9 @@ fn the_centre_of_pressure_stays_within() {
     }
 }
 
-/// A wrench and corner forces distribute the load in the same way. (Four corner forces, each a quarter of the load,
-/// cost a quarter of one force that carries the load.) Halfway to the side, the pressure is no longer in the middle of
-/// the soles, but far from their edges.
+/// Checks that a wrench and corner forces distribute the load in the same way. (Four corner forces, each a quarter of
+/// the load, cost a quarter of one force that carries the load.) When the robot leans halfway to the side, the pressure
+/// must be outside of the middle of the soles, but far from their edges.
 #[test]
 fn pressure_keeps_away_from_the_edges() {
     let model = robots::humanoid();
@@ -79,15 +79,15 @@ fn pressure_keeps_away_from_the_edges() {
     let weight = 9.81 * model.total_mass();
     for (one, other) in wrench.forces.iter().zip(&corners.forces) {
         assert!(max_abs((*one - *other).to_array()) < 1e-5 * weight, "{one:?} and {other:?}");
-        let aside = one.angular.x / one.linear.z; // y of the centre of pressure; a sole is 10 cm wide
+        let aside = one.angular.x / one.linear.z; // y of the centre of pressure (m); a sole is 0.1 m wide
         assert!(aside.abs() > 1e-3 && aside.abs() < 0.025, "{aside}");
     }
     let [left, right] = [0, 1].map(|k| wrench.forces[k].linear.z);
     assert!((left - right).abs() > 0.05 * weight, "{left} and {right}");
 }
 
-/// Condensed and full programs agree, with clarabel and with Condyle's own solver. The weight of the forces exceeds the
-/// tolerance.
+/// Checks that condensed and full programs agree, with clarabel and with Condyle's own solver. The weight of the forces
+/// is large compared to the tolerance.
 #[test]
 fn all_ways_agree() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -121,7 +121,8 @@ fn all_ways_agree() {
     }
 }
 
-/// A larger set of forces cannot raise the cost of a task: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+/// Checks that a larger set of forces does not raise the cost of a task: inscribed pyramid ⊂ cone ⊂ circumscribed
+/// pyramid.
 #[test]
 fn the_cone_lies_between_the_pyramids() {
     let model = robots::quadruped();
@@ -144,7 +145,8 @@ fn the_cone_lies_between_the_pyramids() {
     }
 }
 
-/// A foot rolls over the edge of its toe. Hands push against a wall, with normals that turn with the hands.
+/// Checks a foot that rolls over the edge of its toe, and hands that push against a wall. The normals of the hands turn
+/// with the hands.
 #[test]
 fn edges_and_walls() {
     let model = robots::humanoid();
@@ -163,20 +165,20 @@ fn edges_and_walls() {
         assert_eq!(command.status, Status::Solved);
         let tau = inverse_dynamics(&model, &contacts, &q, &v, &command);
         assert!(max_abs(tau.iter().zip(&command.tau).map(|(a, b)| a - b)) < EQUALITY);
-        // There is no moment about the edge.
+        // The moment about the edge is zero.
         let (f, p) = (command.forces[0], toe[0]);
         let R = orientation(&model, &q, "left_sole");
         let about = f.angular - (R * p).cross(f.linear);
         assert!(about.dot(R * Vec3::new(0.0, 1.0, 0.0)).abs() < EQUALITY);
-        // The wall can only push, with a limited force, along a normal that turns with the hand.
+        // The wall can only push. Its force is limited, and its normal turns with the hand.
         let R = orientation(&model, &q, "left_hand");
         let f_n = command.forces[2].linear.dot(R * Vec3::new(-1.0, 0.0, 0.0));
         assert!((-EQUALITY..30.0 + EQUALITY).contains(&f_n), "{f_n}");
     }
 }
 
-/// A hand leans on a wall next to the robot. The normal is given in the world: the wall pushes along it, with friction
-/// perpendicular to it.
+/// Checks a hand that leans on a wall next to the robot. The normal is given in the world: the wall pushes along the
+/// normal, with friction perpendicular to it.
 #[test]
 fn a_hand_leans_on_a_wall() {
     let model = robots::humanoid();
@@ -188,7 +190,7 @@ fn a_hand_leans_on_a_wall() {
     };
     let contacts = [soles(0.7), vec![wall]].concat();
     let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // makes the wall's force small
-    // The reference force on the wall is a part of the weight, which exceeds the available friction.
+    // The reference force on the wall is a share of the weight. This share exceeds the available friction.
     let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, |r| {
         r.contacts[2].force.linear = Vec3::new(0.0, 0.0, 100.0);
     });
@@ -198,7 +200,7 @@ fn a_hand_leans_on_a_wall() {
     assert!(f.z > 0.0 && (f.x.hypot(f.z) / (-0.4 * f.y) - 1.0).abs() < 1e-3, "at the edge of its cone: {f:?}");
 }
 
-/// Tests any convex polygon, with corners in either direction.
+/// Checks a convex polygon with six corners, whose corners are given in both directions around the polygon.
 #[test]
 fn soles_of_many_corners() {
     let model = robots::humanoid();
@@ -226,7 +228,7 @@ fn soles_of_many_corners() {
     }
 }
 
-/// On one foot whose yaw moment is bounded, the robot turns as fast as this bound allows.
+/// Checks a robot on one foot with bounded yaw moment: the robot turns as fast as this bound allows.
 #[test]
 fn the_yaw_moment_binds() {
     let model = robots::humanoid();
@@ -249,7 +251,7 @@ fn the_yaw_moment_binds() {
     assert!((less - 0.003).abs() < 1e-6 && (more - 0.006).abs() < 1e-6, "{less} {more}");
 }
 
-/// Four points on one foot give twelve equalities, six of which are independent.
+/// Checks redundant contacts: four points on one foot give twelve equalities, and only six of them are independent.
 #[test]
 fn redundant_contacts_are_no_obstacle() {
     let mut builder = condyle_dynamics::ModelBuilder::new("hopper");

@@ -9,11 +9,12 @@ use common::*;
 use condyle_dynamics::{Force, Model, integrate, robots};
 use condyle_wholebody::{FrictionContact, Gains, Settings, Task, WholeBodyController};
 
-/// Any set of touching feet, in any order of sets, gives the same command as a controller made for this set.
+/// Checks that any set of touching feet gives the same command as a controller made for this set, in any order of the
+/// sets.
 #[test]
 fn every_set_of_contacts() {
     let (model, contacts) = (robots::quadruped(), feet(0.7));
-    // The weight of forces is small. To compare torques, the tolerance must be tighter than the default.
+    // The weight of forces is small. So the comparison of torques requires a tighter tolerance than the default.
     let make = |contacts: &[FrictionContact]| {
         let settings = Settings { tolerance: 1e-13, force_weight: 1e-5, ..Settings::default() };
         WholeBodyController::new(&model, contacts, &tasks(), settings).unwrap()
@@ -54,15 +55,16 @@ fn free_fall_is_a_tick_like_others() {
     }
 }
 
-/// The weight moves to the left foot. The right foot is unloaded in 0.2 s, hangs, and is loaded again: no torque jumps.
+/// Checks that no torque jumps. The weight moves to the left foot, while the right foot is unloaded within 0.2 s,
+/// hangs, and is loaded again.
 #[test]
 fn fading_contacts_do_not_jerk() {
     let model = robots::humanoid();
     let contacts = soles(0.7);
-    // A task holds the foot where the contact held it, with more weight than the posture.
+    // After the contact has ended, a task with more weight than the posture holds the foot at the same pose.
     let tasks = [humanoid_tasks(), vec![Task { weight: 1e3, ..Task::pose("right_sole") }]].concat();
-    // The gap is relative to 1 if the objective is below 1. A tighter tolerance than the default makes the gap small
-    // enough.
+    // The duality gap is relative to 1 if the objective is below 1. Only a tolerance tighter than the default makes the
+    // gap small enough.
     let settings = Settings { contact_gains: Gains::critical(100.0), tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, settings).unwrap();
     let (mut q, mut v) = (squat(&model), vec![0.0; 38]);
@@ -90,7 +92,7 @@ fn fading_contacts_do_not_jerk() {
         assert!(command.forces[1].linear.z < EQUALITY + if (1000..=1200).contains(&tick) { 0.0 } else { 1e3 });
         if let Some(before) = &before {
             let jump = max_abs(command.tau.iter().zip(before).map(|(a, b)| a - b));
-            largest = largest.max(if tick > 650 { jump } else { 0.0 }); // the reference's c̈ jumps at tick 600
+            largest = largest.max(if tick > 650 { jump } else { 0.0 }); // c̈ of the reference jumps at tick 600
         }
         before = Some(command.tau.clone());
         let a = command.a.clone();
@@ -99,9 +101,9 @@ fn fading_contacts_do_not_jerk() {
         }
         advance(&model, &mut q, &mut v, &a, dt);
     }
-    // A tick of the ramp changes the force by 4 N, with a lever of 0.4 m between the feet. The last tick also moves the
-    // friction that these 4 N allow to the other foot: 2.7 N, which accelerate the centre of mass. Its lever is 0.9 m,
-    // the height of the hips.
+    // A tick of the ramp changes the force of the right foot by 4 N, with a lever of 0.4 m between the feet. The last
+    // tick of the ramp also moves the friction force of this foot, 2.7 N, to the other foot. This accelerates the
+    // centre of mass, and the lever is 0.9 m, the height of the hips.
     assert!(largest < 4.0, "a torque jumps by {largest:.3} N m in a tick");
 }
 

@@ -1,4 +1,5 @@
-//! Commands of recorded stands, walks and trots under pushes. Each command is the optimum, and the back ends agree.
+//! Tests of commands at recorded ticks of stands, walks and trots under pushes. Each command must be the optimum, and
+//! the back ends must agree.
 #![allow(non_snake_case)]
 
 mod common;
@@ -12,17 +13,17 @@ use condyle_wholebody::{Backend, Command, Formulation, Friction, Settings, Statu
 use kkt_residuals::{OPTIMALITY, check_optimality};
 use workload::{Robot, Tick, record};
 
-/// Number of recorded ticks: the first step of each foot of a biped, or nine steps of a quadruped.
+/// Number of recorded ticks. They contain the first step of each foot of a biped, or nine steps of a quadruped.
 const TICKS: usize = 2000;
 /// Interval between checked ticks.
 const EACH: usize = 8;
 
-/// Tolerance of objective and q̈, relative to 1 and their size, for solutions with tolerances 1e-14 and 1e-13. An error
-/// of the objective, relative to a few hundred, causes an error of q̈ of the size of its square root. The error is four
-/// times larger where only the posture's weight of 0.1 determines q̈.
+/// Tolerance of objective and q̈ for solutions with tolerances 1e-14 and 1e-13, relative to 1 plus their size. The
+/// objective is a few hundred. A relative error of the objective causes an error of q̈ of about the square root of this
+/// error. Where only the posture's weight of 0.1 determines q̈, the error of q̈ is four times larger.
 const AGREEMENT: f64 = 1e-6;
 
-/// Calls a function for each workload of each robot.
+/// Calls a function for each recording of each robot.
 fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
     for name in ["quadruped", "humanoid"] {
         let robot = Robot::new(name, None).unwrap();
@@ -34,8 +35,8 @@ fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
 }
 
 /// Checks the Karush–Kuhn–Tucker conditions of the assembled program, before any elimination or scaling. Also checks
-/// forces and torques by formulas that the controller does not use: τ = RNEA, Σ f = m (c̈ − g), cones, centres of
-/// pressure.
+/// forces and torques by formulas that the controller does not use: τ from RNEA, Σ f = m (c̈ − g), cones, and centres
+/// of pressure.
 #[test]
 fn every_command_is_optimal() {
     all(|robot, what, ticks| {
@@ -51,8 +52,8 @@ fn every_command_is_optimal() {
     });
 }
 
-/// Compares two solvers. Condyle's own solver gets the condensed program and warm starts; clarabel gets the full
-/// program and cold starts.
+/// Compares the commands of two solvers. Condyle's own solver gets the condensed program and warm starts. Clarabel gets
+/// the full program and cold starts.
 #[test]
 fn back_ends_agree_on_every_command() {
     all(|robot, what, ticks| {
@@ -69,7 +70,7 @@ fn back_ends_agree_on_every_command() {
             let expected = theirs.step(q, v, references).solved().unwrap().clone();
             compared += 1;
             if expected.reduced_accuracy || reduced_accuracy || status != Status::Solved {
-                reduced += 1; // one of the solvers missed the accuracy that the comparison needs
+                reduced += 1; // one of the solvers was too inaccurate for the comparison
                 continue;
             }
             let expected = expected.a;
@@ -84,7 +85,8 @@ fn back_ends_agree_on_every_command() {
     });
 }
 
-/// A larger set of forces cannot raise the optimal cost: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+/// Checks that a larger set of forces does not raise the optimal cost: inscribed pyramid ⊂ cone ⊂ circumscribed
+/// pyramid.
 #[test]
 fn optima_on_cones_lie_between_those_on_pyramids() {
     let mut differ = 0;
@@ -106,8 +108,8 @@ fn optima_on_cones_lie_between_those_on_pyramids() {
     assert!(differ > 0, "friction never mattered");
 }
 
-/// In a trot, contacts fade in and out twice in half a second. Nevertheless only 1 tick in 100 takes more than a few
-/// iterations; a cold start takes about ten.
+/// Checks warm starts in a trot, in which contacts fade in and out twice in half a second. Only 1 tick in 100 may take
+/// more than a few iterations; a cold start takes about ten.
 #[test]
 fn contacts_that_come_and_go_need_no_new_start() {
     let robot = Robot::new("quadruped", None).unwrap();

@@ -8,14 +8,14 @@ use condyle_dynamics::{
 use rand::RngExt;
 use rand::rngs::StdRng;
 
-/// Maximum condition number of Λ. Sets of constraints with a larger condition number are too inaccurate for a test of
-/// the algorithm.
+/// Maximum condition number of Λ. With a larger condition number, rounding errors are too large for a test of the
+/// algorithm.
 const WORST_CONDITION: f64 = 1e4;
 
 const KINDS: [ConstraintKind; 4] =
     [ConstraintKind::Point, ConstraintKind::Rigid, ConstraintKind::Line, ConstraintKind::Plane];
 
-/// Returns a contact or loop of a random kind, in a random reference frame, with random gains and targets.
+/// Returns a random contact or loop constraint, in a random reference frame, with random gains and targets.
 pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConstraint {
     let frames = model.frames().len();
     let motion = |rng: &mut StdRng| Motion::new(normal3(rng), normal3(rng));
@@ -37,7 +37,7 @@ pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConst
     }
 }
 
-/// Returns random constraints that the robot can satisfy at a state, and for which the constraint forces are unique.
+/// Returns random constraints that the robot can satisfy at a state. The constraint forces are unique.
 pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng) -> Vec<ContactConstraint> {
     let mut chosen = Vec::new();
     let mut data = Data::new(model);
@@ -55,8 +55,8 @@ pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng)
     chosen
 }
 
-/// Returns models, each with a state and constraints. At this state, the robot can satisfy the constraints, and the
-/// constraint forces are unique.
+/// Returns models, each with a state and constraints that the model can satisfy at this state. The constraint forces
+/// are unique.
 pub(crate) fn cases(trees: u64) -> Vec<(Model, State, Vec<ContactConstraint>)> {
     let with_constraints = |(seed, model): (usize, Model)| {
         let mut rng = rng(seed as u64);

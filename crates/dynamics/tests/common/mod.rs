@@ -1,5 +1,5 @@
 //! Random robots and states, and functions that compare numbers.
-#![allow(dead_code)] // each test file uses a part of it
+#![allow(dead_code)] // each test file uses only some of the functions
 
 pub(crate) mod contacts;
 pub(crate) mod panics;
@@ -63,13 +63,14 @@ pub(crate) fn embedded() -> [Model; 3] {
 /// Body of a random tree, and the joint that carries it.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
-    /// Index of the parent; 0 is the world.
+    /// Index of the parent body; 0 is the world.
     pub(crate) parent: usize,
     pub(crate) joint: Joint,
     pub(crate) placement: Se3<f64>,
     pub(crate) inertia: Inertia<f64>,
     pub(crate) armature: f64,
-    /// Index of the part whose joint leads, and the relation, if the joint of this part follows another joint.
+    /// Index of the part with the leading joint, and the relation to its position. It is `None` if the joint follows no
+    /// other joint.
     pub(crate) mimic: Option<(usize, Mimic)>,
     /// Placement of a frame on the body.
     pub(crate) frame: Se3<f64>,
@@ -81,13 +82,13 @@ pub(crate) struct Part {
 pub(crate) struct Tree {
     pub(crate) parts: Vec<Part>,
     pub(crate) gravity: Vec3<f64>,
-    /// Whether the passive efforts of the robot are smooth functions: they contain neither |v| nor |Δ|.
+    /// Whether the passive efforts are smooth functions of the state. Smooth efforts contain neither |v| nor |Δ|.
     pub(crate) smooth: bool,
 }
 
 impl Tree {
-    /// Creates a robot with every kind of joint in random order on random parents. Axes of revolute and prismatic
-    /// joints are both parallel to coordinate axes and oblique.
+    /// Creates a robot with every type of joint in random order on random parents. Revolute and prismatic joints have
+    /// axes parallel to coordinate axes, and also oblique axes.
     pub(crate) fn random(rng: &mut StdRng) -> Self {
         let e = |k: usize, s: f64| Vec3::from(core::array::from_fn(|i| if i == k { s } else { 0.0 }));
         let mut kinds = vec![
@@ -108,7 +109,7 @@ impl Tree {
         kinds.shuffle(rng);
         let mut tree = Self { parts: Vec::new(), gravity: normal3(rng).scale(5.0), smooth: false };
         for joint in kinds {
-            // half of the bodies have the previous body as parent, so that some branches are long
+            // Half of the bodies have the previous body as parent, which makes some branches long.
             let n = tree.parts.len();
             let parent = if rng.random::<bool>() { n } else { rng.random_range(0..=n) };
             tree.add(rng, parent, joint);
@@ -116,8 +117,9 @@ impl Tree {
         tree
     }
 
-    /// Creates the same robot with additional joints that follow other joints: in the leader's branch, in other
-    /// branches, with several followers of one leader, and with negative ratios.
+    /// Creates a random robot like `random` does, with additional joints that follow other joints. Followers
+    /// are in the leader's branch and in other branches, a leader may have several followers, and ratios may be
+    /// negative.
     pub(crate) fn random_with_mimics(rng: &mut StdRng) -> Self {
         let mut tree = Self::random(rng);
         let n = tree.parts.len();
@@ -134,7 +136,7 @@ impl Tree {
         tree.follow(far_below, leader, 1.0, 0.0);
         tree.follow(across, leader, 0.4, -0.2);
         tree.follow(earlier, between, 1.5, 0.1); // the follower has a lower index than the leader
-        // continuous joints are leaders and followers too
+        // Continuous joints can also be leaders and followers.
         let endless = tree.add(rng, below, Joint::Continuous { axis: e });
         let backwards = tree.add(rng, endless, Joint::Revolute { axis: a });
         let faster = tree.add(rng, 0, Joint::Continuous { axis: d });
@@ -202,14 +204,14 @@ impl Tree {
     }
 }
 
-/// Returns damping (with or without a polynomial) and friction of the i-th joint.
+/// Returns the damping (with or without a polynomial) and the friction of joint i.
 fn losses(i: usize, smooth: bool) -> JointOptions {
     let damping_polynomial = if i.is_multiple_of(2) { [if smooth { 0.0 } else { 0.02 }, 0.03] } else { [0.0; 2] };
     let friction = if i.is_multiple_of(3) { 0.2 } else { 0.0 };
     JointOptions { damping: 0.1 + 0.05 * (i % 3) as f64, damping_polynomial, friction, ..JointOptions::default() }
 }
 
-/// Returns a position of a joint at which the spring of the joint is at rest.
+/// Returns a position of a joint at which the joint's spring is at rest.
 fn rest(joint: Joint) -> &'static [f64] {
     match joint {
         Joint::Continuous { .. } => &[0.6, 0.8],
@@ -221,8 +223,8 @@ fn rest(joint: Joint) -> &'static [f64] {
     }
 }
 
-/// Returns the efforts caused by an armature a: a q̈, and a (v̇ + ω × v) for the linear coordinates of a free joint.
-#[allow(dead_code)] // used by some of the tests
+/// Returns the efforts caused by an armature a: a q̈, or a (v̇ + ω × v) for the linear coordinates of a free joint.
+#[allow(dead_code)] // only some of the tests use this function
 pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
     let mut tau: Vec<f64> = model.armature().iter().zip(a).map(|(armature, a)| armature * a).collect();
     for body in model.bodies()[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
@@ -235,8 +237,8 @@ pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
     tau
 }
 
-/// Creates a robot that does not move: two bodies fixed to the world, and a frame.
-#[allow(dead_code)] // used by some of the tests
+/// Creates a robot without moving bodies: two bodies fixed to the world, and a frame.
+#[allow(dead_code)] // only some of the tests use this function
 pub(crate) fn fixed() -> Model {
     let rng = &mut rng(0);
     let mut builder = ModelBuilder::new("fixed");
@@ -246,8 +248,8 @@ pub(crate) fn fixed() -> Model {
     builder.build().expect("a robot need not move")
 }
 
-/// Returns the embedded robots, a copy of one with an apparent mass of the base, and random trees with and without
-/// mimic joints.
+/// Returns the embedded robots, a copy of an embedded robot with an apparent mass of the base, and random trees with
+/// and without mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();
     models.push(robots::quadruped().with_armature(&[0.7; 18]).expect("three equal numbers"));
@@ -258,8 +260,8 @@ pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     models
 }
 
-/// Creates a tree of n joints: hinges, and one slide in four joints. `parent` gives the index of a body's parent. With
-/// `floating`, the first joint is a free-flyer.
+/// Creates a tree of n joints. Every fourth joint is prismatic, and the others are revolute. `parent` gives the index
+/// of a body's parent. If `floating` is true, the first joint is a free-flyer.
 pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) -> Model {
     let rng = &mut rng(n as u64);
     let mut builder = ModelBuilder::new("tree");
@@ -278,7 +280,7 @@ pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) ->
     builder.build().expect("a tree is well-formed")
 }
 
-/// Returns three long trees: a chain on the world, a chain on a floating base, and a tree whose branches have branches.
+/// Returns three long trees: a chain on the world, a chain on a floating base, and a tree whose branches divide again.
 pub(crate) fn long_branches() -> [Model; 3] {
     [
         tree(53, false, |i| i - 1),
@@ -299,7 +301,7 @@ pub(crate) struct State {
     pub(crate) v: Vec<f64>,
     pub(crate) a: Vec<f64>,
     pub(crate) tau: Vec<f64>,
-    /// Force on each body. The force on the world must have no effect.
+    /// External force on each body, including the world. The force on the world must have no effect.
     pub(crate) f_ext: Vec<Force<f64>>,
 }
 
@@ -345,7 +347,7 @@ pub(crate) fn moved<S: Scalar>(model: &Model, q: &[S], d: &[S]) -> Vec<S> {
     out
 }
 
-/// Computes the placement of a body in its parent as in textbooks, by Rodrigues' formula about the axis of the joint.
+/// Computes the placement of a body in its parent by Rodrigues' formula about the joint's axis, as in textbooks.
 pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
     let turn = |w: Vec3<f64>| lie::exp3(w).to_rotation();
     let z = Vec3::new(0.0, 0.0, 1.0);
@@ -363,8 +365,8 @@ pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
     Se3::new(rotation, translation)
 }
 
-/// Computes the position of joint i from its own kind: for a follower, ratio · q + offset, where q is the position of
-/// the leader as an angle.
+/// Computes the position of joint i in the coordinates of its own type. For a follower it is ratio · q + offset, where
+/// q is the leader's position as an angle.
 pub(crate) fn own_position(model: &Model, i: usize, q: &[f64]) -> Vec<f64> {
     let body = &model.bodies()[i];
     let Some(Mimic { ratio, offset }) = body.mimic else { return q[body.idx_q..body.idx_q + body.joint.nq()].to_vec() };
@@ -388,7 +390,7 @@ pub(crate) fn relative(a: &[f64], b: &[f64]) -> f64 {
     difference / (1.0 + b.iter().map(|b| b.abs()).fold(0.0, largest))
 }
 
-/// Largest error that was found so far, and the tolerance for this error.
+/// Largest error found in a test, and the tolerance of this error.
 pub(crate) struct Worst {
     name: &'static str,
     tolerance: f64,
@@ -400,7 +402,7 @@ impl Worst {
         Self { name, tolerance, error: 0.0 }
     }
 
-    /// Fails if the relative error exceeds the tolerance.
+    /// Compares two results. Fails if their relative error exceeds the tolerance.
     #[track_caller]
     pub(crate) fn see(&mut self, model: &Model, found: &[f64], expected: &[f64]) {
         let error = relative(found, expected);

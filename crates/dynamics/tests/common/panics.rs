@@ -1,11 +1,12 @@
-//! Checks of the location that a panic reports.
+//! Checks of the source location that a panic reports.
 
 #[path = "../../../../tests/common/panics.rs"]
 mod shared;
 
 pub(crate) use shared::{Panic, panic_of};
 
-/// Fails unless `call` panics with a message that contains `expected`, at a file whose path ends with `end`.
+/// Fails unless `call` panics with a message that contains `expected`. The file that the panic reports must have a path
+/// that ends with `end`.
 #[track_caller]
 pub(crate) fn assert_panic(end: &str, expected: &str, call: impl FnOnce()) {
     let Panic { file, message, .. } = panic_of(call).unwrap_or_else(|| panic!("expected a panic: {expected}"));

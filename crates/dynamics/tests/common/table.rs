@@ -1,6 +1,6 @@
-//! Table of every function that a control loop calls. Tests use it for properties that all functions must have.
+//! Table of every function that a control loop calls. Tests apply the same checks to all functions of the table.
 //!
-//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not in this table, because rayon allocates when threads
+//! The table does not contain [`DivideConquer`](condyle_dynamics::DivideConquer), because rayon allocates when threads
 //! synchronise.
 
 use super::{State, lift, lift_forces};
@@ -21,13 +21,13 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 
-/// Arguments with which the functions of this file's table are called.
+/// Arguments of the functions in this file's table.
 #[derive(Clone, Debug)]
 pub(crate) struct Input<S> {
     pub(crate) q: Vec<S>,
     pub(crate) q1: Vec<S>,
     pub(crate) v: Vec<S>,
-    /// Accelerations or joint efforts.
+    /// Accelerations q̈, or joint efforts τ.
     pub(crate) x: Vec<S>,
     pub(crate) f_ext: Vec<Force<S>>,
 }
@@ -52,7 +52,7 @@ impl<S: Scalar> Input<S> {
     }
 }
 
-/// Results of the functions in this file's table, and scratch that is not part of a `Data`.
+/// Results of the functions in this file's table, and scratch memory that is not part of a `Data`.
 pub(crate) struct Output<S: Scalar> {
     pub(crate) numbers: Vec<S>,
     q: Vec<S>,
@@ -93,12 +93,12 @@ impl<S: Scalar> Output<S> {
         }
     }
 
-    /// Appends the state after a step of 1 ms, then 1 if the step was taken, else 0.
+    /// Makes a step of 1 ms. Appends the state after the step, and then 1 if the step was taken, otherwise 0.
     fn step(&mut self, integrator: Integrator, i: &Input<S>) {
         self.simulation.settings.integrator = integrator;
         self.simulation.settings.passive = Some(0.1);
         if self.simulation.set_state(&i.q, &i.v).is_err() {
-            return; // NaN, as the test of hidden order passes it
+            return; // the state is NaN in the test of hidden order
         }
         let taken = self.simulation.step(&i.x, &i.f_ext).is_done();
         self.numbers.extend_from_slice(self.simulation.q());
@@ -113,8 +113,8 @@ impl<S: Scalar> Output<S> {
     }
 }
 
-/// Returns a contact and a loop, with one more iteration than needed. If the robot cannot move, or the bodies have no
-/// frames for these constraints, returns no constraints.
+/// Returns a contact and a loop constraint, with one iteration more than needed. The set is empty if the robot cannot
+/// move, or if its bodies have no frames for these constraints.
 fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let last = model.bodies().len() - 1;
     let frame = |body: usize| model.frames().iter().position(|f| f.body == body).filter(|_| last > 0);
@@ -129,7 +129,7 @@ fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     set
 }
 
-/// Returns the inputs on which inverse and forward dynamics depend, besides q, v, q̈ and τ.
+/// Returns the inputs of inverse and forward dynamics other than q, v, q̈ and τ.
 fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
     use condyle_dynamics::Input::*;
     let last = model.bodies().len() - 1;
@@ -137,7 +137,7 @@ fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
     [Force(last), inertia, Gravity, Armature, Damping, Friction { smoothing: 0.1 }]
 }
 
-/// Functions that need no `Data`, or that create a `Data` themselves.
+/// Names of the functions that need no `Data`, or that create a `Data` themselves.
 const WITHOUT_DATA: [&str; 10] = [
     "integrate",
     "difference",
@@ -158,16 +158,16 @@ pub(crate) fn has_data(name: &str) -> bool {
 /// Maximum number of Newton iterations in a simulated step. Three iterations are enough from random states.
 const ITERATIONS: usize = 5;
 
-/// Returns whether a function couples the lanes. A simulation takes a step in all lanes or in no lane, and Newton's
-/// method iterates until all lanes have converged.
+/// Returns whether the result in one lane depends on the other lanes. In a simulation, all lanes take a step or no lane
+/// does, and Newton's method iterates until all lanes have converged.
 pub(crate) fn in_step(name: &str) -> bool {
     name.starts_with("simulation")
 }
 
 pub(crate) type Function<S> = fn(&Model, &mut Data<S>, &Input<S>, &mut Output<S>);
 
-/// Returns the name and a call of each function that is compiled as a whole for every SIMD level. A call allocates only
-/// if the function allocates.
+/// Returns each function that is compiled as a whole for every SIMD level: its name and a closure that calls it. The
+/// closure allocates only if the function allocates.
 pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     [
         ("rnea", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
@@ -207,7 +207,8 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     ]
 }
 
-/// Returns the name and a call of each function. A call allocates only if the function allocates.
+/// Returns each function of the table: its name and a closure that calls it. The closure allocates only if the function
+/// allocates.
 pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
     let others: [(&'static str, Function<S>); 42] = [
         ("rnea_derivatives by all other inputs", |m, d, i, o| {

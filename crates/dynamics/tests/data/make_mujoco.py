@@ -1,7 +1,9 @@
-"""Reference numbers of MuJoCo 4.0.0 for tests/suite/mjcf.rs: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
+"""Writes the reference numbers of MuJoCo 4.0.0 for tests/suite/mjcf.rs and tests/suite/springs.rs.
 
-The numbers follow MuJoCo's conventions: quaternions begin with w, and the linear velocity of a free joint is in the
-world's frame. The test converts these numbers.
+Usage: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
+
+The numbers for mjcf.rs follow MuJoCo's conventions: quaternions begin with w, and the linear velocity of a free joint
+is in the world's frame. The test converts these numbers.
 """
 
 import json
@@ -14,7 +16,7 @@ assert mujoco.__version__ == "4.0.0"
 here = pathlib.Path(__file__).parent
 for name in ["arm", "quadruped"]:
     text = (here / f"{name}.xml").read_text()
-    # remove the mesh, because MuJoCo would read a file that does not exist; the mesh has no mass
+    # Remove the mesh, which has no mass, because MuJoCo would read its file, and this file does not exist.
     lines = [line for line in text.splitlines() if "mesh" not in line]
     assets = {p.name: p.read_bytes() for p in here.glob("*_defaults.xml")}
     model = mujoco.MjModel.from_xml_string("\n".join(lines), assets)
@@ -62,8 +64,8 @@ for name in ["arm", "quadruped"]:
         )
     (here / f"{name}_mujoco.json").write_text(json.dumps(out) + "\n")
 
-# Joints that follow other joints: positions at which MuJoCo's equality constraints hold, and results at them.
-# All numbers are in the coordinates of the leaders: v = G v_leaders.
+# The gripper has joints that follow other joints. The positions satisfy MuJoCo's equality constraints.
+# All numbers are in the coordinates of the leading joints: v = G v_leaders.
 model = mujoco.MjModel.from_xml_path(str(here / "gripper.xml"))
 data = mujoco.MjData(model)
 rng = np.random.default_rng(1)
@@ -98,9 +100,9 @@ for _ in range(3):
     )
 (here / "gripper_mujoco.json").write_text(json.dumps(out))
 
-# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/springs.rs.
-# These numbers follow Condyle's conventions.
-# Quaternions end with w, and the linear velocity of a free joint is in the body's axes.
+# The robot of passive.xml has springs, polynomial damping, gravity compensation and the armature of a free joint.
+# The numbers for tests/suite/springs.rs follow Condyle's conventions: quaternions end with w.
+# In these numbers, the linear velocity of a free joint is in the body's axes.
 model = mujoco.MjModel.from_xml_path(str(here / "passive.xml"))
 data = mujoco.MjData(model)
 rng = np.random.default_rng(1)

@@ -1,4 +1,7 @@
-"""Reference numbers of Pinocchio for tests/suite/mimic.rs: `pip install pin==4.1.0`, `python make_pinocchio.py`."""
+"""Writes the reference numbers of Pinocchio for tests/suite/mimic.rs.
+
+Usage: `pip install pin==4.1.0`, then `python make_pinocchio.py`.
+"""
 
 import json
 import pathlib

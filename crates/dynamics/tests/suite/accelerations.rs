@@ -1,4 +1,5 @@
-//! Velocities, accelerations and rates of Jacobians, compared with derivatives in time by dual numbers.
+//! Tests of velocities, accelerations and rates of Jacobians. The results are compared with time derivatives by dual
+//! numbers.
 
 use crate::common;
 
@@ -12,13 +13,13 @@ use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Tolerance of products of about ten matrices.
+/// Tolerance of products of about ten matrices, relative to the largest number.
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 10;
 const REFERENCES: [ReferenceFrame; 3] =
     [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned];
 
-/// Body or frame. Bodies and frames have functions of the same kinds.
+/// Body or frame of a robot. Bodies and frames have functions of the same kinds.
 #[derive(Clone, Copy)]
 enum Place {
     Body(usize),
@@ -62,12 +63,13 @@ impl Place {
     }
 }
 
-/// Returns q ⊕ t v and v + t a, as dual numbers in t.
+/// Returns the position q ⊕ t v and the velocity v + t a, as dual numbers in t.
 fn moving(model: &Model, State { q, v, a, .. }: &State) -> (Vec<Dual64>, Vec<Dual64>) {
     (moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v)), dual(v, a))
 }
 
-/// In each reference frame, J v is the velocity, and dJ v + J a is the time derivative of this velocity.
+/// Checks in each reference frame that J v is the velocity, and that dJ v + J a is the time derivative of this
+/// velocity.
 #[test]
 fn velocities_and_their_rates() {
     let mut first = Worst::new("J v = velocity", ROUNDING);
@@ -80,7 +82,7 @@ fn velocities_and_their_rates() {
         let k = forward_accelerations(model, &mut data, &state.q, &state.v, &state.a);
         let (q_moving, v_moving) = moving(model, &state);
         let k_moving = forward_velocities(model, &mut duals, &q_moving, &v_moving);
-        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // tests that the function overwrites all entries
+        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // NaN, to find entries that are not overwritten
         let mut dJ = J.clone();
         for place in places(model) {
             for r in REFERENCES {
@@ -108,7 +110,7 @@ fn velocities_and_their_rates() {
     }
 }
 
-/// dJ is the derivative of J along v, column by column.
+/// Checks that dJ is the derivative of J along v, column by column.
 #[test]
 fn jacobian_rates() {
     let mut worst = Worst::new("dJ = d/dt J", ROUNDING);
@@ -133,8 +135,8 @@ fn jacobian_rates() {
     }
 }
 
-/// The spatial acceleration is the rate of the spatial velocity, and the classical acceleration is the rate of a
-/// point's velocity. Both accelerations are expressed in each reference frame.
+/// Checks the accelerations in each reference frame. The spatial acceleration is the rate of the spatial velocity, and
+/// the classical acceleration is the rate of a point's velocity.
 #[test]
 fn accelerations() {
     let mut spatial = Worst::new("spatial acceleration", ROUNDING);
@@ -164,7 +166,7 @@ fn accelerations() {
             classical.see(model, &place.classical_acceleration(&k, aligned).to_array(), &p_rate.to_array());
             let turned = at_origin.act_inv(p_rate);
             classical.see(model, &place.classical_acceleration(&k, local).to_array(), &turned.to_array());
-            // the reference frame `World` describes the point of the body that is at the world's origin
+            // The reference frame `World` describes the point of the body that is at the world's origin.
             let (v, a) = (place.velocity(&k, world), place.acceleration(&k, world));
             let expected = Motion::new(a.linear + v.angular.cross(v.linear), a.angular);
             classical.see(model, &place.classical_acceleration(&k, world).to_array(), &expected.to_array());
@@ -172,7 +174,8 @@ fn accelerations() {
     }
 }
 
-/// Results with accelerations also provide the functions for velocities and placements, and these give the same bits.
+/// Checks that results with accelerations also contain velocities and placements, and results with velocities also
+/// contain placements. Equal quantities must have the same bits.
 #[test]
 fn one_hierarchy() {
     for model in all_models(2) {
@@ -192,7 +195,7 @@ fn one_hierarchy() {
     }
 }
 
-/// Each argument of each function of kinematics, statics and momentum is passed with one number too few. The panic must
+/// Passes each argument of each function of kinematics, statics and momentum with one number too few. The panic must
 /// name the argument.
 #[test]
 fn wrong_lengths_name_the_argument() {

@@ -1,4 +1,4 @@
-//! No function that a control loop calls allocates, once a `Data` exists.
+//! Test that the functions of a control loop do not allocate memory, once a `Data` exists.
 
 use crate::common::table::{Input, Output, functions};
 use crate::common::{all_models, rng};
@@ -6,8 +6,8 @@ use crate::counting::allocations;
 use condyle_dynamics::{Data, Scalar};
 use num_dual::Dual64;
 
-/// Checks from the first call on: with the three embedded robots, a tree with every joint type, and a tree with mimic
-/// joints.
+/// Checks every call, including the first, on the three embedded robots, a tree with every joint type, and a tree with
+/// mimic joints.
 fn check<S: Scalar>() {
     for (seed, model) in all_models(1).iter().enumerate() {
         let input = Input::<S>::random(model, &mut rng(seed as u64));

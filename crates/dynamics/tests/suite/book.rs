@@ -1,4 +1,4 @@
-//! Inverse dynamics, the inertia matrix and forward dynamics, as Featherstone's book formulates them. The results are
+//! Inverse dynamics, the inertia matrix and forward dynamics in the formulation of Featherstone's book. The results are
 //! compared with the results of this library.
 
 use crate::common;
@@ -20,7 +20,7 @@ fn motion(x: &[f64]) -> Motion<f64> {
     Motion::from(core::array::from_fn(|k| x[k]))
 }
 
-/// Returns the 6 × 6 matrix of a linear map from motions to motions or forces.
+/// Returns the 6 × 6 matrix of a linear map, given as a function from motions to motions or forces.
 fn matrix(map: impl Fn(Motion<f64>) -> [f64; 6]) -> Matrix6<f64> {
     Matrix6::from_columns(&core::array::from_fn::<_, 6, _>(|k| {
         let unit = core::array::from_fn(|i| if i == k { 1.0 } else { 0.0 });
@@ -33,8 +33,8 @@ struct Book<'a> {
     model: &'a Model,
     /// Placement of each body i in its parent λ.
     X: Vec<Se3<f64>>,
-    /// Motion subspaces, 6 × nv each. A joint that follows another joint has its column at the coordinate of the
-    /// leader.
+    /// Motion subspaces, 6 × nv each. The column of a joint that follows another joint is at the index of the leader's
+    /// coordinate.
     S: Vec<Matrix6xX<f64>>,
 }
 
@@ -109,8 +109,8 @@ impl<'a> Book<'a> {
         tau.as_slice().to_vec()
     }
 
-    /// Computes M by table 6.2 of the book. The products of pairs of joints are added, because several pairs contribute
-    /// to an entry of M if joints share a coordinate.
+    /// Computes M by table 6.2 of the book. If joints share a coordinate, several pairs of joints contribute to an
+    /// entry of M. So the products of pairs are added.
     fn crba(&self) -> DMatrix<f64> {
         let mut Ic = self.inertias();
         let mut M = DMatrix::from_diagonal(&DVector::from_column_slice(self.model.armature()));
@@ -177,8 +177,8 @@ impl<'a> Book<'a> {
     }
 }
 
-/// The library gives the results of the book on the embedded robots and on random trees. The trees have every kind of
-/// joint, armature, and forces on all bodies.
+/// Checks that the library gives the results of the book on the embedded robots and on random trees. The trees have
+/// every type of joint, armature, and forces on all bodies.
 #[test]
 fn the_book_gives_the_same() {
     let mut efforts = Worst::new("rnea = table 5.1", ROUNDING);
@@ -199,7 +199,7 @@ fn the_book_gives_the_same() {
             let expected = book.aba(&state);
             accelerations.see(model, aba(model, &mut data, &q, &v, &effort, &f_ext), &expected);
         } else {
-            // The book's recursion is not possible where joints share a coordinate, so M q̈ = τ − h is solved instead.
+            // The book's recursion does not support joints that share a coordinate: solve M q̈ = τ − h instead.
             state.a.fill(0.0);
             let right = DVector::from_column_slice(&effort) - DVector::from_vec(book.rnea(&state));
             let expected = M.cholesky().expect("M is positive definite").solve(&right);

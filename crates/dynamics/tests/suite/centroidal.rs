@@ -1,5 +1,5 @@
-//! Centre of mass, centroidal momentum, energies, and the function that computes all terms at once. They are compared
-//! with time derivatives by dual numbers and with other algorithms.
+//! Tests of centre of mass, centroidal momentum, energies, and the function that computes all terms at once. The
+//! results are compared with time derivatives by dual numbers and with other algorithms.
 
 use crate::common;
 
@@ -22,12 +22,12 @@ fn vector(x: &[f64]) -> DVector<f64> {
     DVector::from_column_slice(x)
 }
 
-/// Returns q ⊕ t v, as dual numbers in t.
+/// Returns the position q ⊕ t v, as dual numbers in t.
 fn moving(model: &Model, q: &[f64], v: &[f64]) -> Vec<Dual64> {
     moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v))
 }
 
-/// ċ = Jcom v and c̈ equal time derivatives by dual numbers, and the linear momentum is m ċ.
+/// Checks that ċ = Jcom v and c̈ equal time derivatives by dual numbers, and that the linear momentum is m ċ.
 #[test]
 fn centre_of_mass() {
     let mut place = Worst::new("c = Σ m_i c_i / m", ROUNDING);
@@ -55,8 +55,8 @@ fn centre_of_mass() {
     }
 }
 
-/// hg = Ag v. dAg is the rate of Ag, and dhg = Ag a + dAg v is the rate of hg. Ig is the inertia of all bodies as one
-/// rigid body.
+/// Checks the centroidal momentum hg = Ag v and its rate dhg = Ag a + dAg v, where dAg is the rate of Ag. Ig must be
+/// the inertia of all bodies as one rigid body.
 #[test]
 fn momentum() {
     let mut momentum = Worst::new("Ag v = hg", ROUNDING);
@@ -91,7 +91,7 @@ fn momentum() {
     }
 }
 
-/// Only weight and external forces change the momentum of a floating robot: dhg = [m g; 0] + Σ f_ext.
+/// Checks that only weight and external forces change the momentum of a floating robot: dhg = [m g; 0] + Σ f_ext.
 #[test]
 fn newton_and_euler() {
     let mut worst = Worst::new("dhg = [m g; 0] + Σ f_ext", INVERTED);
@@ -111,7 +111,7 @@ fn newton_and_euler() {
     }
 }
 
-/// T = ½ vᵀ M v, ∂V/∂q = g, d(T + V)/dt = vᵀ τ.
+/// Checks the kinetic energy T and the potential energy V: T = ½ vᵀ M v, ∂V/∂q = g, d(T + V)/dt = vᵀ τ.
 #[test]
 fn energies() {
     let mut kinetic = Worst::new("T = ½ vᵀ M v", ROUNDING);
@@ -136,7 +136,7 @@ fn energies() {
     }
 }
 
-/// All terms equal the results of the single algorithms.
+/// Checks the function that computes all terms at once: each term must equal the result of the single algorithm.
 #[test]
 fn all_terms() {
     let mut worst = Worst::new("compute_all_terms", ROUNDING);

@@ -1,4 +1,4 @@
-//! Worked examples: robots whose equations of motion are given in textbooks.
+//! Tests of robots whose equations of motion are given in textbooks.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-13;
 const G: f64 = 9.81;
 const Z: Vec3<f64> = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
 
-/// Link of a planar arm: length, distance of the centre of mass along the link, mass, and inertia about the centre of
+/// Link of a planar arm: length, distance from the joint to the centre of mass, mass, and inertia about the centre of
 /// mass.
 #[derive(Clone, Copy)]
 struct Link {
@@ -34,13 +34,13 @@ fn along_x(x: f64) -> Se3<f64> {
     Se3::new(Mat3::identity(), Vec3::new(x, 0.0, 0.0))
 }
 
-/// Creates an arm with hinges about z and gravity along −y; the whole world is rotated by R.
+/// Creates a planar arm with hinges about z and gravity along −y. The rotation R turns the arm and gravity together.
 fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     let mut builder = ModelBuilder::new("planar arm");
     builder.gravity(R * Vec3::new(0.0, -G, 0.0));
     let (mut parent, mut placement) = (WORLD, Se3::new(R, Vec3::new(0.3, -0.2, 0.1)));
     for (i, link) in links.iter().enumerate() {
-        // the arm only rotates about z, so the other moments of inertia have no effect
+        // The arm rotates only about z, so the other moments of inertia have no effect.
         let inertia = Inertia::from_com(link.m, Vec3::new(link.c, 0.0, 0.0), Sym3::diagonal(link.I));
         parent = builder.body(&format!("link{i}"), parent, Joint::Revolute { axis: Z }, placement, inertia);
         placement = along_x(link.l);
@@ -48,8 +48,8 @@ fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     builder.build().unwrap()
 }
 
-/// The dynamics of a planar arm with two links equal the equations in Spong, Hutchinson, Vidyasagar, *Robot Modeling
-/// and Control* (2006), section 7.3.2.
+/// Checks a planar arm with two links against the equations in Spong, Hutchinson, Vidyasagar, *Robot Modeling and
+/// Control* (2006), section 7.3.2.
 #[test]
 fn two_links() {
     let [a, b, _] = LINKS;
@@ -77,8 +77,8 @@ fn two_links() {
     }
 }
 
-/// A planar arm with three links, in absolute angles θ_i = q_1 + … + q_i: T = ½ Σ A_ij cos(θ_i − θ_j) θ̇_i θ̇_j with
-/// A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj. A torque that turns link i also acts on all links before it.
+/// Checks a planar arm with three links, in absolute angles θ_i = q_1 + … + q_i: T = ½ Σ A_ij cos(θ_i − θ_j) θ̇_i θ̇_j
+/// with A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj. A torque that turns link i also acts on all links before it.
 #[test]
 fn three_links() {
     let arm = |k: usize, i: usize| match k.cmp(&i) {
@@ -121,12 +121,12 @@ fn three_links() {
     }
 }
 
-/// A rod hangs at θ = 0 on a horizontal hinge: (I + m c² + rotor) θ̈ = τ − m g c sin θ.
+/// Checks a rod that hangs at θ = 0 on a horizontal hinge: (I + m c² + rotor) θ̈ = τ − m g c sin θ.
 #[test]
 fn pendulum() {
     let (m, c, I, rotor) = (1.7, 0.6, 0.09, 0.05);
     let inertia = Inertia::from_com(m, Vec3::new(0.0, 0.0, -c), Sym3::diagonal(I));
-    let axis = Vec3::new(0.0, 3.0, 0.0); // of any length
+    let axis = Vec3::new(0.0, 3.0, 0.0); // an axis may have any length
     for joint in [Joint::Revolute { axis }, Joint::Continuous { axis }] {
         let mut builder = ModelBuilder::new("pendulum");
         let options = JointOptions { armature: rotor, ..JointOptions::default() };
@@ -143,11 +143,12 @@ fn pendulum() {
     }
 }
 
-/// A pendulum released at 2 rad swings with the period 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)). K is the complete
-/// elliptic integral, agm the arithmetic-geometric mean.
+/// Checks the period of a pendulum released at 2 rad: 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)). K is the complete
+/// elliptic integral, and agm is the arithmetic-geometric mean.
 #[test]
 fn period_of_a_pendulum() {
-    /// Number of steps, and tolerance. The error of the Runge–Kutta method is (0.001)⁴ times a fifth derivative.
+    /// Number of steps. The error of the Runge–Kutta method is (0.001)⁴ times a fifth derivative, from which the
+    /// tolerance follows.
     const STEPS: u32 = 2000;
     const INTEGRATION: f64 = 1e-10;
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -1.0), Sym3::zero());
@@ -173,8 +174,8 @@ fn period_of_a_pendulum() {
     assert!((q - 2.0).abs() < INTEGRATION && v.abs() < INTEGRATION, "after a period: {q} {v}");
 }
 
-/// A cart on rails carries a pole, which is upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l θ̈ + ẍ cos
-/// θ = g sin θ.
+/// Checks a cart on rails that carries a pole, which is upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l
+/// θ̈ + ẍ cos θ = g sin θ.
 #[test]
 fn cart_and_pole() {
     let (M, m, l) = (1.5, 0.4, 0.8);
@@ -194,7 +195,7 @@ fn cart_and_pole() {
     }
 }
 
-/// A free body satisfies Euler's equations J ω̇ = n − ω × J ω. Its centre of mass falls freely, however the body
+/// Checks Euler's equations of a free body, J ω̇ = n − ω × J ω. The centre of mass must fall freely, however the body
 /// rotates.
 #[test]
 fn free_body() {
@@ -212,12 +213,12 @@ fn free_body() {
             let r = Quaternion::new(r[0], r[1], r[2], r[3]).normalize();
             let q = [p.x, p.y, p.z, r.vector.x, r.vector.y, r.vector.z, r.scalar];
             let twist: Vec<f64> = v.to_array().into_iter().chain(w.to_array()).collect();
-            // the body feels a torque n about the centre of mass, but no force except its weight
+            // The effort is a torque n about the centre of mass. Apart from the weight, no force acts.
             let tau = [0.0, 0.0, 0.0, n.x, n.y, n.z];
             let free = n - w.cross(J * w);
             let w_dot = Vec3::new(free.x / J.xx, free.y / J.yy, free.z / J.zz);
             // The acceleration of the origin is gravity minus the contribution of the rotation about the centre of
-            // mass. As it is a spatial acceleration, ω × v is subtracted.
+            // mass. Subtract ω × v to get the spatial acceleration.
             let fall = r.to_rotation().transpose_mul(Vec3::new(0.0, 0.0, -G));
             let v_dot = fall - w_dot.cross(c) - w.cross(w.cross(c)) - w.cross(v);
             let expected: Vec<f64> = v_dot.to_array().into_iter().chain(w_dot.to_array()).collect();
@@ -227,7 +228,7 @@ fn free_body() {
     }
 }
 
-/// A top that stands on its tip satisfies Ī ω̇ = c × m g − ω × Ī ω, with the inertia Ī about the tip.
+/// Checks a top that stands on its tip: Ī ω̇ = c × m g − ω × Ī ω, with the inertia Ī about the tip.
 #[test]
 fn top() {
     let rng = &mut rng(4);
@@ -250,7 +251,7 @@ fn top() {
     }
 }
 
-/// A puck on ice satisfies m (v̇ + ω × v) = f in body coordinates. A point mass in the air satisfies m ẍ = f + m g.
+/// Checks a puck on ice, m (v̇ + ω × v) = f in body coordinates, and a point mass in the air, m ẍ = f + m g.
 #[test]
 fn puck_and_point() {
     let rng = &mut rng(5);
@@ -272,8 +273,8 @@ fn puck_and_point() {
     }
 }
 
-/// One motor drives a wheel, a second wheel with the gear ratio −3, and a rack on the first wheel: (J₁ + 9 J₂ + r² m)
-/// θ̈ = τ.
+/// Checks a motor that drives a wheel, a second wheel with the gear ratio −3, and a rack on the first wheel: (J₁ + 9 J₂
+/// + r² m) θ̈ = τ.
 #[test]
 fn gears() {
     let (J1, J2, m, r) = (0.2, 0.05, 1.5, 0.1);

@@ -1,4 +1,4 @@
-//! Growth of the work of recursive algorithms with the number of bodies. The tests count operations and do not measure
+//! Tests of the growth of an algorithm's work with the number of bodies. The tests count operations and do not measure
 //! times.
 
 use crate::common;
@@ -35,14 +35,14 @@ const SHAPES: [(&str, Shape); 4] = [
     ("caterpillar", |i| if i % 3 == 1 { i.saturating_sub(3) } else { i - 1 }),
 ];
 
-/// Number of bodies that are added at a time. It is a multiple of 3 and 4, because joints repeat after 3 and 4 bodies,
-/// and shapes after 3.
+/// Number of bodies by which trees grow. It is a multiple of 3 and 4, because joint axes repeat after 3 or 4 bodies,
+/// and shapes repeat after 3 bodies.
 const GROUP: usize = 12;
 
-/// Number of operations per hinge, as on the book's page on complexity.
+/// Number of operations of RNEA per hinge, as on the book's page on complexity.
 const RNEA_PER_HINGE: u64 = 245;
 const ABA_PER_HINGE: u64 = 629;
-/// Number of operations of CRBA: per hinge, and per pair of a hinge and one of its ancestors.
+/// Numbers of operations of CRBA: per hinge, and per pair of a hinge and one of its ancestors.
 const CRBA_PER_HINGE: f64 = 276.0;
 const CRBA_PER_PAIR: f64 = 11.0;
 
@@ -58,7 +58,7 @@ fn work(model: &Model) -> [Operations; 3] {
     ]
 }
 
-/// Returns Σ depth, the sum of the depths of all bodies. The depth of a body is the number of its ancestors, plus one.
+/// Returns Σ depth, the sum of the depths of all bodies. The depth of a body is the number of its ancestors plus one.
 fn sum_of_depths(model: &Model) -> u64 {
     let mut depth = vec![0; model.bodies().len()];
     for (i, body) in model.bodies().iter().enumerate().skip(1) {
@@ -67,7 +67,7 @@ fn sum_of_depths(model: &Model) -> u64 {
     depth.iter().sum()
 }
 
-/// RNEA and ABA take the same number of operations for each additional body, for any shape of the tree.
+/// Checks that RNEA and ABA take the same number of operations for each additional body, for any shape of the tree.
 #[test]
 fn work_of_rnea_and_aba_is_linear() {
     for (name, parent) in SHAPES {
@@ -86,8 +86,8 @@ fn work_of_rnea_and_aba_is_linear() {
     }
 }
 
-/// CRBA takes a + b n + c Σ depth operations, with the same a, b and c for all shapes of trees. Σ depth grows like n²
-/// for a chain, n log n for a balanced tree, and n for a star.
+/// Checks that CRBA takes a + b n + c Σ depth operations, with the same a, b and c for all shapes of trees. Σ depth
+/// grows like n² for a chain, like n log n for a balanced tree, and like n for a star.
 #[test]
 fn work_of_crba_is_the_sum_of_depths() {
     let seen: Vec<(f64, f64, f64)> = SHAPES
@@ -95,7 +95,7 @@ fn work_of_crba_is_the_sum_of_depths() {
         .flat_map(|&(_, parent)| [GROUP, 2 * GROUP, 4 * GROUP].map(|n| hinges(n, parent)))
         .map(|model| (model.nv() as f64, sum_of_depths(&model) as f64, work(&model)[1].flops() as f64))
         .collect();
-    // c follows from a chain and a star of 4 groups, and a and b follow from two stars
+    // Compute c from a chain and a star of 4 groups, and a and b from two stars.
     let [chain, star, short] = [seen[2], seen[8], seen[6]];
     let c = (chain.2 - star.2) / (chain.1 - star.1);
     let b = (star.2 - short.2 - c * (star.1 - short.1)) / (star.0 - short.0);
@@ -107,7 +107,7 @@ fn work_of_crba_is_the_sum_of_depths() {
     }
 }
 
-/// With joints of other kinds, the number of operations per body changes, but the growth stays linear.
+/// Checks trees with other joint types: the number of operations per body is different, but the growth is still linear.
 #[test]
 fn with_slides_and_a_floating_base() {
     for floating in [false, true] {
@@ -133,7 +133,7 @@ fn forward(model: &Model, method: ForwardDynamicsMethod) -> Operations {
     counted(|| forward_dynamics(model, &mut data, &q, &v, &tau, &[], Some(method))).0
 }
 
-/// Counts the operations for all terms at once, and for the same terms by one call per term.
+/// Counts the operations of the function for all terms, and of single calls for the same terms.
 fn terms(model: &Model) -> [Operations; 2] {
     let State { q, v, .. } = State::random(model, &mut rng(0));
     let [q, v]: [Vec<Counted>; 2] = [&q, &v].map(|x| lift(x));
@@ -169,7 +169,7 @@ fn factors(model: &Model) -> [Operations; 2] {
     [dense.0, sparse.0]
 }
 
-/// Creates one model with several humanoids.
+/// Creates one model that consists of `n` humanoids.
 fn humanoids(n: usize) -> Model {
     let (one, mut builder) = (robots::humanoid(), ModelBuilder::new("crowd"));
     for k in 0..n {
@@ -178,7 +178,7 @@ fn humanoids(n: usize) -> Model {
     builder.build().expect("robots side by side are one")
 }
 
-/// The tables on the book's page on complexity show the numbers that this test counts.
+/// Checks that the tables on the book's page on complexity contain the numbers that this test counts.
 #[test]
 fn the_book_has_these_figures() {
     let page = include_str!("../../../../docs/complexity.md");

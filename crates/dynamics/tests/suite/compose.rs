@@ -1,4 +1,4 @@
-//! Models that are composed of other models, and paths through the space of positions.
+//! Tests of models that are composed of other models, and of interpolation between positions.
 
 use crate::common;
 
@@ -128,7 +128,8 @@ fn ways_between_positions() {
         difference(&model, &a.q, &b.q, &mut rest);
         assert!((whole - rest.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < ROUNDING * (1.0 + whole));
         interpolate(&model, &a.q, &b.q, 0.3, &mut d, &mut q);
-        // the path has constant velocity, so the length of the rest is proportional to the remaining time
+        // The interpolated motion has constant velocity, so the remaining distance is proportional to the remaining
+        // time.
         assert!((distance(&model, &q, &b.q, &mut rest) - 0.7 * whole).abs() < 1e-10 * (1.0 + whole));
         let mut long: Vec<f64> = q.clone();
         normalize(&model, &mut long);

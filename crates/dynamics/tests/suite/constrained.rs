@@ -1,4 +1,4 @@
-//! Constrained dynamics and impacts: the constraints hold, and only constraint forces enforce them.
+//! Tests of constrained dynamics and impacts. The constraints must hold, and only constraint forces may enforce them.
 
 use crate::common;
 
@@ -13,13 +13,13 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods with some thousand roundings each.
+/// Tolerance between two exact methods with some thousand rounding errors each.
 const EXACT: f64 = 1e-11;
 /// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
 const TREES: u64 = 15;
 
-/// Computes the quantity that a constraint requires to vanish, from the public functions of kinematics. Rates of
+/// Computes the quantity that must vanish according to a constraint, from the public functions of kinematics. Rates of
 /// velocities are time derivatives by dual numbers.
 fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
     let world = ReferenceFrame::World;
@@ -68,7 +68,7 @@ fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64])
     }
 }
 
-/// Returns the entries of a force that belong to a constraint's rows.
+/// Returns the components of a force that the rows of a constraint contain.
 fn in_rows(c: &ContactConstraint, force: Force<f64>) -> Vec<f64> {
     let along = c.axes.transpose_mul(force.linear);
     match c.kind {
@@ -78,7 +78,7 @@ fn in_rows(c: &ContactConstraint, force: Force<f64>) -> Vec<f64> {
     }
 }
 
-/// Computes the joint efforts of a constraint's force, from the public Jacobians.
+/// Computes the joint efforts that are equivalent to a constraint's force, from the public Jacobians.
 fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) -> DVector<f64> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
@@ -100,7 +100,7 @@ fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) ->
     own - J.tr_mul(&DVector::from_row_slice(&oF.to_array()))
 }
 
-/// Every constraint holds, and M q̈ + h − Jᵀ λ = τ. These two equations define the solution.
+/// Checks that every constraint holds and that M q̈ + h − Jᵀ λ = τ. These two equations define the solution.
 #[test]
 fn constraints_hold_by_forces_of_their_own() {
     let mut held = Worst::new("J q̈ + γ", CONDITIONED);
@@ -128,7 +128,7 @@ fn constraints_hold_by_forces_of_their_own() {
     println!("{rows} rows in all");
 }
 
-/// For a contact of a point or a frame, other axes of the rows only change the axes in which λ is expressed.
+/// Checks a contact of a point or a frame in two reference frames. Only the axes in which λ is expressed may differ.
 #[test]
 fn references_turn_forces_only() {
     let mut worst = Worst::new("q̈ in both references", CONDITIONED);
@@ -162,7 +162,7 @@ fn references_turn_forces_only() {
     }
 }
 
-/// Returns a humanoid that stands on both soles with bent knees, its state, and the frames of the soles.
+/// Returns a humanoid that stands on both soles with bent knees, the humanoid's state, and the frames of the soles.
 fn standing() -> (Model, State, [usize; 2]) {
     let model = robots::humanoid();
     let mut state = State::random(&model, &mut rng(7));
@@ -173,8 +173,8 @@ fn standing() -> (Model, State, [usize; 2]) {
     (model, state, soles)
 }
 
-/// Redundant rows are detected and get no force. With the proximal parameter μ, redundant rows share the force, and the
-/// motion is the same.
+/// Checks that redundant rows are detected and get no force. With the proximal parameter μ, redundant rows must share
+/// the force, and the motion must be the same.
 #[test]
 fn redundant_constraints() {
     let (model, s, [left, right]) = standing();
@@ -183,7 +183,7 @@ fn redundant_constraints() {
         ContactConstraint::rigid(left),
         ContactConstraint { reference: ReferenceFrame::LocalWorldAligned, ..ContactConstraint::rigid(right) },
     ];
-    // the frame of the ankle is on the same body as the sole
+    // The frame of the ankle is on the same body as the sole.
     let body = model.frames()[left].body;
     let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
     let twice = [once[0], once[1], ContactConstraint::rigid(again)];
@@ -204,8 +204,8 @@ fn redundant_constraints() {
     }
 }
 
-/// With the proximal parameter μ, the forces of redundant points on a line are the smallest possible forces. They equal
-/// the forces computed with M⁻¹ and a pseudo-inverse.
+/// Checks the forces of redundant points on a line. With the proximal parameter μ, these forces must be the smallest
+/// possible forces. The test computes the smallest forces from M⁻¹ and a pseudo-inverse.
 #[test]
 fn smallest_forces() {
     let mut builder = ModelBuilder::new("box");
@@ -235,8 +235,8 @@ fn smallest_forces() {
     assert!((lambda - smallest).amax() < 1e-6);
 }
 
-/// If two constraints contradict each other, the result is the finite solution for the first constraint, and the
-/// contradiction is reported.
+/// Checks two constraints that contradict each other. The result must be the finite solution for the first constraint,
+/// and the contradiction must be reported.
 #[test]
 fn contradictions() {
     let (model, s, [left, _]) = standing();
@@ -254,7 +254,8 @@ fn contradictions() {
     assert!(common::relative(d.a, &a) < CONDITIONED);
 }
 
-/// Without constraints, constrained dynamics equals forward dynamics, and an impact changes nothing.
+/// Checks that constrained dynamics without constraints equals forward dynamics, and that an impact without constraints
+/// changes nothing.
 #[test]
 fn no_constraint() {
     for (seed, model) in all_models(4).iter().enumerate() {
@@ -270,8 +271,8 @@ fn no_constraint() {
     }
 }
 
-/// For the restitution ε = 1, an impact keeps the kinetic energy. For ε = 0, the lost energy is ½ Δᵀ M Δ with the lost
-/// velocity Δ (Carnot's theorem).
+/// Checks the energy of impacts. For the restitution ε = 1, the kinetic energy is constant. For ε = 0, the lost energy
+/// is ½ Δᵀ M Δ, where Δ is the lost velocity (Carnot's theorem).
 #[test]
 fn energy_of_impacts() {
     let mut worst = Worst::new("energy of impacts", CONDITIONED);
@@ -292,9 +293,8 @@ fn energy_of_impacts() {
     }
 }
 
-/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0. The
-/// acceleration q̈ is the allowed acceleration that is nearest to the free acceleration, so no allowed change brings it
-/// nearer (Gauss).
+/// Checks that constraint forces do no work on motions that the constraints allow: vᵀ Jᵀ λ = 0 for v in the kernel of
+/// J. So q̈ is the allowed acceleration with the smallest distance from the free acceleration (Gauss's principle).
 #[test]
 fn gauss_principle() {
     let mut worst = Worst::new("Gauss's principle", CONDITIONED);
@@ -312,7 +312,7 @@ fn gauss_principle() {
     }
 }
 
-/// The targets of a constraint set are used, and can be changed.
+/// Checks that the targets of a constraint set are used, and that they can be changed.
 #[test]
 fn moving_targets() {
     let (model, s, [left, right]) = standing();
@@ -381,8 +381,8 @@ fn another_robots_constraints() {
     constrained_dynamics(&arm, &mut Data::new(&arm), &mut set, &[0.0; 7], &[0.0; 7], &[0.0; 7], &[]);
 }
 
-/// The loops of a model become constraints between frames of the model. A coupling of joints does not constrain a
-/// frame.
+/// Checks that the loops of a model become constraints between frames of the model. A coupling of joints is not a
+/// constraint of a frame.
 #[test]
 fn loops_of_a_model() {
     let mut builder = ModelBuilder::new("loops");

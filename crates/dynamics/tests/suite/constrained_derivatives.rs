@@ -1,4 +1,5 @@
-//! Hand-written derivatives of constrained dynamics and of impacts, compared with dual numbers and with differences.
+//! Tests of the analytical derivatives of constrained dynamics and of impacts. The results are compared with dual
+//! numbers and with finite differences.
 
 use crate::common;
 
@@ -13,12 +14,12 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods with some thousand roundings each.
+/// Tolerance between two exact methods with some thousand rounding errors each.
 const EXACT: f64 = 1e-11;
 /// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
-/// Tolerance and step of central differences. The error is a rounding of 1e-16/step, plus step² times a third
-/// derivative.
+/// Tolerance of central differences. The error of a difference is a rounding error of 1e-16 / step, plus step² times a
+/// third derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
@@ -49,8 +50,7 @@ impl Algorithm for Dynamics {
     }
 }
 
-/// Constrained inverse dynamics: τ and J q̈ + γ as functions of q, v and q̈. The forces need not be a solution of
-/// constrained dynamics.
+/// Constrained inverse dynamics: τ and J q̈ + γ as functions of q, v and q̈. The constraint forces are arbitrary.
 struct Inverse;
 
 impl Algorithm for Inverse {
@@ -113,7 +113,7 @@ fn by_duals<A: Algorithm>(
     out
 }
 
-/// Computes the same derivatives by central differences.
+/// Computes the derivatives with respect to q, v and τ by central differences.
 fn by_differences<A: Algorithm>(
     model: &Model,
     s: &State,
@@ -170,8 +170,8 @@ fn derivatives_of_constrained_dynamics() {
     }
 }
 
-/// The derivatives computed by dual numbers satisfy M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c = 0, with the returned M, J, r
-/// and c.
+/// Checks the returned M, J, r and c: the derivatives by dual numbers must satisfy M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c
+/// = 0.
 #[test]
 fn equations_of_constrained_dynamics() {
     let names = ["r, c for q", "r, c for v", "for τ"];
@@ -215,8 +215,8 @@ fn equations_of_constrained_dynamics() {
     }
 }
 
-/// Derivatives of constrained inverse dynamics are exact, even for accelerations and forces that do not solve
-/// constrained dynamics. The values are M q̈ + h − Jᵀ λ and J q̈ + γ.
+/// Checks that derivatives of constrained inverse dynamics are exact for any accelerations and forces. The values are M
+/// q̈ + h − Jᵀ λ and J q̈ + γ.
 #[test]
 fn derivatives_of_constrained_inverse_dynamics() {
     let names = ["∂(τ, J q̈ + γ)/∂q", "∂(τ, J q̈ + γ)/∂v", "∂(τ, J q̈ + γ)/∂q̈"];
@@ -272,7 +272,7 @@ fn derivatives_of_impulse_dynamics() {
     }
 }
 
-/// The returned blocks form K⁻¹, the inverse of the whole matrix of constrained dynamics: K K⁻¹ = 1.
+/// Checks that the returned blocks form K⁻¹, the inverse of the whole matrix K of constrained dynamics: K K⁻¹ = 1.
 #[test]
 fn inverse_of_the_whole_matrix() {
     let mut worst = Worst::new("K K⁻¹ − 1", CONDITIONED);
@@ -296,7 +296,8 @@ fn inverse_of_the_whole_matrix() {
     }
 }
 
-/// Redundant rows have no force, also at neighbouring states, so all derivatives are exact.
+/// Checks that all derivatives are exact with redundant rows. The forces of redundant rows are zero also at
+/// neighbouring states.
 #[test]
 fn redundant_constraints() {
     let mut exact = Worst::new("redundant constraints", EXACT);

@@ -1,4 +1,4 @@
-//! Coriolis matrix, and efforts that hold a robot still.
+//! Tests of the Coriolis matrix, and of the efforts that hold a robot at rest.
 
 use crate::common;
 
@@ -20,7 +20,7 @@ fn inertia_rate(model: &Model, q: &[f64], v: &[f64]) -> DMatrix<f64> {
     DMatrix::from_column_slice(model.nv(), model.nv(), &rate)
 }
 
-/// C v + g = h, and Ṁ = C + Cᵀ, so Ṁ − 2C is skew-symmetric.
+/// Checks that C v + g = h, and that Ṁ = C + Cᵀ. The matrix Ṁ − 2C is then skew-symmetric.
 #[test]
 fn forces_and_skewness() {
     let mut forces = Worst::new("C v + g = h", ROUNDING);
@@ -36,8 +36,8 @@ fn forces_and_skewness() {
     }
 }
 
-/// If the velocities are rates of coordinates, Christoffel symbols determine C uniquely: C_ij = ½ Σ_k (∂M_ij/∂q_k +
-/// ∂M_ik/∂q_j − ∂M_jk/∂q_i) v_k.
+/// Checks C against Christoffel symbols, which determine C uniquely if the velocities are rates of coordinates: C_ij =
+/// ½ Σ_k (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_jk/∂q_i) v_k.
 #[test]
 fn christoffel_symbols() {
     let mut worst = Worst::new("C = Christoffel", ROUNDING);
@@ -66,7 +66,7 @@ fn christoffel_symbols() {
     }
 }
 
-/// `static_torque` equals `rnea` at rest. Without external forces, it also equals `gravity`.
+/// Checks that `static_torque` equals `rnea` at rest. Without external forces, it must also equal `gravity`.
 #[test]
 fn at_rest() {
     let mut worst = Worst::new("static_torque = rnea(q, 0, 0, f_ext)", ROUNDING);

@@ -39,7 +39,8 @@ thread_local! {
     };
 }
 
-/// Number that counts all operations, and stores the length of the longest chain of operations that led to it.
+/// Number that counts all operations. It also stores the length of the longest chain of dependent operations that led
+/// to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Counted {
     value: f64,
@@ -128,8 +129,8 @@ impl Scalar for Counted {
     }
 }
 
-/// Returns the number of all operations of f, and the length of the longest chain of operations in which each needs the
-/// result of the previous one.
+/// Returns the number of all operations of f. Also returns the length of the longest chain of operations in which each
+/// operation needs the result of the previous operation.
 pub(crate) fn counted<'a>(f: impl FnOnce() -> &'a [Counted]) -> (Operations, u32) {
     OPERATIONS.set(Operations::default());
     let steps = f().iter().map(|x| x.steps).max().unwrap_or(0);

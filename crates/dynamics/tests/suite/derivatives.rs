@@ -1,4 +1,4 @@
-//! Hand-written derivatives, compared with dual numbers and with differences.
+//! Tests of analytical derivatives. The results are compared with dual numbers and with finite differences.
 
 use crate::common;
 
@@ -7,20 +7,20 @@ use condyle_dynamics::{Data, Force, Inertia, Model, Scalar, aba, aba_derivatives
 use nalgebra::DMatrix;
 use num_dual::{Dual, Dual64};
 
-/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
-/// condition number of M.
+/// Tolerance between two exact methods with some thousand rounding errors each. For forward dynamics, the tolerance
+/// includes the condition number of M.
 const EXACT: f64 = 1e-11;
 /// Tolerance for long chains. The condition number of M grows with the cube of a chain's length: it is 1e7 for 90
-/// links. As the error is relative to the largest entries, most of this growth cancels.
+/// links. Since the error is relative to the largest entries, most of this growth cancels.
 const LONG: f64 = 1e-9;
-/// Tolerance and step of central differences. The error is a rounding of 1e-16/step, plus step² times a third
-/// derivative.
+/// Tolerance of central differences. The error of a difference is a rounding error of 1e-16 / step, plus step² times a
+/// third derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
 
-/// Algorithm as a function of position, velocity and a third vector (acceleration or effort), with or without external
-/// forces.
+/// Algorithm as a function of position, velocity and a third vector (acceleration or effort). It is called with and
+/// without external forces.
 trait Algorithm {
     fn run<S: Scalar>(&self, model: &Model, data: &mut Data<S>, q: &[S], v: &[S], x: &[S], f: &[Force<S>]) -> Vec<S>;
 }
@@ -64,7 +64,7 @@ fn by_duals(
     out
 }
 
-/// Computes the same derivatives by central differences.
+/// Computes the derivatives with respect to q, v and x by central differences.
 fn by_differences(
     algorithm: &impl Algorithm,
     model: &Model,
@@ -116,7 +116,8 @@ fn inverse_dynamics() {
     }
 }
 
-/// On long branches, the library computes several columns side by side, and M⁻¹ ∂τ without a matrix product.
+/// Checks derivatives on long branches. There the library computes several columns at the same time, and M⁻¹ ∂τ without
+/// a matrix product.
 #[test]
 fn long_branches() {
     let mut exact = Worst::new("∂τ of long branches", EXACT);
@@ -164,8 +165,7 @@ fn forward_dynamics() {
     }
 }
 
-/// The hand-written derivatives also run on dual numbers. ∂²τ/∂q∂q is computed by nested dual numbers, and by
-/// differentiating the hand-written derivative.
+/// Checks ∂²τ/∂q∂q by nested dual numbers, and by the analytical derivatives on dual numbers.
 #[test]
 fn second_derivatives() {
     let mut worst = Worst::new("∂²τ/∂q²", EXACT);
@@ -174,7 +174,7 @@ fn second_derivatives() {
         let State { q, v, a, .. } = State::random(model, &mut rng(seed as u64));
         let (j, k) = (seed % nv, (3 * seed + 1) % nv);
         let still = vec![0.0; nv];
-        // move first along j with the inner dual numbers, then from there along k with the outer dual numbers
+        // Move first along j with the inner dual numbers, and then from there along k with the outer dual numbers.
         let inner = moved(model, &lift(&q), &dual(&still, &unit(nv, j)));
         let mut data = Data::<Dual64>::new(model);
         let derivative = rnea_derivatives(model, &mut data, &inner, &lift(&v), &lift(&a), &[]).dtau_dq;
@@ -188,7 +188,8 @@ fn second_derivatives() {
     }
 }
 
-/// τ is linear in the inertial parameters, so differences with a step of a whole kilogram are exact.
+/// Checks derivatives with respect to a mass. τ is linear in the inertial parameters, so a difference quotient with a
+/// step of 1 kg is exact.
 #[test]
 fn with_respect_to_a_mass() {
     let mut efforts = Worst::new("∂τ/∂m", EXACT);

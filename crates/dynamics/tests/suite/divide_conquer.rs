@@ -1,5 +1,5 @@
-//! Forward dynamics by divide and conquer. It gives the accelerations of `aba` in O(log n) steps, on any number of
-//! threads.
+//! Tests of forward dynamics by divide and conquer. This algorithm gives the accelerations of `aba` in O(log n) steps,
+//! on any number of threads.
 
 use crate::common;
 use crate::counted::{Counted, counted};
@@ -11,10 +11,10 @@ use condyle_dynamics::{
 };
 use num_dual::Dual64;
 
-/// Tolerance of some hundreds of roundings times the condition number of M. The condition number is 1e2 to 1e5 for the
-/// robots and grows with the cube of a chain's length: it is 1e8 for 300 links. `aba` itself loses as many digits. The
-/// error is relative to the largest accelerations. These are the accelerations of the light tips, and they grow in the
-/// same way.
+/// Tolerance of some hundred rounding errors times the condition number of M. The condition number is 1e2 to 1e5 for
+/// the robots. For a chain, the condition number grows with the cube of the length: it is 1e8 for 300 links, and `aba`
+/// itself loses as many digits. The error is relative to the largest accelerations, which are the accelerations of the
+/// light tips and grow in the same way.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 
@@ -72,7 +72,7 @@ fn branches_and_floating_bases() {
     }
 }
 
-/// One model consists of several robots that are fixed to the world.
+/// Checks a model that consists of several robots fixed to the world.
 #[test]
 fn a_forest() {
     let mut worst = Worst::new("divide and conquer on forests", INVERTED);
@@ -81,7 +81,8 @@ fn a_forest() {
     }
 }
 
-/// A body without mass, or with a point mass on the axis of its hinge, is valid if a body that it carries has mass.
+/// Checks bodies without mass, or with a point mass on the axis of their hinge. Such a body is valid if it carries a
+/// body with mass.
 #[test]
 fn bodies_without_mass() {
     let mut worst = Worst::new("divide and conquer with massless bodies", INVERTED);
@@ -106,8 +107,8 @@ fn bodies_without_mass() {
     }
 }
 
-/// Creates a floating palm with four fingers of four hinges each. The last three hinges are parallel, and the tips are
-/// light. The inertia of a joint's rotor grows with the index of the joint along the finger.
+/// Creates a floating palm with four fingers of four hinges each. The last three hinges of a finger are parallel, and
+/// the tips are light. The inertia of a joint's rotor grows from the palm to the tip.
 fn hand(rotor: f64) -> Model {
     let inertia = |mass: f64| Inertia::from_com(mass, Vec3::new(0.0, 0.0, 0.02), Sym3::diagonal(1e-4 * mass));
     let at = |y: f64, z: f64| Se3::new(Mat3::identity(), Vec3::new(0.0, y, z));
@@ -128,8 +129,8 @@ fn hand(rotor: f64) -> Model {
     builder.build().expect("a hand is well-formed")
 }
 
-/// The joints between the handles of a piece have fewer than six degrees of freedom, all in a plane. So the compliance
-/// Y of the piece is singular.
+/// Checks fingers with parallel hinges. The joints between the handles of a piece then have fewer than six degrees of
+/// freedom, so the compliance Y of the piece is singular.
 #[test]
 fn fingers() {
     let mut worst = Worst::new("divide and conquer on hands", INVERTED);
@@ -168,8 +169,8 @@ fn chains_with_followers() {
     }
 }
 
-/// Only couplings give these joints inertia: massless followers at the tip, and a wheel on a massless arm. Without the
-/// gear to the leader, the wheel could turn freely relative to the arm.
+/// Checks joints that get inertia only from couplings: massless followers at the tip, and a wheel on a massless arm.
+/// Without the gear to the leader, the arm could turn without moving any mass.
 #[test]
 fn followers_without_inertia() {
     let axis = Vec3::new(0.0, 0.0, 1.0);
@@ -196,7 +197,7 @@ fn followers_without_inertia() {
     }
 }
 
-/// The generic code also runs on dual numbers, which give derivatives.
+/// Checks that the generic code also runs on dual numbers, which give derivatives.
 #[test]
 fn on_dual_numbers() {
     let mut worst = Worst::new("derivatives by divide and conquer", INVERTED);
@@ -212,7 +213,7 @@ fn on_dual_numbers() {
     }
 }
 
-/// The assembly fixes the order of every sum, so the bits of a result do not depend on the number of threads.
+/// Checks that the bits of a result do not depend on the number of threads, because the order of every sum is fixed.
 #[test]
 fn same_bits_for_any_number_of_threads() {
     let pools: Vec<_> = [1, 2, 3]
@@ -237,8 +238,8 @@ fn same_bits_for_any_number_of_threads() {
     }
 }
 
-/// For a chain of n bodies, joins are nested to the depth ⌈log₂ n⌉. For other trees, which are cut into heavy paths,
-/// the depth is at most about twice as large.
+/// Checks the depth to which joins are nested. For a chain of n bodies, the depth is ⌈log₂ n⌉. Other trees are cut into
+/// heavy paths, and their depth is at most about twice as large.
 #[test]
 fn depth() {
     let log2 = |n: usize| n.next_power_of_two().ilog2() as usize;
@@ -259,9 +260,9 @@ fn depth() {
     }
 }
 
-/// Counts the sequential steps of the computation itself. When a chain is twice as long, the number of steps grows by a
-/// constant; with the articulated-body algorithm, it doubles. The total work is a constant multiple of the work of that
-/// algorithm.
+/// Counts the sequential steps of divide and conquer. If a chain is twice as long, the number of steps must grow by a
+/// constant, while the number of steps of the articulated-body algorithm doubles. The total work must be a constant
+/// multiple of the work of the articulated-body algorithm.
 #[test]
 fn steps_grow_with_the_logarithm() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");

@@ -1,4 +1,5 @@
-//! Algorithms compared with derivatives of the energies (Lagrange). The energies are computed only from placements.
+//! Tests that compare algorithms with derivatives of the energies (Lagrange). The energies are computed only from
+//! placements.
 
 use crate::common;
 
@@ -13,8 +14,8 @@ use num_dual::{Dual, Dual64, DualNum, HyperDual64};
 const ROUNDING: f64 = 1e-11;
 const TREES: u64 = 8;
 
-/// Computes the kinetic energy (rotors included) and the potential energy. A body's velocity is the rate of its
-/// placement along q ⊕ t v, by a dual number around the scalar.
+/// Computes the kinetic energy (rotors included) and the potential energy. The velocity of a body is the rate of its
+/// placement along q ⊕ t v, computed by an outer dual number in t.
 fn energies<T>(model: &Model, data: &mut Data<Dual<T>>, q: &[T], v: &[T]) -> (T, T)
 where
     T: Scalar<Mask = bool> + DualNum,
@@ -49,7 +50,7 @@ where
     (kinetic, potential)
 }
 
-/// M = ∂²T/∂v².
+/// Checks that M is the second derivative of the kinetic energy: M = ∂²T/∂v².
 #[test]
 fn inertia_matrix_is_the_curvature_of_kinetic_energy() {
     let mut worst = Worst::new("M = ∂²T/∂v²", ROUNDING);
@@ -71,7 +72,7 @@ fn inertia_matrix_is_the_curvature_of_kinetic_energy() {
     }
 }
 
-/// g = ∂V/∂q.
+/// Checks that g is the gradient of the potential energy: g = ∂V/∂q.
 #[test]
 fn gravity_is_the_slope_of_potential_energy() {
     let mut worst = Worst::new("g = ∂V/∂q", ROUNDING);
@@ -89,8 +90,8 @@ fn gravity_is_the_slope_of_potential_energy() {
     }
 }
 
-/// The power of efforts and external forces is the rate of the energy: vᵀ τ + Σ ⟨v_i, f_ext,i⟩ = d(T + V)/dt, for the
-/// velocity v and the acceleration a.
+/// Checks that the power of efforts and external forces is the rate of the energy: vᵀ τ + Σ ⟨v_i, f_ext,i⟩ = d(T +
+/// V)/dt, for the velocity v and the acceleration a.
 #[test]
 fn power_balance() {
     let mut worst = Worst::new("vᵀ τ = dE/dt", ROUNDING);
@@ -103,7 +104,7 @@ fn power_balance() {
         let (kinetic, potential) = energies(model, &mut duals, &q_moving, &dual(&v, &a));
         let rate = (kinetic + potential).eps;
         worst.see(model, &[power(rnea(model, &mut data, &q, &v, &a, &[]))], &[rate]);
-        // add the power of the external forces, with velocities of bodies by dual numbers
+        // Add the power of the external forces. Dual numbers give the velocities of the bodies.
         let mut dual_data = Data::new(model);
         let placements = forward_kinematics(model, &mut dual_data, &q_moving);
         let mut external = 0.0;
@@ -123,7 +124,8 @@ fn power_balance() {
     }
 }
 
-/// C v is quadratic in v, so (∂h/∂v) v = 2 C v. Ṁ − 2C is skew-symmetric, so vᵀ Ṁ v = 2 vᵀ C v.
+/// Checks that Coriolis forces do no work. C v is quadratic in v, so (∂h/∂v) v = 2 C v. Ṁ − 2C is skew-symmetric, so vᵀ
+/// Ṁ v = 2 vᵀ C v.
 #[test]
 fn coriolis_forces_do_no_work() {
     let mut quadratic = Worst::new("(∂h/∂v) v = 2 (h − g)", ROUNDING);

@@ -1,4 +1,5 @@
-//! Sparse and dense factors of M: products of the factors, solutions of linear systems, and zeros of the factors.
+//! Tests of sparse and dense factors of M: products of the factors, solutions of linear systems, and zeros of the
+//! factors.
 
 use crate::common;
 
@@ -9,9 +10,9 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance of some hundreds of roundings, relative to the largest entry of M.
+/// Tolerance of some hundred rounding errors, relative to the largest entry of M.
 const RECONSTRUCTED: f64 = 1e-13;
-/// Tolerance of some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 for these robots.
+/// Tolerance of some hundred rounding errors times the condition number of M, which is 1e2 to 1e5 for these robots.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 
@@ -20,7 +21,7 @@ fn inertia_matrix(model: &Model, seed: u64) -> DMatrix<f64> {
     crba(model, &mut Data::new(model), &q).clone_owned()
 }
 
-/// Returns L and D, with rows and columns in the order of the factor.
+/// Returns L and D, with rows and columns in the order that the factor uses.
 fn unpack(factor: &Ltdl<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let D = nalgebra::DVector::from_iterator(factor.order().len(), factor.diagonal());
     let mut L = DMatrix::identity(D.len(), D.len());
@@ -32,12 +33,12 @@ fn unpack(factor: &Ltdl<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     (L, DMatrix::from_diagonal(&D))
 }
 
-/// Returns P M Pᵀ: the rows and columns of M in the given order.
+/// Returns P M Pᵀ, which is M with rows and columns in the given order.
 fn ordered(M: &DMatrix<f64>, order: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(M.nrows(), M.nrows(), |i, j| M[(order[i], order[j])])
 }
 
-/// The product of the factors is M, and D is positive.
+/// Checks that the product of the factors is M, and that D is positive.
 #[test]
 fn reconstructs() {
     let mut sparse = Worst::new("Lᵀ D L = M", RECONSTRUCTED);
@@ -57,7 +58,7 @@ fn reconstructs() {
     }
 }
 
-/// Both factors solve linear systems whose right-hand sides are vectors, matrices and the identity.
+/// Checks solutions of linear systems with both factors. The right-hand sides are vectors, matrices and the identity.
 #[test]
 fn solves() {
     let mut vector = Worst::new("M M⁻¹ b = b", INVERTED);
@@ -95,8 +96,8 @@ fn solves() {
     }
 }
 
-/// Without shared coordinates, row k of the factor has one entry for each degree of freedom between k and the root, and
-/// no other entries.
+/// Checks the non-zero entries of the factor for robots without shared coordinates. Row k has one entry for each degree
+/// of freedom between k and the root, and no other entries.
 #[test]
 fn zeros_are_those_of_the_tree() {
     for model in all_models(TREES).iter().filter(|m| m.bodies().iter().all(|b| b.mimic.is_none())) {
@@ -123,7 +124,7 @@ fn zeros_are_those_of_the_tree() {
     }
 }
 
-/// Computes M = Lᵀ D L densely; returns the number of nonzeros in the lower triangle of L, and L.
+/// Computes M = Lᵀ D L densely. Returns the number of non-zero entries in the lower triangle of L, and L itself.
 fn dense_nonzeros(mut H: DMatrix<f64>) -> (usize, DMatrix<f64>) {
     let n = H.nrows();
     for k in (0..n).rev() {
@@ -140,8 +141,8 @@ fn dense_nonzeros(mut H: DMatrix<f64>) -> (usize, DMatrix<f64>) {
     (H.lower_triangle().iter().filter(|&&x| x != 0.0).count(), H)
 }
 
-/// With shared coordinates, the rows of the factor contain all nonzeros. The order that the library chooses needs fewer
-/// entries than the original order of the coordinates.
+/// Checks for robots with shared coordinates that the rows of the factor contain all non-zero entries. The order that
+/// the library chooses must need fewer entries than the original order of the coordinates.
 #[test]
 fn shared_coordinates_keep_branches_apart() {
     let mut stored = (0, 0);
@@ -167,9 +168,9 @@ fn shared_coordinates_keep_branches_apart() {
     assert!(stored.0 < stored.1);
 }
 
-/// All fingers of a hand follow one coordinate, which is at the tip of the first finger. The factor orders this
-/// coordinate where the fingers meet. The row of a finger contains this coordinate, the coordinates of the finger, and
-/// the coordinates of the arm.
+/// Checks a hand whose fingers all follow one coordinate, which is at the tip of the first finger. The factor must
+/// place this coordinate directly after the palm. The row of a finger then contains this coordinate, the coordinates of
+/// the finger, and the coordinates of the arm.
 #[test]
 fn fingers_that_follow() {
     let link = Inertia::from_com(0.1, Vec3::new(0.01, 0.02, 0.03), condyle_dynamics::Sym3::diagonal(1e-3));
@@ -198,7 +199,7 @@ fn fingers_that_follow() {
     assert!((X - DMatrix::identity(7, 7)).amax() < INVERTED);
 }
 
-/// On dual numbers, a solution has the derivative d(M⁻¹ b) = −M⁻¹ dM M⁻¹ b.
+/// Checks the derivative of a solution on dual numbers: d(M⁻¹ b) = −M⁻¹ dM M⁻¹ b.
 #[test]
 fn on_dual_numbers() {
     let mut worst = Worst::new("d(M⁻¹ b)", INVERTED);
@@ -224,7 +225,7 @@ fn on_dual_numbers() {
     }
 }
 
-/// A factorisation does not depend on the previous content of the factor.
+/// Checks that a factorisation does not depend on the previous content of the factor.
 #[test]
 fn may_be_used_again() {
     for (seed, model) in all_models(4).iter().enumerate() {

@@ -1,4 +1,4 @@
-//! All methods of forward dynamics give the same result.
+//! Tests that all methods of forward dynamics give the same result.
 
 use crate::common::{self, State, Worst, all_models, lift, lift_forces, rng, tree};
 use crate::counted::{Counted, counted};
@@ -8,7 +8,7 @@ use condyle_dynamics::{aba, crba, forward_dynamics};
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance of some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 for these robots.
+/// Tolerance of some hundred rounding errors times the condition number of M, which is 1e2 to 1e5 for these robots.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 const METHODS: [ForwardDynamicsMethod; 3] =
@@ -35,7 +35,7 @@ fn methods_agree() {
     }
 }
 
-/// All methods give the same results on dual numbers, for any previous content of the scratch.
+/// Checks that all methods give the same results on dual numbers, for any previous content of the scratch memory.
 #[test]
 fn methods_agree_on_dual_numbers() {
     let mut worst = Worst::new("derivatives by every method", INVERTED);
@@ -52,7 +52,7 @@ fn methods_agree_on_dual_numbers() {
     }
 }
 
-/// Counts the operations of forward dynamics by a method.
+/// Counts the operations of forward dynamics by a given method.
 fn operations(model: &Model, method: ForwardDynamicsMethod) -> f64 {
     let State { q, v, tau, .. } = State::random(model, &mut rng(0));
     let [q, v, tau]: [Vec<Counted>; 3] = [&q, &v, &tau].map(|x| lift(x));
@@ -60,9 +60,9 @@ fn operations(model: &Model, method: ForwardDynamicsMethod) -> f64 {
     counted(|| forward_dynamics(model, &mut data, &q, &v, &tau, &[], Some(method))).0.flops() as f64
 }
 
-/// The method that the library chooses takes at most a quarter more operations than the method with the fewest
-/// operations. The test uses robots, random trees, and chains, binary trees and stars of 1 to 60 joints.
-/// `benches/factorisation.rs` measures times.
+/// Checks that the method chosen by the library takes at most 25 % more operations than the best method. The test uses
+/// robots, random trees, and chains, binary trees and stars of 1 to 60 joints. `benches/factorisation.rs` measures
+/// times.
 #[test]
 fn the_choice_takes_few_operations() {
     let shapes: [fn(usize) -> usize; 3] = [|i| i - 1, |i| i / 2, |i| usize::from(i > 1)];
@@ -87,8 +87,8 @@ fn allocates_nothing(f: impl FnOnce()) {
     assert_eq!(allocations(f), 0);
 }
 
-/// Every method, both factors, and divide and conquer run without allocations. Divide and conquer uses one thread,
-/// because rayon allocates when it shares work.
+/// Checks that every method, both factors, and divide and conquer do not allocate memory. Divide and conquer uses one
+/// thread, because rayon allocates when threads share work.
 #[test]
 fn nothing_is_allocated() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");

@@ -1,4 +1,5 @@
-//! Armature of free joints. In free space, armature equals a mass at the origin of the body, in every algorithm.
+//! Tests of the armature of free joints. In free space, armature must equal a mass at the origin of the body, in every
+//! algorithm.
 
 use crate::common;
 
@@ -12,15 +13,15 @@ use condyle_dynamics::{
     nonlinear_effects, rnea, rnea_derivatives, rnea_hessian, robots,
 };
 
-/// Tolerances between the same sums in different orders. For results with M⁻¹, the tolerance includes the condition
+/// Tolerance between the same sums in different orders. For results with M⁻¹, `CONDITIONED` includes the condition
 /// number of M.
 const ROUNDING: f64 = 1e-11;
 const CONDITIONED: f64 = 1e-8;
 /// Apparent mass (kg).
 const MASS: f64 = 2.5;
 
-/// Returns two robots in free space: the base of the first has armature, the base of the second has an additional mass
-/// instead.
+/// Returns two robots in free space. The base of the first robot has armature; the base of the second robot has an
+/// additional mass instead.
 fn pair(robot: &Model) -> [Model; 2] {
     let free = robot.clone().with_gravity(Vec3::zero()).unwrap();
     let nv = robot.nv();
@@ -30,7 +31,7 @@ fn pair(robot: &Model) -> [Model; 2] {
     [free.with_armature(&armature(MASS)).unwrap(), heavier.with_armature(&armature(0.0)).unwrap()]
 }
 
-/// Returns all numbers that the algorithms compute for a model: first results without M⁻¹, then results with M⁻¹.
+/// Returns all numbers that the algorithms compute for a model: results without M⁻¹, and results with M⁻¹.
 fn numbers(model: &Model, s: &State, frames: [&str; 2]) -> [Vec<f64>; 2] {
     let (State { q, v, a, tau, f_ext }, nv) = (s, model.nv());
     let data = &mut Data::new(model);
@@ -86,7 +87,8 @@ fn numbers(model: &Model, s: &State, frames: [&str; 2]) -> [Vec<f64>; 2] {
     [sums, solved]
 }
 
-/// In free space, armature acts like a mass. The test computes bodies one by one, and branches in parallel lanes.
+/// Checks that armature in free space acts like a mass. The bodies are computed one by one, and also as limbs in
+/// parallel lanes.
 #[test]
 fn in_free_space_it_is_a_mass() {
     let mut sums = Worst::new("armature of a base = mass", ROUNDING);
@@ -110,7 +112,7 @@ fn in_free_space_it_is_a_mass() {
     }
 }
 
-/// Armature has no weight, so gravity efforts do not change.
+/// Checks that armature has no weight: the efforts of gravity do not depend on it.
 #[test]
 fn it_has_no_weight() {
     let quadruped = robots::quadruped();
@@ -120,8 +122,8 @@ fn it_has_no_weight() {
     assert_eq!(gravity(&heavier, &mut Data::new(&heavier), &q), weight);
 }
 
-/// If the parent of a free joint moves, the armature resists motion relative to the parent, along the axes of the
-/// parent.
+/// Checks a free joint whose parent moves. The armature must resist motion relative to the parent, along the parent's
+/// axes.
 #[test]
 fn on_a_body_that_moves() {
     let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
@@ -136,14 +138,14 @@ fn on_a_body_that_moves() {
     let with = rnea(&heavier, &mut Data::new(&heavier), &q, &v, &a, &[]).to_vec();
     let [linear, angular] = [1, 4].map(|k| Vec3::new(v[k], v[k + 1], v[k + 2]));
     let acceleration = Vec3::new(a[1], a[2], a[3]) + angular.cross(linear); // v̇ + ω × v
-    assert!((with[0] - without[0]).abs() < 1e-12); // the parent, a table, does not feel the armature
+    assert!((with[0] - without[0]).abs() < 1e-12); // the armature does not act on the parent, a table
     for (k, x) in acceleration.to_array().into_iter().enumerate() {
         assert!((with[k + 1] - without[k + 1] - MASS * x).abs() < 1e-12);
         assert!((with[k + 4] - without[k + 4]).abs() < 1e-12);
     }
 }
 
-/// The armature of a free joint along its three linear axes must be one number, for models from any source.
+/// Checks that the armature of a free joint is the same number along all three linear axes, for models from any source.
 #[test]
 fn three_equal_numbers() {
     let quadruped = robots::quadruped();

@@ -1,5 +1,5 @@
-//! Contacts of a simulation with the ground, compared with closed forms: landing, standing, sliding, sticking, lift-off
-//! and energy.
+//! Tests of a simulation's contacts with the ground: landing, standing, sliding, sticking, lift-off and energy. The
+//! results are compared with closed forms.
 
 use crate::common::{normal3, random_rotation, relative, rng};
 use crate::counting::allocations;
@@ -12,10 +12,10 @@ use condyle_dynamics::{
 const G: f64 = 9.81;
 /// Time step of all tests (s).
 const H: f64 = 1e-3;
-/// Half of the length, width and height of the box (m), and the mass of the box (kg).
+/// Half of the box's length, width and height (m). The next constant is the mass of the box (kg).
 const HALF: [f64; 3] = [0.15, 0.1, 0.05];
 const MASS: f64 = 2.0;
-/// Tolerance for the errors of the contact solver (1e-9 m/s) over some thousand steps, and for rounding.
+/// Tolerance for rounding errors and for the errors of the contact solver (1e-9 m/s) over some thousand steps.
 const SOLVED: f64 = 1e-7;
 
 /// Creates a box that moves freely, with a frame at the centre of the box.
@@ -32,7 +32,7 @@ fn free(name: &str, inertia: Inertia<f64>) -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// Returns all corners of the box; the first four are at the bottom.
+/// Returns all corners of the box. The first four corners are at the bottom.
 fn corners() -> Vec<Vec3<f64>> {
     let [x, y, z] = HALF;
     let around = [(x, y), (x, -y), (-x, -y), (-x, y)];
@@ -56,8 +56,8 @@ fn energy(model: &Model, simulation: &Simulation<f64>) -> f64 {
 
 fn passive(_: &mut Control<'_, f64>) {}
 
-/// A box slides with exactly μ g, along any direction. It stops after a distance of v²/(2 μ g), minus half the distance
-/// of the first step.
+/// Checks a sliding box along different directions. The box must decelerate with exactly μ g. It must stop after a
+/// distance of v²/(2 μ g), minus half the distance of the first step.
 #[test]
 fn a_box_slides_to_a_stop() {
     let model = free_box();
@@ -66,7 +66,7 @@ fn a_box_slides_to_a_stop() {
         let (speed, along) = (1.0, Vec3::new(f64::cos(angle), f64::sin(angle), 0.0));
         let v = [speed * along.x, speed * along.y, 0.0, 0.0, 0.0, 0.0];
         let mut simulation = on(&model, ground, &[0.0, 0.0, HALF[2], 0.0, 0.0, 0.0, 1.0], &v);
-        let steps = (speed / (mu * G * H)) as usize; // the box slides in all of them
+        let steps = (speed / (mu * G * H)) as usize; // number of steps in which the box slides
         for k in 1..=steps {
             assert_eq!(simulation.run(1, passive), Status::Done);
             let found = Vec3::new(simulation.v()[0], simulation.v()[1], 0.0);
@@ -77,16 +77,16 @@ fn a_box_slides_to_a_stop() {
         }
         assert!(simulation.run(500, passive).is_done());
         let way = simulation.q()[0].hypot(simulation.q()[1]);
-        let expected = speed * speed / (2.0 * mu * G) - speed * H / 2.0; // the sum of h v⁺ over the steps
-        let rest = mu * G * H * H; // distance that the last, shorter, step may add
+        let expected = speed * speed / (2.0 * mu * G) - speed * H / 2.0; // sum of h v⁺ over the steps
+        let rest = mu * G * H * H; // additional distance of the last step, which is shorter
         println!("μ = {mu}: stops after {way:.6} m, expected {expected:.6}");
         assert!((way - expected).abs() < rest, "{way} {expected}");
         assert!(simulation.v().iter().all(|v| v.abs() < SOLVED), "{:?}", simulation.v());
     }
 }
 
-/// The forces on a standing robot are the same in each step, and their sum is its weight. The robot neither drifts nor
-/// vibrates.
+/// Checks that the forces on a standing robot are the same in each step, and that their sum is the weight. The robot
+/// must neither drift nor vibrate.
 #[test]
 fn standing_is_still() {
     let model = free_box();
@@ -96,13 +96,13 @@ fn standing_is_still() {
             .flat_map(|k| corners()[..4].iter().map(move |&c| c * (1.0 - 0.1 * k as f64)).collect::<Vec<_>>())
             .collect(),
     );
-    let sixteen: Vec<_> = sixteen.into_iter().map(|p| Vec3::new(p.x, p.y, -HALF[2])).collect(); // all in one plane
+    let sixteen: Vec<_> = sixteen.into_iter().map(|p| Vec3::new(p.x, p.y, -HALF[2])).collect(); // points in one plane
     for (sole, speed) in [(four, 0.0), (sixteen, 0.3)] {
         let points = sole.len();
         let ground = Ground::default().with_sole(0, &sole);
         let v = [speed, 0.0, 0.0, 0.0, 0.0, speed];
         let mut simulation = on(&model, ground, &[0.0, 0.0, HALF[2], 0.0, 0.0, 0.0, 1.0], &v);
-        assert!(simulation.run(500, passive).is_done()); // the box comes to rest
+        assert!(simulation.run(500, passive).is_done()); // until the box is at rest
         let (q, mut forces, mut shaken) = (simulation.q().to_vec(), simulation.contacts().to_vec(), 0);
         for _ in 0..5000 {
             assert!(simulation.run(1, passive).is_done());
@@ -120,8 +120,8 @@ fn standing_is_still() {
     }
 }
 
-/// A box sticks on a slope α below the friction angle. On a steeper slope, it slides with the acceleration g (sin α − μ
-/// cos α).
+/// Checks a box on a slope α. Below the friction angle the box sticks. On a steeper slope it slides with the
+/// acceleration g (sin α − μ cos α).
 #[test]
 fn sticks_or_slides_on_a_slope() {
     let model = free_box();
@@ -148,7 +148,8 @@ fn sticks_or_slides_on_a_slope() {
     }
 }
 
-/// A point falls for √(2 H/g), lands without penetration, stays, and lifts off when pulled up by more than its weight.
+/// Checks a point that falls for √(2 H/g). It must land without penetration, stay, and lift off when pulled up by more
+/// than its weight.
 #[test]
 fn falls_lands_and_lifts_off() {
     let model = free("ball", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01)));
@@ -175,8 +176,8 @@ fn falls_lands_and_lifts_off() {
     }
 }
 
-/// A point lands and stands like a free point, even if joints constrain its motion. The examples are a vertical rail
-/// and a pendulum.
+/// Checks points whose motion is constrained by joints, on a vertical rail and on a pendulum. They must land and stand
+/// like a free point.
 #[test]
 fn joints_may_hold_directions() {
     let z = Vec3::new(0.0, 0.0, 1.0);
@@ -196,10 +197,10 @@ fn joints_may_hold_directions() {
     builder.frame("tip", rod, Se3 { translation: Vec3::new(2.0, 0.0, 0.0), ..Se3::identity() });
     let pendulum = builder.build().unwrap();
     let mut heavy = on(&pendulum, Ground { friction: 0.3, ..Ground::at_frames([0]) }, &[0.0], &[0.0]);
-    assert!(heavy.run(500, |now| now.tau[0] = 3.0).is_done()); // the pendulum turns down, until its tip touches at 30°
+    assert!(heavy.run(500, |now| now.tau[0] = 3.0).is_done()); // the pendulum turns down until its tip touches at 30°
     assert!((heavy.q()[0] - f64::asin(0.5)).abs() < 1e-6 && heavy.v()[0].abs() < 1e-9);
     assert!(heavy.contacts()[0].touches);
-    // on a rail along the ground, the point can only slide, and the ground exerts no force
+    // On a rail along the ground, the point can only slide, and the ground exerts no force.
     let mut builder = ModelBuilder::new("cart");
     let cart =
         builder.body("cart", WORLD, Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) }, Se3::identity(), weight);
@@ -210,8 +211,8 @@ fn joints_may_hold_directions() {
     assert_eq!(simulation.v()[0], 1.0);
 }
 
-/// With a restitution e, a ball rebounds to e² times its initial height. In the end it comes to rest and does not
-/// vibrate.
+/// Checks that a ball with restitution e rebounds to e² times its initial height. Finally the ball must rest without
+/// vibration.
 #[test]
 fn restitution_rebounds() {
     let model = free("ball", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01)));
@@ -235,11 +236,12 @@ fn restitution_rebounds() {
     }
 }
 
-/// Cubes tumble over their eight corners. Contacts only reduce the energy, and all cubes with friction come to rest.
+/// Checks the energy of cubes that tumble over their eight corners. Contacts may only reduce the energy, and all cubes
+/// with friction must come to rest.
 #[test]
 fn energy_never_grows() {
-    // Without contacts, the spin of a cube keeps its energy. The energy of the linear velocity has a relative error of
-    // h² ω², because this velocity is expressed in the axes of the turning cube.
+    // Without contacts, the rotational energy of a cube is constant. The energy of the linear velocity has a relative
+    // error of h² ω², because this velocity is expressed in the axes of the turning cube.
     let model = free("cube", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.02)));
     let cube: Vec<_> =
         corners().into_iter().map(|c| Vec3::from([c.x / HALF[0], c.y / HALF[1], c.z / HALF[2]]) * 0.1).collect();
@@ -256,7 +258,7 @@ fn energy_never_grows() {
             let (v, now) = (simulation.v(), energy(&model, &simulation));
             let spin = Vec3::new(v[3], v[4], v[5]).norm_squared();
             let turned = H * H * spin * MASS * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-            // the path of a corner is curved, so the corner may enter the plane; pushing it out adds potential energy
+            // A corner moves along a curve, so it may enter the plane. Pushing the corner out adds potential energy.
             let depth = H * H * (spin * 0.2 + G) * MASS * G;
             assert!(now <= before + turned + depth + 1e-9, "cube {seed}: {before} to {now} J");
             before = now;
@@ -273,9 +275,9 @@ fn placed(model: &Model, q: &[f64]) -> Se3<f64> {
     forward_kinematics(model, &mut Data::new(model), q).body(1)
 }
 
-/// Returns a control law that holds a posture. The law compensates the weight, and is as stiff as an explicit
-/// integrator allows for the inertia at each joint. This inertia is M_kk if the joint carries a light limb. With
-/// `heavy`, it is 1/(M⁻¹)_kk, for joints with heavy bodies on both sides.
+/// Returns a controller that holds a posture and compensates the weight. The stiffness at each joint is the maximum
+/// that an explicit integrator allows for the inertia at this joint. For a joint that carries a light limb, the inertia
+/// is M_kk. With `heavy`, for joints with heavy bodies on both sides, the inertia is 1/(M⁻¹)_kk.
 fn posture(model: &Model, q0: &[f64], heavy: bool) -> impl FnMut(&mut Control<'_, f64>) + use<> {
     let (mut data, q0) = (Data::new(model), q0.to_vec());
     let inertia: Vec<f64> = if heavy {
@@ -307,7 +309,8 @@ fn quadruped() -> (Model, Vec<f64>, Ground) {
     (model, q, Ground::at_frames(feet))
 }
 
-/// A quadruped stands on four feet; a humanoid with locked joints stands on the eight corners of its soles.
+/// Checks a quadruped that stands on four feet, and a humanoid with locked joints that stands on the eight corners of
+/// its soles.
 #[test]
 fn robots_stand() {
     let (model, q, ground) = quadruped();
@@ -334,7 +337,7 @@ fn robots_stand() {
     assert!(relative(simulation.q(), &q) < 1e-6, "{:?} {q:?}", simulation.q());
     assert!((push(&simulation).z / (statue.total_mass() * G) - 1.0).abs() < 1e-6);
 
-    // now all joints of the humanoid can move, and a control law holds the posture
+    // Now all joints of the humanoid can move, and a controller holds the posture.
     let mut q = neutral(&humanoid);
     let frames = soles.map(|frame| humanoid.frame(&statue.frames()[frame].name).unwrap());
     let ground = frames.into_iter().fold(Ground::default(), |ground, frame| ground.with_sole(frame, &sole));
@@ -349,7 +352,7 @@ fn robots_stand() {
     assert!((lifted - 1.0).abs() < 0.05 && (q[2] - z).abs() < 0.05);
 }
 
-/// Points that start below the ground are pushed out gently: depth does not become speed.
+/// Checks that points that start below the ground are pushed out slowly, without a velocity afterwards.
 #[test]
 fn depth_does_not_become_speed() {
     let model = free_box();
@@ -362,8 +365,8 @@ fn depth_does_not_become_speed() {
     assert!((simulation.q()[2] - HALF[2]).abs() < 1e-6, "{}", simulation.q()[2]);
 }
 
-/// A simulation continues from a stored state with the same bits, including the contacts. A simulation whose initial
-/// state is set again also repeats the same bits.
+/// Checks that a simulation continues from a stored state with the same bits, including the contacts. A simulation that
+/// is set to its initial state again must also repeat the same bits.
 #[test]
 fn contacts_are_part_of_the_state() {
     let (model, q, ground) = quadruped();
@@ -386,7 +389,7 @@ fn contacts_are_part_of_the_state() {
     assert_eq!(simulation.state(), end);
 }
 
-/// Steps do not allocate: neither in the air, nor on landing, nor at rest.
+/// Checks that steps do not allocate memory in the air, on landing and at rest.
 #[test]
 fn steps_do_not_allocate() {
     let (model, mut q, ground) = quadruped();
@@ -400,8 +403,8 @@ fn steps_do_not_allocate() {
     assert!(simulation.contacts().iter().any(|contact| contact.touches));
 }
 
-/// A contact solver without iterations reports the failure and the error. The impulses still only push, and are inside
-/// the friction cones.
+/// Checks a contact solver without iterations. It must report the failure and the error. The impulses must still push,
+/// and not pull, and lie within the friction cones.
 #[test]
 fn a_solver_that_is_stopped_says_so() {
     let model = free_box();
@@ -410,7 +413,7 @@ fn a_solver_that_is_stopped_says_so() {
     let status = simulation.run(1, passive);
     let Status::ContactsNotConverged { error } = status else { panic!("{status}") };
     assert!((error - G * H).abs() < 1e-12, "{error}");
-    assert_eq!(simulation.time(), H); // the step was taken
+    assert_eq!(simulation.time(), H); // the simulation took the step
     let run = simulation.run(4, passive);
     assert!((simulation.time() - 5.0 * H).abs() < 1e-12); // the run continues, and reports the largest error
     assert!(matches!(run, Status::ContactsNotConverged { error: largest } if largest > error), "{run}");

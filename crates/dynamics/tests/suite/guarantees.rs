@@ -1,4 +1,5 @@
-//! Guarantees of every function (no hidden state, and panics that name the argument), and guarantees of models.
+//! Tests of guarantees of models and of every function. Functions have no hidden state, and their panics name the
+//! argument.
 
 use crate::common;
 
@@ -14,7 +15,8 @@ use nalgebra::DMatrix;
 use num_dual::Dual64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// A function gives the same bits after any earlier calls with the same `Data`, even if these calls computed NaN.
+/// Checks that a function gives the same bits after any earlier calls with the same `Data`, even if these calls
+/// computed NaN.
 #[test]
 fn no_hidden_order() {
     for (seed, model) in all_models(3).iter().enumerate() {
@@ -40,8 +42,8 @@ fn no_hidden_order() {
     }
 }
 
-/// A robot with only fixed joints has no coordinates. Every function still gives its other results, and they are
-/// finite. The exception is the centre of mass of the moving bodies: without moving bodies, it is NaN, as documented.
+/// Checks robots with only fixed joints, which have no coordinates. All other results of every function must be finite.
+/// The exception is the centre of mass of the moving bodies: without moving bodies, it is NaN, as documented.
 #[test]
 fn robots_without_coordinates() {
     const CENTRE_OF_MASS: [&str; 6] = [
@@ -70,13 +72,13 @@ fn robots_without_coordinates() {
     }
 }
 
-/// Returns the message with which a call panics.
+/// Returns the message of a call's panic.
 fn message(call: impl FnOnce()) -> String {
     let panic = catch_unwind(AssertUnwindSafe(call)).expect_err("the call panics");
     panic.downcast_ref::<String>().cloned().expect("the message has numbers in it")
 }
 
-/// Each argument of each function is passed with one number too few or too many. The panic must name the argument.
+/// Passes each argument of each function with one number too few or too many. The panic must name the argument.
 #[test]
 fn wrong_lengths_name_the_argument() {
     let model = &robots::quadruped(); // nq 19, nv 18, 14 bodies including the world
@@ -137,7 +139,7 @@ fn wrong_lengths_name_the_argument() {
     expect(bad_armature, message(|| drop(robots::quadruped().with_armature(short_v))));
 }
 
-/// Every function that takes a `Data` panics if the `Data` was made for another robot.
+/// Checks that every function that takes a `Data` panics if the `Data` was made for another robot.
 #[test]
 fn data_of_another_model() {
     let [arm, quadruped, humanoid] = embedded();
@@ -154,8 +156,8 @@ fn data_of_another_model() {
     }
 }
 
-/// A `Data` is also rejected if the other robot has the same numbers of bodies, columns and coordinates, but another
-/// tree.
+/// Checks that a `Data` is also rejected if the robots have different trees but equal numbers of bodies, columns and
+/// coordinates.
 #[test]
 fn data_of_another_tree() {
     let robot = |parents: [usize; 3]| {
@@ -172,7 +174,7 @@ fn data_of_another_tree() {
     let found = message(|| drop(minv(&fork, &mut Data::new(&chain), &[0.0; 3]).clone()));
     let sizes = "(4, 3, 3) bodies, joint axes and coordinates, found (4, 3, 3)";
     assert_eq!(found, format!("data: made for a model of {sizes} in another tree"));
-    // a `Data` is accepted for the same tree with other constants
+    // A `Data` is accepted for the same tree with other constants.
     let heavy = chain.with_inertias(|_, I| I.scale(2.0)).unwrap();
     minv(&heavy, &mut Data::new(&chain), &[0.0; 3]);
     assert_eq!(heavy.total_mass(), 2.0 * chain.total_mass());
@@ -193,7 +195,8 @@ fn models_are_shared_between_threads() {
     });
 }
 
-/// A robot stored as JSON and read again is the same to the last bit, with or without limits. (JSON has no infinity.)
+/// Checks that a robot stored as JSON and read again has the same bits, with and without limits. (JSON has no
+/// infinity.)
 #[test]
 fn serde_round_trip() {
     for (seed, model) in all_models(3).iter().enumerate() {
@@ -227,7 +230,7 @@ fn names() {
     assert_eq!(arm.frames()[arm.frame("base").unwrap()].body, 0);
 }
 
-/// Threads can share models, and a `Data` can move to another thread. Both types can be cloned.
+/// Checks that threads can share models, that a `Data` can move to another thread, and that both types can be cloned.
 #[test]
 fn types_are_cloned_and_cross_threads() {
     use condyle_dynamics::{Batch, BatchConstraints, ConstraintSet, Data, DivideConquer, Matrices, Model, StateMatrix};

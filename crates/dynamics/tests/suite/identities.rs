@@ -1,4 +1,5 @@
-//! Algorithms compared with each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
+//! Tests that compare algorithms with each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia
+//! matrix.
 
 use crate::common;
 
@@ -21,8 +22,8 @@ fn vector(x: &[f64]) -> DVector<f64> {
     DVector::from_column_slice(x)
 }
 
-/// Checks rnea = M a + h, M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1 and ∂q̈ = −M⁻¹ ∂τ. Both sides of each equation
-/// come from different algorithms. Identities that hold within one algorithm are in `by_construction`.
+/// Checks rnea = M a + h, M M⁻¹ = 1, aba = M⁻¹ (τ − h), rnea ∘ aba = 1 and ∂q̈ = −M⁻¹ ∂τ. The two sides of each
+/// equation come from different algorithms. Identities within one algorithm are in `by_construction`.
 fn check(model: &Model, states: usize, seed: u64) {
     let mut inverse = Worst::new("M a + h = rnea", ROUNDING);
     let mut identity = Worst::new("M M⁻¹ = 1", INVERTED);
@@ -83,9 +84,9 @@ fn random_trees_with_mimics() {
     }
 }
 
-/// h = rnea(q, v, 0), g = rnea(q, 0, 0) and M = Mᵀ, to the bit. These identities hold by construction: h and g are
-/// computed by the passes of rnea, and one triangle of M is copied. So this test only protects the construction, and
-/// checks no physics. Other tests check h, g and M themselves: `book` (another formulation), `energy` (g and M as
+/// Checks h = rnea(q, v, 0), g = rnea(q, 0, 0) and M = Mᵀ to the bit. These identities hold by construction: h and g
+/// are computed by the passes of rnea, and one triangle of M is copied. So this test only protects the construction,
+/// and checks no physics. Other tests check h, g and M themselves: `book` (another formulation), `energy` (g and M as
 /// derivatives of energies), `closed_forms`, and the comparisons with Pinocchio.
 #[test]
 fn by_construction() {
@@ -101,7 +102,7 @@ fn by_construction() {
     }
 }
 
-/// M is positive definite, for trees of all shapes and with every kind of joint.
+/// Checks that M is positive definite, for trees of all shapes and with every type of joint.
 #[test]
 fn inertia_matrix_is_positive() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
@@ -111,8 +112,8 @@ fn inertia_matrix_is_positive() {
     }
 }
 
-/// A robot with mimic joints equals the robot without mimics under the constraint v_joint = G v: τ = Gᵀ τ_joint and M =
-/// Gᵀ M_joint G.
+/// Checks that a robot with mimic joints equals the same robot without mimics under the constraint v_joint = G v: τ =
+/// Gᵀ τ_joint and M = Gᵀ M_joint G.
 #[test]
 fn mimics_are_a_projection() {
     let mut efforts = Worst::new("τ = Gᵀ rnea(G q + o, G v, G a)", ROUNDING);
@@ -142,9 +143,9 @@ fn mimics_are_a_projection() {
     }
 }
 
-/// The same robot is described with other body frames: with any orientation, with any origin on the axis of a hinge,
-/// and with any origin for a slide. The coordinates do not change, so efforts, accelerations and M do not change
-/// either.
+/// Checks a robot that is described again with other body frames. Frames have any orientation; the origin of a hinge's
+/// frame is anywhere on the axis, and the origin of a slide's frame is anywhere. The coordinates do not change, so
+/// efforts, accelerations and M must not change either.
 #[test]
 fn frames_do_not_matter() {
     let mut efforts = Worst::new("rnea in other frames", ROUNDING);
@@ -156,7 +157,7 @@ fn frames_do_not_matter() {
         let rng = &mut rng(seed);
         let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
         let mut other = tree.clone();
-        // placement oXn of each body's new frame in the old frame
+        // placement oXn of each body's new frame n in the old frame o
         let mut news = vec![Se3::identity()];
         for part in &mut other.parts {
             let axis = part.joint.axis().map(|a| a.scale(1.0 / a.norm_squared().sqrt()));
@@ -209,7 +210,8 @@ fn frames_do_not_matter() {
     }
 }
 
-/// If a floating robot and gravity are rotated and moved together, results in the frames of the robot do not change.
+/// Checks that results in the frames of a floating robot do not change if the robot and gravity are rotated and moved
+/// together.
 #[test]
 fn moved_as_a_whole() {
     let mut slopes = ["∂τ/∂q", "∂τ/∂v", "∂τ/∂a"].map(|name| Worst::new(name, ROUNDING));
@@ -242,7 +244,7 @@ fn moved_as_a_whole() {
     }
 }
 
-/// The placements of bodies equal products of matrices from textbooks, in the frames of the model.
+/// Checks that the placements of bodies equal products of matrices from textbooks, in the frames of the model.
 #[test]
 fn placements() {
     let mut worst = Worst::new("oX_i = oX_λ X_T X_J", ROUNDING);
@@ -263,7 +265,7 @@ fn placements() {
     }
 }
 
-/// A force on the world has no effect.
+/// Checks that a force on the world has no effect.
 #[test]
 fn force_on_the_world() {
     let [arm, ..] = embedded();

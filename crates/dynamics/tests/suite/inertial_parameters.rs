@@ -1,4 +1,5 @@
-//! Physical validity of inertias, and the log-Cholesky parametrisation, which can only describe valid inertias.
+//! Tests of the physical validity of inertias, and of the log-Cholesky parametrisation, which can describe only valid
+//! inertias.
 
 use crate::common;
 
@@ -11,9 +12,9 @@ use condyle_dynamics::{Inertia, Sym3, Vec3, robots};
 use nalgebra::SMatrix;
 use num_dual::Dual64;
 
-/// Tolerance of a few roundings, relative to the largest number.
+/// Tolerance of a few rounding errors, relative to the largest number.
 const ROUNDING: f64 = 1e-13;
-/// Tolerance after a factorisation of pseudo-inertias with a condition number up to 1e5.
+/// Tolerance after a factorisation of pseudo-inertias, whose condition number is up to 1e5.
 const FACTORED: f64 = 1e-9;
 const CASES: u64 = 300;
 
@@ -25,7 +26,7 @@ fn ten_numbers_there_and_back() {
     }
 }
 
-/// The pseudo-inertia J is the sum Σ m (x, 1)(x, 1)ᵀ over mass points.
+/// Checks that the pseudo-inertia J of mass points is Σ m (x, 1)(x, 1)ᵀ.
 #[test]
 fn pseudo_inertia_is_the_second_moment() {
     for seed in 0..CASES {
@@ -36,11 +37,11 @@ fn pseudo_inertia_is_the_second_moment() {
             J += 0.7 * x * x.transpose();
         }
         assert!((pseudo_inertia(I) - J).amax() < ROUNDING * (1.0 + J.amax()));
-        assert!(check(I).is_ok()); // four points that are not in a plane have a volume
+        assert!(check(I).is_ok()); // four points that are not in a plane are valid
     }
 }
 
-/// The check for physical validity agrees with the eigenvalues of the pseudo-inertia J.
+/// Checks that the test of physical validity agrees with the eigenvalues of the pseudo-inertia J.
 #[test]
 fn physical_is_positive_definite() {
     let mut refused = 0;
@@ -69,7 +70,7 @@ fn what_is_wrong_is_said() {
     assert!(check(Inertia::from_com(1.0, Vec3::zero(), rod)).is_err()); // no volume
 }
 
-/// Every body of the embedded robots has a physically valid inertia.
+/// Checks that every body of the embedded robots has a physically valid inertia.
 #[test]
 fn our_robots_are_physical() {
     for model in [robots::arm7(), robots::quadruped(), robots::humanoid()] {
@@ -79,7 +80,7 @@ fn our_robots_are_physical() {
     }
 }
 
-/// The maps between log-Cholesky parameters θ and inertial parameters π are inverses of each other.
+/// Checks that the maps between log-Cholesky parameters θ and inertial parameters π are inverses of each other.
 #[test]
 fn log_cholesky_there_and_back() {
     for seed in 0..CASES {
@@ -94,7 +95,7 @@ fn log_cholesky_there_and_back() {
     }
 }
 
-/// The pseudo-inertia is J = U Uᵀ, with the matrix U of the paper on the log-Cholesky parametrisation.
+/// Checks that the pseudo-inertia is J = U Uᵀ, with the matrix U of the paper on the log-Cholesky parametrisation.
 #[test]
 fn log_cholesky_is_the_factor() {
     for seed in 0..CASES {
@@ -123,7 +124,7 @@ fn log_cholesky_is_the_factor() {
     }
 }
 
-/// The Jacobian ∂π/∂θ of the log-Cholesky map equals the derivative by dual numbers.
+/// Checks that the Jacobian ∂π/∂θ of the log-Cholesky map equals the derivative by dual numbers.
 #[test]
 fn log_cholesky_jacobian_is_the_derivative() {
     for seed in 0..CASES {

@@ -1,4 +1,4 @@
-//! Derivatives with respect to forces, inertial parameters, gravity, armature, damping and friction.
+//! Tests of derivatives with respect to forces, inertial parameters, gravity, armature, damping and friction.
 
 use crate::common;
 
@@ -10,8 +10,8 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
-/// condition number of M.
+/// Tolerance between two exact methods with some thousand rounding errors each. For forward dynamics, the tolerance
+/// includes the condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 6;
 const SMOOTHING: f64 = 0.3;
@@ -62,8 +62,8 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     [eps(&effort), eps(aba(&seeded, &mut data, &q, &v, &tau, &f_ext))]
 }
 
-/// Computes the efforts of coordinate k for one unit of damping or friction, by a law for one component of the
-/// velocity. The linear losses of a free joint act along the axes of its parent.
+/// Computes the efforts of coordinate k for one unit of damping or friction. The function `law` gives the loss at a
+/// component of the velocity. The linear losses of a free joint act along the axes of its parent.
 fn lost(model: &Model, s: &State, k: usize, law: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut loss = vec![0.0; model.nv()];
     let is_linear = |body: &&Body| body.joint == Joint::FreeFlyer && (body.idx_v..body.idx_v + 3).contains(&k);
@@ -108,7 +108,7 @@ fn every_input() {
     }
 }
 
-/// A force on the world has no effect.
+/// Checks that a force on the world has no effect.
 #[test]
 fn the_world() {
     let quadruped = condyle_dynamics::robots::quadruped();

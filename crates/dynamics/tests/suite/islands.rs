@@ -1,4 +1,5 @@
-//! Several robots in one model. Robots that are not connected by constraints are computed as if each robot were alone.
+//! Tests of models with several robots. Robots without constraints between them must be computed like models of single
+//! robots.
 
 use crate::common::{Worst, normal, random_pose, rng};
 use condyle_dynamics::{
@@ -12,7 +13,7 @@ use std::ops::Range;
 /// Tolerance between sums of the same numbers in different orders, times the condition numbers of M and of J M⁻¹ Jᵀ.
 const SAME: f64 = 1e-9;
 
-/// Robot, the contact frames of the robot, and whether contacts constrain all six directions of these frames.
+/// Robot with its contact frames. `rigid` tells whether contacts constrain all six directions of these frames.
 struct Part {
     model: Model,
     feet: &'static [&'static str],
@@ -32,7 +33,7 @@ fn parts() -> Vec<Part> {
     ]
 }
 
-/// Creates a model with all robots side by side.
+/// Creates a model with all robots.
 fn together(parts: &[Part]) -> Model {
     let (mut builder, mut rng) = (ModelBuilder::new("all"), rng(7));
     for (k, part) in parts.iter().enumerate() {
@@ -41,7 +42,7 @@ fn together(parts: &[Part]) -> Model {
     builder.build().unwrap()
 }
 
-/// Creates the model of one robot alone, at the same placement in the world as in the whole model.
+/// Creates the model of one robot, at the same placement in the world as in the model with all robots.
 fn alone(k: usize, parts: &[Part]) -> Model {
     let (mut builder, mut rng) = (ModelBuilder::new("one"), rng(7));
     let placement = (0..=k).map(|_| random_pose(&mut rng)).last().unwrap();
@@ -81,8 +82,9 @@ fn block(of: &Matrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
     columns.iter().flat_map(|&column| rows.iter().map(move |&row| of[(row, column)])).collect()
 }
 
-/// Compares each function on the whole model with the same function on each robot alone. Branches are computed in
-/// parallel lanes, and body by body. The `Data` was used before with a constraint set that connects two robots.
+/// Compares each function on the model with all robots with the same function on each single robot. Limbs are computed
+/// in parallel lanes, and also body by body. Before the test, the `Data` was used with a constraint set that connects
+/// two robots.
 #[test]
 fn each_robot_is_as_it_is_alone() {
     let (parts, mut worst) = (parts(), Worst::new("robots alone and together", SAME));
@@ -153,8 +155,8 @@ fn each_robot_is_as_it_is_alone() {
     }
 }
 
-/// Other orders of the constraints only change the order of the rows, although islands depend on the order. Here loops
-/// connect robots, with a proximal parameter and several iterations.
+/// Checks that other orders of the constraints change only the order of the rows, although islands depend on the order.
+/// In this test loops connect robots, with a proximal parameter and several iterations.
 #[test]
 fn the_order_of_constraints_changes_nothing() {
     let (parts, mut worst) = (parts(), Worst::new("orders of constraints", SAME));
@@ -198,7 +200,7 @@ fn the_order_of_constraints_changes_nothing() {
     }
 }
 
-/// A robot with NaN in its state does not affect the other robots.
+/// Checks that a robot with NaN in its state does not affect the other robots.
 #[test]
 fn a_robot_that_is_not_a_number_stays_alone() {
     let parts = parts();
@@ -218,7 +220,7 @@ fn a_robot_that_is_not_a_number_stays_alone() {
     }
 }
 
-/// Creates one model of two arms with seven coordinates each, and two quadrupeds with eighteen coordinates each.
+/// Creates a model of two arms with seven coordinates each, and two quadrupeds with eighteen coordinates each.
 fn four() -> Model {
     let mut builder = ModelBuilder::new("all");
     for (name, robot) in
@@ -229,8 +231,8 @@ fn four() -> Model {
     builder.build().unwrap()
 }
 
-/// Returns the islands for given contacts. Each contact is given by the name of a frame and, optionally, of a second
-/// frame.
+/// Returns the islands for given contacts. Each contact is given by the name of a frame and, if the contact connects
+/// two frames, by the name of the second frame.
 fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Range<usize>)> {
     let frame = |name: &str| model.frame(name).unwrap();
     let contact = |(one, other): &(&str, Option<&str>)| ContactConstraint {
@@ -245,15 +247,16 @@ fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Ran
 fn trees_and_what_ties_them() {
     let model = &four();
     assert_eq!(islands(model, &[]), [(0..7, 0..0), (7..14, 0..0), (14..32, 0..0), (32..50, 0..0)]);
-    // contacts with the world, in any order, keep the robots separate
+    // Contacts with the world, in any order, keep the robots separate.
     let apart = [("cLF_foot", None), ("cRF_foot", None), ("atool", None), ("dLF_foot", None)];
     assert_eq!(islands(model, &apart), [(0..7, 6..9), (7..14, 0..0), (14..32, 0..6), (32..50, 9..12)]);
-    // a constraint connects two robots, which then form one island
+    // A constraint connects two robots, which then form one island.
     assert_eq!(islands(model, &[("atool", Some("btool"))])[0], (0..14, 0..3));
-    // an island is a range of indices, so it includes robots and rows whose indices are between connected ones
+    // An island is a range of indices. So it includes robots and rows whose indices are between the indices of
+    // connected robots.
     assert_eq!(islands(model, &[("atool", Some("cLF_foot"))]), [(0..32, 0..3), (32..50, 0..0)]);
     let mixed = [("cLF_foot", None), ("dLF_foot", None), ("cRF_foot", None)];
     assert_eq!(islands(model, &mixed), [(0..7, 0..0), (7..14, 0..0), (14..50, 0..9)]);
-    // a constraint between two feet of one robot does not connect robots
+    // A constraint between two feet of one robot does not connect robots.
     assert_eq!(islands(model, &[("cLF_foot", Some("cRF_foot"))])[2], (14..32, 0..3));
 }

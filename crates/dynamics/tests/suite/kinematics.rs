@@ -1,4 +1,4 @@
-//! Jacobians of frames and of the configuration space, compared with dual numbers.
+//! Tests of the Jacobians of frames and of the configuration space. The results are compared with dual numbers.
 
 use crate::common;
 
@@ -10,7 +10,7 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance of products of about ten matrices.
+/// Tolerance of products of about ten matrices, relative to the largest number.
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 10;
 
@@ -27,7 +27,7 @@ fn times(J: &DMatrix<f64>, v: &[f64]) -> Vec<f64> {
     (J * nalgebra::DVector::from_column_slice(v)).as_slice().to_vec()
 }
 
-/// J v is the frame's velocity, in each reference frame.
+/// Checks in each reference frame that J v is the frame's velocity.
 #[test]
 fn frame_jacobians() {
     let mut worst = Worst::new("J v = velocity of the frame", ROUNDING);
@@ -37,7 +37,7 @@ fn frame_jacobians() {
         let q_moving = moved(model, &lift(&q), &dual(&vec![0.0; model.nv()], &v));
         let moving = forward_kinematics(model, &mut duals, &q_moving);
         let placements = forward_kinematics(model, &mut data, &q);
-        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // the matrix need not be zeroed
+        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // NaN, to find entries that are not overwritten
         for f in 0..model.frames().len() {
             let (oXf, local) = velocity(moving.frame(f));
             let at_origin = Se3::new(oXf.rotation, Vec3::zero());
@@ -56,7 +56,7 @@ fn frame_jacobians() {
     }
 }
 
-/// Forces f at frames are equivalent to the efforts Σ Jᵀ f at the joints.
+/// Checks that forces f at frames are equivalent to the efforts Σ Jᵀ f at the joints.
 #[test]
 fn external_forces() {
     let mut worst = Worst::new("rnea(f_ext) = rnea − Σ Jᵀ f", ROUNDING);
@@ -80,7 +80,7 @@ fn external_forces() {
     }
 }
 
-/// q ⊕ (q₁ ⊖ q) = q₁, (q ⊕ v) ⊖ q = v for rotations of less than π, and q ⊕ 0 = q.
+/// Checks that q ⊕ (q₁ ⊖ q) = q₁, that (q ⊕ v) ⊖ q = v for rotations of less than π, and that q ⊕ 0 = q.
 #[test]
 fn integrate_and_difference() {
     let mut there = Worst::new("q ⊕ (q₁ ⊖ q) = q₁", ROUNDING);
@@ -92,7 +92,7 @@ fn integrate_and_difference() {
             let mut d = vec![0.0; model.nv()];
             difference(model, &q, &q1, &mut d);
             let arrived = moved(model, &q, &d);
-            // a quaternion and its negative describe the same rotation, so placements are compared instead
+            // A quaternion and its negative describe the same rotation, so compare placements instead.
             let (mut one, mut two) = (Data::new(model), Data::new(model));
             let (one, two) = (forward_kinematics(model, &mut one, &arrived), forward_kinematics(model, &mut two, &q1));
             for i in 0..model.bodies().len() {
@@ -110,7 +110,7 @@ fn integrate_and_difference() {
     }
 }
 
-/// Returns the rate of a moving position as a tangent vector.
+/// Returns the rate of a moving position, given in dual numbers, as a tangent vector.
 fn rate(model: &Model, moving: &[Dual64]) -> Vec<f64> {
     let still = lift(&real(moving));
     let mut d = lift::<Dual64>(&vec![0.0; model.nv()]);
@@ -166,8 +166,8 @@ fn jacobians_of_difference() {
     }
 }
 
-/// Random positions are within the limits and have unit length where required. Generators with the same seed give the
-/// same positions.
+/// Checks that random positions are within the limits and have unit length where required. Generators with the same
+/// seed must give the same positions.
 #[test]
 fn random_configurations() {
     for model in all_models(TREES) {
@@ -178,7 +178,7 @@ fn random_configurations() {
             let (lower, upper) = (bound(model.limits().lower[k], -3.0), bound(model.limits().upper[k], 3.0));
             assert!(lower <= q && q <= upper, "{k}: {q} on\n{model}");
         }
-        // positions are on the manifold, so a step of zero changes only rounding
+        // Positions are on the manifold, so a step of zero may change them only by rounding errors.
         assert!(relative(&moved(&model, &q, &vec![0.0; model.nv()]), &q) < 1e-15);
     }
 }

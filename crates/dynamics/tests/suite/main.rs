@@ -1,5 +1,5 @@
-//! Most tests of this crate are in this one program, since each program compiles the generic algorithms again. Tests
-//! that read environment variables or select a SIMD level are separate programs.
+//! Program with most tests of this crate. Each test program compiles the generic algorithms again, so one program is
+//! faster. Tests that read environment variables or select a SIMD level are separate programs.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]

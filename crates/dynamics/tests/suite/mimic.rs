@@ -1,4 +1,4 @@
-//! Joints that follow other joints: comparisons with Pinocchio, full turns, and rotors of followers.
+//! Tests of joints that follow other joints: comparisons with Pinocchio, full turns, and rotors of followers.
 
 use crate::common;
 
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 /// Tolerance between some hundred products in different orders.
 const ROUNDING: f64 = 1e-13;
-/// Tolerance after some hundred turns; each turn adds one more error of the size of `ROUNDING`.
+/// Tolerance after some hundred turns. Each turn adds one more error of the size of `ROUNDING`.
 const TURNS_ROUNDING: f64 = 1e-11;
 
 fn floats(value: &Value) -> Vec<f64> {
@@ -19,9 +19,9 @@ fn floats(value: &Value) -> Vec<f64> {
     all.flat_map(|x| x.as_f64().map_or_else(|| floats(x), |x| vec![x])).collect()
 }
 
-/// Placements, efforts, M and effort limits equal Pinocchio's, for every pair of joint types that Pinocchio supports as
-/// leader and follower. Here, position limits, velocity limits and losses of a follower act on the leader, but
-/// Pinocchio ignores them.
+/// Checks that placements, efforts, M and effort limits equal Pinocchio's. The file `mimic.urdf` has every pair of
+/// joint types that Pinocchio supports as leader and follower. Here, position limits, velocity limits and losses of a
+/// follower act on the leader, but Pinocchio ignores them.
 #[test]
 fn as_in_pinocchio() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
@@ -65,7 +65,7 @@ fn body(mass: f64) -> Inertia<f64> {
     Inertia::from_com(mass, Vec3::new(0.1, 0.2, -0.1), Sym3::diagonal(0.05))
 }
 
-/// Creates a leader with an oblique axis, and followers whose axes have other directions.
+/// Creates a leader with an oblique axis, and three followers whose axes have other directions.
 fn geared(leader: fn(Vec3<f64>) -> Joint, follower: fn(Vec3<f64>) -> Joint, options: &JointOptions) -> Model {
     let mut builder = ModelBuilder::new("gears");
     let axis = Vec3::new(0.3, -0.5, 0.8);
@@ -80,8 +80,8 @@ fn geared(leader: fn(Vec3<f64>) -> Joint, follower: fn(Vec3<f64>) -> Joint, opti
     builder.build().unwrap()
 }
 
-/// A continuous leader moves all followers like a revolute leader, even after many turns. Followers are continuous and
-/// revolute joints.
+/// Checks that a continuous leader moves its followers like a revolute leader, even after many turns. The followers are
+/// continuous or revolute joints.
 #[test]
 fn continuous_is_revolute() {
     type Kind = fn(Vec3<f64>) -> Joint;
@@ -106,8 +106,8 @@ fn continuous_is_revolute() {
     }
 }
 
-/// The rotor of a follower counts with the square of the follower's ratio, also when the robot becomes a part of
-/// another robot.
+/// Checks that the armature of a follower is multiplied by the square of the follower's ratio, also after the robot has
+/// been added to another robot.
 #[test]
 fn rotors_of_followers() {
     let revolute = |axis| Joint::Revolute { axis };

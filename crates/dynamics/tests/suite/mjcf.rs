@@ -1,11 +1,11 @@
-//! Dynamics of models from MJCF, compared with results of MuJoCo (`data/make_mujoco.py`).
+//! Tests of the dynamics of models from MJCF. The results are compared with MuJoCo (`data/make_mujoco.py`).
 
 use condyle_dynamics::{Data, FrameKind, Joint, MjcfOptions, Model, Vec3, crba, forward_kinematics, rnea};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Relative tolerance. Both libraries sum some hundred products. MuJoCo uses principal axes, which it computes by
-/// iteration.
+/// Relative tolerance. Both libraries sum some hundred products. MuJoCo uses principal axes of inertia, which it
+/// computes by iteration.
 const AGREES: f64 = 1e-10;
 
 fn data(file: &str) -> PathBuf {
@@ -28,7 +28,7 @@ fn close(what: &str, ours: &[f64], theirs: &[f64]) {
     assert!(error <= AGREES, "{what}: {error:e}");
 }
 
-/// Returns the position, then the rotation matrix by rows.
+/// Returns the translation, and then the rotation matrix by rows.
 fn flat(X: &condyle_dynamics::Se3<f64>) -> Vec<f64> {
     let (p, R) = (X.translation, X.rotation.transpose());
     [p, R.x, R.y, R.z].iter().flat_map(|v| v.to_array()).collect()
@@ -73,7 +73,8 @@ fn against_mujoco(name: &str) {
                 close(name, &flat(&placements.frame(i)), &theirs);
             }
         }
-        // v = T v_mujoco, a = T a_mujoco + Ṫ v_mujoco, τ_mujoco = Tᵀ τ with T = Rᵀ for the free joint's linear part
+        // MuJoCo's velocity is v = T v_mujoco with T = Rᵀ for the free joint's linear part. So a = T a_mujoco + Ṫ
+        // v_mujoco and τ_mujoco = Tᵀ τ.
         let R = placements.body(1).rotation;
         let mut a = vec![0.0; model.nv()];
         let linear = |x: &[f64]| Vec3::new(x[0], x[1], x[2]);
@@ -99,7 +100,7 @@ fn against_mujoco(name: &str) {
         }
         close("M", M.as_slice(), &floats(&state["M"]));
     }
-    // Condyle merges bodies without joints into their parents, so the test compares sums of masses
+    // Condyle merges bodies without joints into their parents, so compare the sums of masses.
     let masses: f64 = reference["bodies"].as_object().unwrap().values().filter_map(Value::as_f64).sum();
     if free {
         close("mass", &[model.total_mass()], &[masses]);
@@ -116,7 +117,7 @@ fn quadruped_equals_mujoco() {
     against_mujoco("quadruped");
 }
 
-/// The gripper has joints that follow by equality constraints, rotors of followers, and inertias that MuJoCo's compiler
+/// Checks a gripper with followers from equality constraints, rotors of followers, and inertias that MuJoCo's compiler
 /// corrects.
 #[test]
 fn gripper_equals_mujoco() {
@@ -137,5 +138,5 @@ fn gripper_equals_mujoco() {
         }
     }
     let free = Model::from_mjcf(data("gripper.xml"), &MjcfOptions::default()).unwrap();
-    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // inactive equality constraints are ignored
+    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // a warning for each active equality
 }

@@ -1,4 +1,4 @@
-//! Model files that users have edited: each file gives a working model, or an error with the reason.
+//! Tests of model files that users have edited. Each file must give a working model, or an error with the reason.
 
 use crate::common;
 
@@ -17,7 +17,7 @@ fn arm() -> Value {
     serde_json::to_value(&embedded()[0]).unwrap()
 }
 
-/// Checks the error for a file in which the value at `pointer` is replaced.
+/// Checks the error message for a file in which the value at `pointer` was replaced.
 #[track_caller]
 fn expect(pointer: &str, value: Value, message: &str) {
     let mut file = arm();
@@ -65,7 +65,7 @@ fn mistakes_have_names() {
     assert!(read(&file).unwrap_err().starts_with("unknown field `nodes`"));
 }
 
-/// Values that are edited in a file are used in computations.
+/// Checks that edited values of a file have an effect on computations.
 #[test]
 fn edits_count() {
     let mut file = arm();
@@ -101,7 +101,7 @@ fn anywhere<'a>(file: &'a mut Value, rng: &mut StdRng) -> &'a mut Value {
     anywhere(next.expect("it has so many"), rng)
 }
 
-/// Makes a random change: changes a number, adds or removes an entry, or swaps two elements.
+/// Makes a random change in a file: changes a number, adds or removes an entry, or swaps two elements.
 fn edit(file: &mut Value, rng: &mut StdRng) {
     let numbers = [json!(0), json!(1), json!(2), json!(-1.0), json!(1e300), json!(u64::MAX), json!(null), json!(0.5)];
     let (change, other) = (rng.random_range(0..4), anywhere(file, rng).clone());
@@ -119,7 +119,7 @@ fn edit(file: &mut Value, rng: &mut StdRng) {
     }
 }
 
-/// Number of edited files that are read.
+/// Number of edited files that the test reads.
 const FILES: usize = 3000;
 
 #[test]

@@ -1,4 +1,5 @@
-//! Hand-written derivatives of frames' motion, momentum, energies and static efforts, compared with dual numbers.
+//! Tests of analytical derivatives of the motion of frames, momentum, energies and static efforts. The results are
+//! compared with dual numbers.
 
 use crate::common;
 
@@ -11,7 +12,7 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance between two exact methods with some hundred roundings each.
+/// Tolerance between two exact methods with some hundred rounding errors each.
 const EXACT: f64 = 1e-12;
 const TREES: u64 = 5;
 const FRAMES: [ReferenceFrame; 3] = [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned];
@@ -34,7 +35,7 @@ fn by_duals(
     DMatrix::from_fn(columns[0].len(), nv, |i, k| columns[k][i])
 }
 
-/// Returns a 6 × nv matrix of NaN, so that entries that are not written are visible.
+/// Returns a 6 × nv matrix of NaN. After a call, NaN shows which entries the call did not write.
 fn six(model: &Model) -> DMatrix<f64> {
     DMatrix::from_element(6, model.nv(), f64::NAN)
 }

@@ -1,4 +1,4 @@
-//! Panics for mistakes of the caller: each names the mistake, and reports a line of the caller's file.
+//! Tests of panics for mistakes of the caller. Each panic must name the mistake and report a line of the caller's file.
 
 use crate::common::panics::{Panic, assert_panic, panic_of};
 use crate::common::rng;
@@ -15,14 +15,14 @@ use num_dual::Dual64;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// End of this file's path.
+/// Last components of this file's path, as a panic reports it.
 const HERE: &str = "tests/suite/panics.rs";
 
-/// Functions without an argument that could have a wrong length.
+/// Functions that have no argument with a variable length.
 const WITHOUT_LENGTHS: &[&str] = &["log-Cholesky parameters"];
 
-/// Arguments (function, name) that `common/table.rs` copies to a matrix of nalgebra. For wrong lengths, nalgebra itself
-/// panics.
+/// Arguments (function, name) that `common/table.rs` copies to a matrix of nalgebra. If such an argument has a wrong
+/// length, nalgebra panics during the copy.
 const COPIED: &[(&str, &str)] = &[("transport", "x")];
 
 /// Calls every function of `common/table.rs` with one number too few in each argument.
@@ -66,7 +66,7 @@ fn wrong_lengths_of_dual_numbers_are_reported_at_the_call() {
     wrong_lengths::<Dual64>();
 }
 
-/// If a body or a frame does not exist, the panic names its index.
+/// Checks that a panic for a missing body or frame names its index.
 #[test]
 fn missing_bodies_and_frames_are_named() {
     let arm = robots::arm7();
@@ -114,7 +114,7 @@ fn missing_bodies_and_frames_are_named() {
     assert_panic(HERE, "dJ: expected 6 × 7", || moving.frame_jacobian_rate(1, World, small));
 }
 
-/// Other invalid arguments of functions are reported at the line of the call.
+/// Checks that other invalid arguments of functions are reported at the line of the call.
 #[test]
 fn other_mistakes_are_reported_at_the_call() {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
@@ -169,7 +169,8 @@ fn other_mistakes_are_reported_at_the_call() {
     });
 }
 
-/// Wrong arguments of the functions of a batch, and of its results, are reported at the line of the call.
+/// Checks that invalid arguments of the functions of a batch, and of functions of its results, are reported at the line
+/// of the call.
 #[test]
 fn mistakes_with_batches_are_reported_at_the_call() {
     let arm = robots::arm7();
@@ -221,7 +222,7 @@ fn mistakes_with_batches_are_reported_at_the_call() {
     assert_panic(HERE, "to: expected 49 numbers", || M.write_rows(&mut [0.0; 48]));
 }
 
-/// A robot whose inertia matrix is singular is reported at the line of the call, also by a batch.
+/// Checks that a robot with a singular inertia matrix is reported at the line of the call, also by a batch.
 #[test]
 fn singular_robots_are_reported_at_the_call() {
     use condyle_dynamics::{Inertia, Joint, WORLD};
@@ -237,11 +238,12 @@ fn singular_robots_are_reported_at_the_call() {
     _ = batch.crba(&light, &[0.0; 2]);
 }
 
-/// Folders and files with internal functions, whose arguments were already checked by the calling functions.
+/// Folders and files with internal functions. Their callers have already checked the arguments.
 const KERNELS: [&str; 4] =
     ["spatial/src/simd/", "linalg/src/outer.rs", "linalg/src/runs.rs", "linalg/src/threads/parts.rs"];
 
-/// Every public function that is documented to panic has `#[track_caller]`, so that a panic reports the caller's line.
+/// Checks that every public function with documented panics has `#[track_caller]`. A panic then reports the caller's
+/// line.
 #[test]
 fn functions_that_panic_track_their_callers() {
     let mut without = Vec::new();
@@ -266,7 +268,7 @@ fn functions_that_panic_track_their_callers() {
     assert!(without.is_empty(), "without #[track_caller]:\n{}", without.join("\n"));
 }
 
-/// Returns the Rust files of a folder and of its subfolders.
+/// Returns the Rust files of a folder and of all its subfolders.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
@@ -291,7 +293,7 @@ fn mistakes_with_simulations_and_scratch_are_reported_at_the_call() {
     assert_panic(HERE, "tangent: expected 7 numbers, found 3", || {
         condyle_dynamics::distance(&arm, &[0.0; 7], &[0.0; 7], &mut [0.0; 3]);
     });
-    // a joint that moves no mass makes M singular
+    // A joint that moves no mass makes M singular.
     let massless = crate::validity::massless_tip();
     assert_panic(HERE, "singular", || {
         let _ = Simulation::new(&massless, Settings::default()).step(&vec![0.0; massless.nv()], &[]);

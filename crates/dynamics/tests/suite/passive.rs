@@ -1,5 +1,5 @@
-//! Passive efforts: damping and friction only take power, and all derivatives are exact. No other function adds passive
-//! efforts.
+//! Tests of passive efforts. Damping and friction must only remove power, and all derivatives must be exact. No other
+//! function may add passive efforts.
 
 use crate::common;
 
@@ -12,7 +12,7 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Tolerance of a few roundings.
+/// Tolerance of a few rounding errors.
 const ROUNDING: f64 = 1e-14;
 const SMOOTHING: f64 = 0.01;
 
@@ -49,7 +49,7 @@ fn takes_power() {
     }
 }
 
-/// Friction follows Coulomb's law where the speed is not small; it is zero at rest, and odd in v.
+/// Checks that friction follows Coulomb's law except at small speeds. The friction must be zero at rest, and odd in v.
 #[test]
 fn friction_is_smoothed() {
     let model = chain(true);
@@ -61,13 +61,13 @@ fn friction_is_smoothed() {
     assert!(torque(0.0).iter().all(|&x| x == 0.0));
     for (k, &tau) in torque(7.3 * SMOOTHING).iter().enumerate() {
         let expected = -model.damping()[k] * 7.3 * SMOOTHING - model.friction()[k];
-        assert!((tau - expected).abs() <= 1e-6 * model.friction()[k] + ROUNDING); // the documented bound
+        assert!((tau - expected).abs() <= 1e-6 * model.friction()[k] + ROUNDING); // the documented bound of the error
     }
     assert!(torque(0.3).iter().zip(torque(-0.3)).all(|(a, b)| *a == -b));
 }
 
-/// The derivatives equal derivatives by dual numbers, for every kind of joint, with springs, polynomial damping,
-/// friction and gravity compensation, and for mimic joints.
+/// Checks the derivatives against dual numbers, for every type of joint and for mimic joints. The joints have springs,
+/// polynomial damping, friction and gravity compensation.
 #[test]
 fn slopes_are_the_derivatives() {
     let mut worst = Worst::new("∂(passive torque)", 1e-12);
@@ -94,7 +94,7 @@ fn slopes_are_the_derivatives() {
     }
 }
 
-/// Friction acts on a free body along the axes of the world, for any orientation of the body.
+/// Checks that friction acts on a free body along the axes of the world, for any orientation of the body.
 #[test]
 fn friction_of_a_free_joint() {
     let mut builder = ModelBuilder::new("box");
@@ -103,16 +103,16 @@ fn friction_of_a_free_joint() {
     builder.body_with(("box", "float"), WORLD, Joint::FreeFlyer, Se3::identity(), I, losses);
     let model = builder.build().expect("it is well-formed");
     let mut q = neutral(&model);
-    q[3..].copy_from_slice(&[0.1, -0.5, 0.5, 0.7].map(|x: f64| x)); // has length 1
+    q[3..].copy_from_slice(&[0.1, -0.5, 0.5, 0.7].map(|x: f64| x)); // a quaternion of length 1
     let R = Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
     let along = R.transpose_mul(Vec3::new(1.0, -1.0, 0.0)).to_array();
     let mut tau = [f64::NAN; 6];
     passive_torque(&model, &q, &[along[0], along[1], along[2], 0.0, 0.0, 0.0], SMOOTHING, &mut tau);
-    let force = R * Vec3::new(tau[0], tau[1], tau[2]); // 2 N along each axis of the world in which it moves
+    let force = R * Vec3::new(tau[0], tau[1], tau[2]); // 2 N along each of the world's axes along which the body moves
     assert!((force - Vec3::new(-2.0, 2.0, 0.0)).norm_squared() < 1e-20, "{force:?}");
 }
 
-/// Damping and friction do not change the results of dynamics, unless the caller adds passive efforts.
+/// Checks that damping and friction do not change the results of dynamics, unless the caller adds passive efforts.
 #[test]
 fn acts_only_where_asked_for() {
     let (with, without) = (chain(true), chain(false));
@@ -122,8 +122,8 @@ fn acts_only_where_asked_for() {
     assert_eq!(aba(&with, &mut data, &q, &v, &tau, &[]), aba(&without, &mut other, &q, &v, &tau, &[]));
 }
 
-/// In a simulation with friction switched on, a sliding body stops at the expected point, and the energy only
-/// decreases.
+/// Checks a simulation with friction: a sliding body must stop at the expected point, and the energy must only
+/// decrease.
 #[test]
 fn simulations_lose_energy() {
     const DT: f64 = 1e-3;
@@ -145,7 +145,7 @@ fn simulations_lose_energy() {
         let (way, speed): (f64, f64) = slide(lossless);
         assert!((way - 6.0).abs() < 1e-9 && (speed - 3.0).abs() < 1e-9); // friction is switched off
         let (way, speed): (f64, f64) = slide(lossy);
-        assert!((way - 3.0 * 3.0 / (2.0 * 4.0 / 2.0)).abs() < 5e-3); // v²/(2 f/m), after 1.5 s
+        assert!((way - 3.0 * 3.0 / (2.0 * 4.0 / 2.0)).abs() < 5e-3); // v²/(2 f/m), reached after 1.5 s
         assert!(speed.abs() < 1e-3);
         let model = chain(true);
         let State { q, v, .. } = State::random(&model, &mut rng(2));

@@ -1,4 +1,5 @@
-//! Points on bodies and frames, compared with frames at these points, and with derivatives by dual numbers.
+//! Tests of points on bodies and frames. The results are compared with frames at these points, and with derivatives by
+//! dual numbers.
 
 use crate::common::{State, all_models, dual, eps, lift, moved, normal3, relative, rng};
 use condyle_dynamics::{
@@ -14,8 +15,8 @@ fn flat(v: Vec3<f64>) -> [f64; 3] {
     v.to_array()
 }
 
-/// A point has the Jacobian and velocity of a frame at this point, in the linear rows. The test uses every body of all
-/// kinds of robots.
+/// Checks that a point has the linear rows of the Jacobian and of the velocity of a frame at this point. The test uses
+/// every body of all kinds of robots.
 #[test]
 fn points_are_frames_put_there() {
     for (seed, model) in all_models(4).iter().enumerate() {
@@ -26,7 +27,7 @@ fn points_are_frames_put_there() {
             let at = Se3 { translation: point, ..Se3::identity() };
             let with = model.with_frame("point", FrameParent::Body(body), at).unwrap();
             let frame = with.frame("point").unwrap();
-            let mut data = Data::new(model); // the tree is the same
+            let mut data = Data::new(model); // both models have the same tree
             let motion = forward_velocities(&with, &mut data, &q, &v);
             let axes = ReferenceFrame::LocalWorldAligned;
             let [mut J, mut here, mut there] = [3, 6, 3].map(|rows| DMatrix::zeros(rows, model.nv()));
@@ -44,7 +45,7 @@ fn points_are_frames_put_there() {
     }
 }
 
-/// J δ is the derivative of the point's position along δ.
+/// Checks that J δ is the derivative of the point's position along δ.
 #[test]
 fn jacobians_are_derivatives() {
     for (seed, model) in all_models(4).iter().enumerate() {
@@ -64,7 +65,7 @@ fn jacobians_are_derivatives() {
     }
 }
 
-/// A force at a point, in the world's axes, accelerates the robot by M⁻¹ Jᵀ f.
+/// Checks that a force f at a point, along the world's axes, accelerates the robot by M⁻¹ Jᵀ f.
 #[test]
 fn forces_at_points() {
     for (seed, model) in all_models(2).iter().enumerate() {
@@ -88,8 +89,8 @@ fn forces_at_points() {
     }
 }
 
-/// Constraints can use a frame that was added to a robot. A constraint set that was made before is rejected for the
-/// robot with the new frame.
+/// Checks that constraints can use a frame that was added to a robot. A constraint set made before this addition must
+/// be rejected for the robot with the new frame.
 #[test]
 fn frames_can_be_added() {
     let arm = robots::arm7();
@@ -108,7 +109,7 @@ fn frames_can_be_added() {
     let motion = condyle_dynamics::forward_accelerations(&with, &mut data, &[0.3; 7], &[0.0; 7], &acceleration);
     let still = motion.frame_classical_acceleration(tip, ReferenceFrame::LocalWorldAligned);
     assert!(still.linear.norm() < 1e-8, "{still:?}");
-    // a constraint set made for the same tree with other frames is rejected
+    // A constraint set made for the same tree with other frames is rejected.
     let old = std::panic::catch_unwind(|| {
         let mut set = ConstraintSet::new(&arm, &[ContactConstraint::point(arm.frame("tool").unwrap())]).unwrap();
         let _ = constrained_dynamics(&with, &mut Data::new(&with), &mut set, &[0.3; 7], &[0.0; 7], &[0.0; 7], &[]);
@@ -136,12 +137,12 @@ fn frames_that_cannot_be() {
     assert_eq!(said("tip", "tool".into(), infinite), "frame `tip`: placement is not finite");
     let twice = arm.with_frame("tip", FrameParent::Body(0), here).unwrap().with_frame("tip", "tool", here);
     assert_eq!(twice.unwrap_err().to_string(), "two frames are named `tip`");
-    assert_eq!(said("tool", "tool".into(), here), "two frames are named `tool`"); // the name of the robot's own frame
+    assert_eq!(said("tool", "tool".into(), here), "two frames are named `tool`"); // name of a frame of the robot
     assert_eq!(said("", "tool".into(), here), "frame ``: a frame without a name cannot be found");
 }
 
-/// A model equals its clone, and the model read back from its file. It does not equal a model in which one number
-/// differs.
+/// Checks that a model equals its clone, and the model read from its file. A model in which one number differs must not
+/// be equal.
 #[test]
 fn models_are_compared() {
     for model in all_models(2) {

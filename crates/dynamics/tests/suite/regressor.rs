@@ -1,4 +1,4 @@
-//! Regressors: dynamics and energies are linear in the inertial parameters.
+//! Tests of regressors: dynamics and energies are linear in the inertial parameters.
 
 use crate::common;
 
@@ -22,7 +22,7 @@ fn parameters(model: &Model) -> DVector<f64> {
     )
 }
 
-/// Efforts are τ = Y π + armature · a, with the regressor Y.
+/// Checks that the efforts are τ = Y π + armature · a, with the regressor Y and the inertial parameters π.
 #[test]
 fn torques() {
     let mut worst = Worst::new("Y π = rnea", ROUNDING);
@@ -37,7 +37,8 @@ fn torques() {
     }
 }
 
-/// Each column of Y is the derivative of the torques, by dual numbers in the model's constants.
+/// Checks that each column of Y is the derivative of the torques with respect to a parameter, by dual numbers in the
+/// model's constants.
 #[test]
 fn columns_are_derivatives() {
     let mut worst = Worst::new("Y = ∂τ/∂π", ROUNDING);
@@ -81,7 +82,7 @@ fn energies() {
     }
 }
 
-/// The regressor Y does not contain results of earlier calls with the same `Data`.
+/// Checks that the regressor Y does not contain results of earlier calls with the same `Data`.
 #[test]
 fn nothing_is_left_over() {
     let model = robots::quadruped();

@@ -1,4 +1,4 @@
-//! Dynamics of models from SDF, compared with the same robot as URDF and with Drake.
+//! Tests of the dynamics of models from SDF. The results are compared with a URDF of the same robot, and with Drake.
 
 use condyle_dynamics::{
     Data, Error, Joint, Model, SdfOptions, UrdfOptions, Vec3, crba, forward_kinematics, nonlinear_effects,
@@ -9,7 +9,8 @@ const ROUNDING: f64 = 1e-12;
 
 const LINKAGE: &str = include_str!("../data/linkage.sdf");
 
-/// URDF of the same robot, with poses computed by hand: in URDF, the frame of each link is at its joint.
+/// URDF of the robot in `linkage.sdf`. Its poses are computed by hand, because in URDF the frame of each link is at the
+/// link's joint.
 const URDF: &str = r#"<robot name="linkage">
   <link name="base"><inertial><mass value="4"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.25"/></inertial></link>
   <link name="crank"><inertial><origin xyz="0.2 0 0" rpy="0 0 0.3"/><mass value="1"/><inertia ixx="0.01" ixy="0.001" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
@@ -62,7 +63,7 @@ fn equals_the_same_robot_as_urdf() {
     }
 }
 
-/// A right-handed screw with 2 mm per turn is described by either of SDF's two elements for the pitch.
+/// Checks a right-handed screw with 2 mm per turn. Each of SDF's two elements for the pitch must give the same screw.
 #[test]
 fn screws() {
     for pitch in ["screw_thread_pitch>0.002</screw_thread_pitch", "thread_pitch>-3141.592653589793</thread_pitch"] {
@@ -81,7 +82,8 @@ fn screws() {
     }
 }
 
-/// An axis follows another axis: multiplier · (leader − reference) + offset. Both may be axes of universal joints.
+/// Checks an axis that follows another axis: multiplier · (leader − reference) + offset. Both axes may belong to
+/// universal joints.
 #[test]
 fn axes_that_follow() {
     let mimic = |inside: &str, ratio: &str| {
@@ -94,7 +96,7 @@ fn axes_that_follow() {
     };
     let (free, model) = (load(LINKAGE, None).unwrap(), mimic("joint='cross' axis='axis2'", "-0.5").unwrap());
     assert_eq!((model.nq(), model.nv()), (5, 4));
-    let q = [0.2, 0.4, -0.7, 0.6, 0.8]; // turn, cross (two), spin
+    let q = [0.2, 0.4, -0.7, 0.6, 0.8]; // order: turn, cross (two axes), spin
     let slide = -0.5 * (q[2] - 0.3) + 0.1;
     let (mut ours, mut theirs) = (Data::new(&model), Data::new(&free));
     let here = forward_kinematics(&model, &mut ours, &q);
@@ -116,7 +118,7 @@ fn axes_that_follow() {
     assert!(said.iter().any(|s| s.ends_with(expected)), "{said:?}");
 }
 
-/// Returns a link of 2 kg with the given name and pose.
+/// Returns the SDF text of a link of 2 kg with the given name and pose.
 fn link(name: &str, pose: &str) -> String {
     format!(
         "<link name='{name}'><pose>{pose}</pose><inertial><pose>0.1 0 0 0 0 0</pose><mass>2</mass>
@@ -124,7 +126,7 @@ fn link(name: &str, pose: &str) -> String {
     )
 }
 
-/// Compares M, the bias and the position of a frame with Drake's numbers.
+/// Compares M, the bias and the position of a frame with numbers from Drake.
 fn drake(model: &Model, q: &[f64], v: &[f64], (M, h): (&[f64], &[f64]), (frame, at): (&str, [f64; 3])) {
     let mut data = Data::new(model);
     close("M", crba(model, &mut data, q).as_slice(), M);
@@ -133,9 +135,9 @@ fn drake(model: &Model, q: &[f64], v: &[f64], (M, h): (&[f64], &[f64]), (frame, 
     close(frame, &placements.frame(model.frame(frame).unwrap()).translation.to_array(), &at);
 }
 
-/// A model contains another model. Poses are relative to the inner model and its frames and links; there is a placement
-/// frame, and axes are expressed in other frames. The reference numbers come from Drake 1.51: `CalcMassMatrix`,
-/// `CalcBiasTerm` − `CalcGravityGeneralizedForces`, with the base welded at its pose.
+/// Checks a model that contains another model. Poses are relative to the inner model and to its frames and links. The
+/// inner model has a placement frame, and axes are expressed in other frames. The reference numbers come from Drake
+/// 1.51: `CalcMassMatrix`, `CalcBiasTerm` − `CalcGravityGeneralizedForces`, with the base welded at its pose.
 #[test]
 fn a_model_in_a_model_is_drakes() {
     let (base, arm) = (link("base", ""), link("arm", "0 0 0.4 0 0 0"));
@@ -159,8 +161,8 @@ fn a_model_in_a_model_is_drakes() {
     drake(&model, &[0.3, -0.4], &[0.5, 0.7], (&M, &h), ("inner::tip", tip));
 }
 
-/// A merged model keeps its model frame, which is placed by a placement frame inside the model. The reference numbers
-/// come from Drake 1.51.
+/// Checks a model that is merged into another model. The merged model keeps its model frame, which is placed by a
+/// placement frame inside the model. The reference numbers come from Drake 1.51.
 #[test]
 fn a_merged_model_is_drakes() {
     let folder = std::env::temp_dir().join(format!("condyle_merged_{}", std::process::id()));
@@ -190,7 +192,8 @@ fn a_merged_model_is_drakes() {
     drake(&model, &q, &v, (&M, &h), ("flange", [0.20867700229444647, -0.07692029983644436, -0.005975034974713755]));
 }
 
-/// A joint whose child link is nearer to the root keeps its position. The reference numbers come from Drake 1.51.
+/// Checks a joint whose child link is nearer to the root than its parent link: the joint keeps its position. The
+/// reference numbers come from Drake 1.51.
 #[test]
 fn a_reversed_joint_is_drakes() {
     let links =
@@ -218,8 +221,8 @@ fn a_reversed_joint_is_drakes() {
     drake(&model, &[0.3, -0.4, 0.2], &[0.5, 0.7, -0.3], (&M, &h), ("d", d));
 }
 
-/// A universal joint is reversed if its child link is nearer to the root: the inverse of R_y(q₁) R_x(q₂) is R_x(−q₂)
-/// R_y(−q₁).
+/// Checks a universal joint whose child link is nearer to the root. The joint is then reversed: the inverse of R_y(q₁)
+/// R_x(q₂) is R_x(−q₂) R_y(−q₁).
 #[test]
 fn a_reversed_universal_joint_moves_the_same() {
     let cross = |[parent, child]: [&str; 2], [first, second]: [&str; 2]| {

@@ -1,4 +1,4 @@
-//! Hand-written second derivatives, compared with hyper-dual numbers and with each other.
+//! Tests of analytical second derivatives. The results are compared with hyper-dual numbers and with each other.
 
 use crate::common;
 
@@ -10,8 +10,8 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::HyperDual64;
 
-/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
-/// condition number of M.
+/// Tolerance between two exact methods with some thousand rounding errors each. For forward dynamics, the tolerance
+/// includes the condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 5;
 
@@ -22,8 +22,8 @@ fn dot(x: &[HyperDual64], lambda: &[f64]) -> HyperDual64 {
     x.iter().zip(lambda).map(|(&x, &l)| x * l).sum()
 }
 
-/// Computes a block of second derivatives of φ with respect to two arguments (`blocks`). Each of the two dual parts
-/// carries one direction.
+/// Computes a block of second derivatives of φ with respect to two arguments, whose indices are `blocks`. Each of the
+/// two dual parts of a number carries one direction.
 fn by_hyper_duals(
     phi: Phi,
     model: &Model,
@@ -56,7 +56,7 @@ fn inverse_dynamics() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
         let State { q, v, a, tau: lambda, f_ext } = State::random(model, &mut rng(seed as u64));
         let mut data = Data::new(model);
-        let serial = model.clone().with_limbs(false); // the same sums in the same order
+        let serial = model.clone().with_limbs(false); // computes the sums in the same order as hyper-dual numbers
         for f in [&[][..], &f_ext] {
             let first = rnea_derivatives(&serial, &mut data, &q, &v, &a, f).dtau_dq.clone();
             let hessian = rnea_hessian(model, &mut data, &q, &v, &a, f, &lambda);
@@ -78,7 +78,7 @@ fn forward_dynamics() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
         let State { q, v, tau, a: lambda, f_ext } = State::random(model, &mut rng(seed as u64));
         let mut data = Data::new(model);
-        let serial = model.clone().with_limbs(false); // the same sums in the same order
+        let serial = model.clone().with_limbs(false); // computes the sums in the same order as hyper-dual numbers
         let first = aba_derivatives(&serial, &mut data, &q, &v, &tau, &f_ext).da_dq.clone();
         let hessian = aba_hessian(model, &mut data, &q, &v, &tau, &f_ext, &lambda);
         assert_eq!(hessian.first.da_dq, &first);
@@ -90,7 +90,7 @@ fn forward_dynamics() {
     }
 }
 
-/// The tensors of second derivatives, contracted with λ, equal the Hessian of λᵀ τ.
+/// Checks that the tensors of second derivatives, contracted with λ, equal the Hessian of λᵀ τ.
 #[test]
 fn tensors() {
     let mut worst = Worst::new("Σ λ_i ∂²τ_i", EXACT);
@@ -112,7 +112,7 @@ fn tensors() {
     }
 }
 
-/// The expansion is ψ(x + h) = ψ + ∇ψ h + ½ hᵀ∇²ψ h + O(h³), so the error falls with the cube of the step.
+/// Checks the expansion ψ(x + h) = ψ + ∇ψ h + ½ hᵀ∇²ψ h + O(h³): its error must fall with the cube of the step.
 #[test]
 fn expansion() {
     const STEPS: [f64; 2] = [2e-3, 1e-3];

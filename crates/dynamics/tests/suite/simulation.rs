@@ -1,4 +1,4 @@
-//! Integrators: the order of each method, and the quantities that each method conserves.
+//! Tests of integrators: the order of each method, and the quantities that each method conserves.
 
 use crate::common::{self, State as Random, Tree, lift, moved, normal, relative, rng};
 use crate::counting::allocations;
@@ -14,7 +14,7 @@ use std::sync::Arc;
 const ALL: [(Integrator, f64); 3] =
     [(Integrator::SemiImplicitEuler, 1.0), (Integrator::RungeKutta4, 4.0), (Integrator::Variational, 2.0)];
 
-/// Tolerance of an observed order. At these step lengths h, errors of the next power of h still have an effect.
+/// Tolerance of an observed order. At these step lengths h, error terms of higher order in h still have an effect.
 const ORDER: f64 = 0.15;
 /// Tolerance of sums over all bodies and some thousand steps, relative to the largest number.
 const ROUNDING: f64 = 1e-10;
@@ -23,7 +23,7 @@ fn settings(integrator: Integrator, dt: f64) -> Settings {
     Settings { integrator, dt, ..Settings::default() }
 }
 
-/// Returns the position and the velocity of the robot after the given time without efforts.
+/// Returns the position and the velocity of the robot after a simulation of the given time without efforts.
 fn simulate(model: &Model, settings: Settings, (q, v): (&[f64], &[f64]), time: f64) -> (Vec<f64>, Vec<f64>) {
     let mut simulation = Simulation::new(model, settings);
     simulation.set_state(q, v).unwrap();
@@ -62,12 +62,12 @@ fn top() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// Returns log₂ of the factor by which the error falls when the step is halved.
+/// Returns the observed order: log₂ of the factor by which the error falls if the step length is halved.
 fn observed_order(coarse: f64, fine: f64) -> f64 {
     (coarse / fine).log2()
 }
 
-/// Checks that the error falls by the order of the method when the step dt is halved.
+/// Checks that the error falls according to the order of the method if the step length dt is halved.
 fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     let (coarse, fine) = (error(dt), error(dt / 2.0));
     let observed = observed_order(coarse, fine);
@@ -75,8 +75,8 @@ fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     assert!((observed - order).abs() < ORDER, "{what}: {observed}");
 }
 
-/// The motion of a free symmetric body has a closed form: with L = I ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A)
-/// e₃).
+/// Checks the order of each integrator on a free symmetric body. The motion of this body has a closed form: with L = I
+/// ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
 #[test]
 fn order_on_a_free_body() {
     let model = top();
@@ -101,8 +101,8 @@ fn order_on_a_free_body() {
     }
 }
 
-/// Each integrator has its order on random trees, compared with fine steps. The trees have every kind of joint, mimic
-/// joints, efforts, external forces, damping and friction.
+/// Checks the order of each integrator on random trees, compared with fine steps. The trees have every type of joint,
+/// mimic joints, efforts, external forces, damping and friction.
 #[test]
 fn order_on_trees() {
     let losses = JointOptions { damping: 0.2, friction: 0.3, armature: 0.1, ..JointOptions::default() };
@@ -137,8 +137,8 @@ fn order_on_trees() {
     }
 }
 
-/// A pendulum that swings by a large angle θ₀ has the period 4 K(sin(θ₀/2)) √(I/(m g l)). The arithmetic-geometric mean
-/// gives the elliptic integral K.
+/// Checks the period of a pendulum with a large angle θ₀, which is 4 K(sin(θ₀/2)) √(I/(m g l)). The
+/// arithmetic-geometric mean gives the elliptic integral K.
 #[test]
 fn period_of_a_pendulum() {
     let mut builder = ModelBuilder::new("pendulum");
@@ -164,7 +164,8 @@ fn period_of_a_pendulum() {
     }
 }
 
-/// The variational integrator's energy oscillates but does not drift, over two hundred swings of a chaotic pendulum.
+/// Checks that the energy of the variational integrator oscillates but does not drift, over 400 s of a chaotic double
+/// pendulum.
 #[test]
 fn energy_does_not_drift() {
     let model = double_pendulum(&JointOptions::default());
@@ -174,7 +175,7 @@ fn energy_does_not_drift() {
     let start = energy(&q, &v);
     let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 5e-3));
     simulation.set_state(&q, &v).unwrap();
-    let mut largest = [0.0; 4]; // in each quarter of 400 s
+    let mut largest = [0.0; 4]; // one entry for each quarter of 400 s
     for largest in &mut largest {
         for _ in 0..20_000 {
             assert!(simulation.step(&[0.0; 2], &[]).is_done());
@@ -186,8 +187,8 @@ fn energy_does_not_drift() {
     assert!(largest.iter().all(|&x| x < 1.2 * largest[0] && x < 2e-2));
 }
 
-/// After the velocity is reversed, a second step undoes the first step, up to rounding. The test reverses the velocity,
-/// because negative time steps are rejected.
+/// Checks that the variational step is symmetric. After the velocity is reversed, a second step must undo the first
+/// step, up to rounding. The test reverses the velocity, because negative time steps are rejected.
 #[test]
 fn variational_steps_are_symmetric() {
     for seed in 0..4 {
@@ -205,7 +206,7 @@ fn variational_steps_are_symmetric() {
     }
 }
 
-/// Newton's method doubles the number of correct digits in each iteration. This is only possible with the exact
+/// Checks that Newton's method doubles the number of correct digits in each iteration. This requires the exact
 /// derivative of the equation.
 #[test]
 fn variational_steps_converge_quadratically() {
@@ -228,7 +229,7 @@ fn variational_steps_converge_quadratically() {
     }
 }
 
-/// Time steps that are negative, zero or not finite are rejected.
+/// Checks that time steps that are negative, zero or not finite are rejected.
 #[test]
 fn time_runs_forwards() {
     let arm = robots::arm7();
@@ -249,7 +250,7 @@ fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 
     (1..model.bodies().len()).fold(Force::zero(), |sum, i| sum + of(i)).to_array()
 }
 
-/// Without gravity, the momentum of a free robot is constant, for any motion of the joints.
+/// Checks that the momentum of a free robot without gravity is constant, for any motion of the joints.
 #[test]
 fn momentum_is_conserved() {
     let model = robots::humanoid().with_gravity(Vec3::zero()).unwrap();
@@ -275,7 +276,7 @@ fn momentum_is_conserved() {
     assert!(fine < 1e-6 && observed_order(coarse, fine) > 3.5, "{coarse:.1e} {fine:.1e}");
 }
 
-/// The centre of mass of a falling humanoid follows a parabola, for any motion of the joints.
+/// Checks that the centre of mass of a falling humanoid follows a parabola, for any motion of the joints.
 #[test]
 fn centre_of_mass_falls_along_a_parabola() {
     let model = robots::humanoid();
@@ -306,13 +307,13 @@ fn centre_of_mass_falls_along_a_parabola() {
     }
 }
 
-/// An external force on a body acts like the equivalent joint efforts.
+/// Checks that an external force on a body acts like the equivalent joint efforts.
 #[test]
 fn external_forces_act() {
     for (integrator, _) in ALL {
         let model = top();
         let mut simulation = Simulation::new(&model, settings(integrator, 1e-3));
-        assert!(simulation.run(1000, |now| now.f_ext[1].linear.y = 4.0).is_done()); // 2 m/s² for 1 s
+        assert!(simulation.run(1000, |now| now.f_ext[1].linear.y = 4.0).is_done()); // acceleration of 2 m/s² for 1 s
         let (way, speed): (f64, f64) = (simulation.q()[1], simulation.v()[1]);
         assert!((speed - 2.0).abs() < 1e-9 && (way - 1.0).abs() < 2e-3);
         let by_force = simulation.q().to_vec();
@@ -324,7 +325,8 @@ fn external_forces_act() {
     }
 }
 
-/// An invalid state is rejected with the joint and the numbers, and the previous state is kept.
+/// Checks that an invalid state is rejected with the joint and the invalid numbers, and that the previous state is
+/// kept.
 #[test]
 fn invalid_states_are_refused() {
     let quadruped = robots::quadruped();
@@ -348,7 +350,7 @@ fn invalid_states_are_refused() {
     assert_eq!((simulation.q(), simulation.v()), (&q[..], &v[..]));
 }
 
-/// A simulation shares its model, can be cloned, and continues from a stored state with the same bits.
+/// Checks that a simulation shares its model, can be cloned, and continues from a stored state with the same bits.
 #[test]
 fn simulations_are_values() {
     fn shared<T: Clone + Send + Sync + 'static>(_: &T) {}
@@ -375,7 +377,7 @@ fn simulations_are_values() {
     assert_eq!(said, "Newton's method did not converge in 3 iterations; the step was not taken");
 }
 
-/// A step that fails keeps the state and reports the reason.
+/// Checks that a failed step keeps the state and reports the reason.
 #[test]
 fn failures_are_typed() {
     let model = robots::arm7();
@@ -395,10 +397,10 @@ fn failures_are_typed() {
     }
 }
 
-/// Dual numbers that pass through a step give the derivatives of the step.
+/// Checks that a step on dual numbers gives the derivatives of the step.
 #[test]
 fn a_step_can_be_differentiated() {
-    const STEP: f64 = 1e-5; // step of central differences, which balances rounding and curvature
+    const STEP: f64 = 1e-5; // step of central differences that balances rounding and curvature errors
     const DIFFERENCES: f64 = 1e-7;
     let mut random = rng(7);
     let model = Tree::random_with_mimics(&mut random).build();
@@ -432,7 +434,7 @@ fn wrong_shape() {
     let _ = Simulation::new(&arm, Settings::default()).step(&[0.0; 6], &[]);
 }
 
-/// After construction, steps, runs, regressors and passive torques do not allocate.
+/// Checks that steps, runs, regressors and passive torques do not allocate memory after construction.
 #[test]
 fn nothing_is_allocated() {
     for (seed, model) in common::all_models(1).iter().enumerate() {
@@ -458,7 +460,7 @@ fn nothing_is_allocated() {
     }
 }
 
-/// A step to a position that is not finite is not taken, even if the velocity is still finite.
+/// Checks that a step to a position that is not finite is not taken, even if the velocity is still finite.
 #[test]
 fn positions_stay_finite() {
     let quadruped = robots::quadruped();

@@ -1,4 +1,4 @@
-//! Single calls in `f32` give the numbers of `f64`, to the accuracy that seven digits allow.
+//! Tests that single calls in `f32` give the numbers of `f64`, up to the accuracy of seven digits.
 
 use crate::common::{State, Worst, all_models, lift, lift_forces, rng};
 use condyle_dynamics::{
@@ -6,10 +6,11 @@ use condyle_dynamics::{
     rnea_derivatives,
 };
 
-/// Tolerance of 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
+/// Tolerance of 1e3 rounding errors of the largest number. It is for sums over about twenty bodies with terms that
+/// cancel.
 const ROUNDINGS: f64 = 1e3 * f32::EPSILON as f64;
 
-/// Returns the results of several calls, each with a flag that says whether the result depends on M⁻¹. Both precisions
+/// Returns the results of several calls. Each has a flag that tells whether the result depends on M⁻¹. Both precisions
 /// represent the state exactly.
 fn results<S: Scalar>(model: &Model, state: &State) -> Vec<(Vec<S>, bool)> {
     let round = |x: &[f64]| lift::<S>(&x.iter().map(|&x| f64::from(x as f32)).collect::<Vec<_>>());

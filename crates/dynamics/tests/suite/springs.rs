@@ -1,4 +1,4 @@
-//! Springs and gravity compensation: laws, energies, and comparisons with MuJoCo.
+//! Tests of springs and gravity compensation: efforts, energies, and comparisons with MuJoCo.
 
 use crate::common;
 
@@ -14,8 +14,8 @@ use num_dual::Dual64;
 
 const SMOOTHING: f64 = 0.01;
 
-/// At the rest position of all springs, and without gravity compensation, passive efforts are 0 and derivatives are
-/// finite.
+/// Checks the rest position of all springs without gravity compensation: passive efforts must be 0, and derivatives
+/// must be finite.
 #[test]
 fn springs_at_rest() {
     let mut builder = ModelBuilder::new("at rest");
@@ -44,15 +44,15 @@ fn springs_at_rest() {
     assert!((dq + DMatrix::identity(nv, nv) * 2.0).amax() < 1e-13);
 }
 
-/// The spring of a follower acts on the displacement of the follower. The effort on the leader is the spring's effort
-/// times the ratio.
+/// Checks that the spring of a follower acts on the displacement of the follower. The effort on the leader is the
+/// spring's effort times the ratio.
 #[test]
 fn springs_of_followers() {
     const AXIS: Vec3<f64> = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
     let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
     let (endless, hinge) = (Joint::Continuous { axis: AXIS }, Joint::Revolute { axis: AXIS });
     // Cases (leader, follower, rest position of the follower, ratio, turns). If the leader or the follower is a
-    // continuous joint, the follower's position is known only up to full turns.
+    // continuous joint, `turns` is true: the follower's position is then known only up to full turns.
     for (leads, follows, rest, ratio, turns) in [
         (hinge, hinge, vec![0.4], -0.7, false),
         (hinge, Joint::Prismatic { axis: AXIS }, vec![0.4], 1.5, false),
@@ -81,8 +81,9 @@ fn springs_of_followers() {
     }
 }
 
-/// If all weights are compensated, the passive efforts equal the efforts that hold the robot still. If half of each
-/// weight is compensated, the passive efforts are half as large.
+/// Checks the efforts of gravity compensation. If all weights are compensated, the passive efforts must equal the
+/// efforts that hold the robot at rest. If half of each weight is compensated, the passive efforts must be half as
+/// large.
 #[test]
 fn gravity_that_is_compensated() {
     for seed in 0..10 {
@@ -96,7 +97,7 @@ fn gravity_that_is_compensated() {
                 let names = (name.as_str(), name.as_str());
                 let options = JointOptions::default();
                 ids.push(builder.body_with(names, ids[body.parent], body.joint, body.placement, body.inertia, options));
-                // half of a body is a second part with another ratio of compensation, in a frame of its own
+                // Half of each body becomes a separate part with a compensation of 0, in a frame of its own.
                 let X = Se3 { translation: Vec3::new(0.3, -0.2, 0.5), ..Se3::identity() };
                 builder.compensate_gravity(ids[i], 2.0 * factor);
                 builder.compensate_gravity_of_part(ids[i], X, X.act_inv(body.inertia).scale(0.5), 0.0);
@@ -120,8 +121,8 @@ fn gravity_that_is_compensated() {
     }
 }
 
-/// Efforts of gravity compensation are linear in the masses of the bodies, and derivatives with respect to a mass are
-/// exact.
+/// Checks that efforts of gravity compensation are linear in the masses of the bodies, and that derivatives with
+/// respect to a mass are exact.
 #[test]
 fn compensation_has_derivatives_with_respect_to_masses() {
     let model = like_mujoco();
@@ -147,7 +148,7 @@ fn compensation_has_derivatives_with_respect_to_masses() {
     assert!(slope.iter().any(|x| x.abs() > 1.0) && common::relative(&slope, &expected) < 1e-12, "{slope:?}");
 }
 
-/// Creates the robot of `passive.xml`, with MuJoCo's laws of springs and damping, and the armature of its free joint.
+/// Creates the robot of `passive.xml`, with the springs and the damping of MuJoCo, and the armature of its free joint.
 fn like_mujoco() -> Model {
     let mut builder = ModelBuilder::new("passive");
     let full =
@@ -181,7 +182,8 @@ fn like_mujoco() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// M, bias and passive efforts equal MuJoCo's results, for a robot from a builder and for the robot read from the file.
+/// Checks that M, bias and passive efforts equal MuJoCo's results, for a robot from a builder and for the robot read
+/// from the file.
 #[test]
 fn the_numbers_of_mujoco() {
     let text = include_str!("../data/passive_mujoco.json");
@@ -207,7 +209,7 @@ fn the_numbers_of_mujoco() {
 }
 
 /// Computes the energy of all springs. Each spring has the energy −∫ τ dr = k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4. For a joint
-/// with one degree of freedom, r is the displacement; for other joints, r is the length of the displacement.
+/// with one degree of freedom, r is the displacement. For other joints, r is the length of the displacement vector.
 fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     let mut energy = 0.0;
     for spring in model.springs() {
@@ -252,7 +254,7 @@ fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     model.gravity_compensation().iter().map(energy).sum()
 }
 
-/// Efforts of springs and of gravity compensation are the negative gradient of an energy.
+/// Checks that the efforts of springs and of gravity compensation are the negative gradient of an energy.
 #[test]
 fn springs_have_an_energy() {
     let step = 1e-6;
@@ -271,8 +273,8 @@ fn springs_have_an_energy() {
     }
 }
 
-/// With springs and gravity compensation, but without losses, a simulation conserves energy up to the error of the
-/// integrator.
+/// Checks that a simulation with springs and gravity compensation, but without losses, conserves energy up to the error
+/// of the integrator.
 #[test]
 fn simulations_keep_the_energy_of_springs() {
     let mut builder = ModelBuilder::new("springs");

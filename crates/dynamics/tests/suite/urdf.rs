@@ -1,4 +1,4 @@
-//! Dynamics of models from URDF: root joints, mimic joints, and the embedded robots.
+//! Tests of the dynamics of models from URDF: root joints, mimic joints, and the embedded robots.
 
 use crate::common;
 
@@ -24,7 +24,7 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, inside: &str) -> Str
     )
 }
 
-/// Links that are fixed to the world belong to body 0, and their mass is part of the total mass.
+/// Checks that links fixed to the world belong to body 0, and that their mass is part of the total mass.
 #[test]
 fn root_joints() {
     let fixed = robots::arm7();
@@ -46,8 +46,8 @@ fn root_joints() {
     }
 }
 
-/// By default, mimic joints are free joints. With the option, a mimic joint uses the coordinate of its leader, which
-/// may be anywhere in the file.
+/// Checks both treatments of mimic joints. By default, a mimic joint is an independent joint. With the option `mimic`,
+/// it uses the coordinate of its leader, which may be anywhere in the file.
 #[test]
 fn mimic_joints() {
     let links: String = ["base", "left", "right"].map(link).concat();
@@ -65,7 +65,7 @@ fn mimic_joints() {
     assert_eq!(crba(&model, &mut data, &[0.1])[(0, 0)], 5.0); // 1 + 2²
 }
 
-/// The properties of the embedded robots match the documentation of the robots.
+/// Checks that the properties of the embedded robots match the documentation of the robots.
 #[test]
 fn embedded_robots() {
     let [arm, quadruped, humanoid] = [robots::arm7(), robots::quadruped(), robots::humanoid()];

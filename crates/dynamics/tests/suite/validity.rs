@@ -1,5 +1,5 @@
-//! Validity of models: models from all sources pass the same checks. Unusual properties give warnings, and impossible
-//! properties are rejected.
+//! Tests of the validity of models. Models from all sources pass the same checks: unusual properties give warnings, and
+//! impossible properties are rejected.
 
 use crate::common::panics::assert_panic;
 use condyle_dynamics::simulation::{Settings, Simulation, Status};
@@ -10,7 +10,7 @@ use condyle_dynamics::{
 use num_dual::Dual64;
 use std::panic::catch_unwind;
 
-/// Creates an arm whose last link has no mass, so that forward dynamics has no solution.
+/// Creates an arm whose last link has no mass. So forward dynamics has no solution.
 pub(crate) fn massless_tip() -> Model {
     let mut builder = ModelBuilder::new("tip");
     let hinge = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
@@ -31,20 +31,21 @@ fn other_inertias_are_judged_anew() {
     let ball = Inertia::from_com(0.3, Vec3::zero(), Sym3::diagonal(0.01));
     let sick = massless_tip();
     assert_eq!(sick.singular_joints(), [2]);
-    // with new inertias the robot is regular: all functions accept it, and it has no warnings
+    // With a new inertia of the tip, the robot is regular: all functions accept it, and it has no warnings.
     let cured = sick.with_inertias(|body, I| if body == 2 { ball } else { I }).unwrap();
     assert!(cured.singular_joints().is_empty() && cured.warnings().is_empty());
     let a: Vec<f64> = aba(&cured, &mut Data::new(&cured), &[0.1, 0.2], &[0.0; 2], &[0.0; 2], &[]).to_vec();
     assert!(a.iter().all(|a: &f64| a.is_finite()));
-    // without mass the robot is singular again, and is rejected like a robot that was built singular
+    // Without this inertia, the robot is singular again. The robot is then rejected like a robot that was built
+    // singular.
     let again = cured.with_inertias(|body, I| if body == 2 { Inertia::<f64>::zero() } else { I }).unwrap();
     assert_eq!((again.singular_joints(), again.warnings()), (sick.singular_joints(), sick.warnings()));
     let refused = catch_unwind(|| aba(&again, &mut Data::new(&again), &[0.0; 2], &[0.0; 2], &[0.0; 2], &[]).to_vec());
     let message = refused.unwrap_err().downcast::<String>().unwrap();
     assert!(message.starts_with("joint `tip` moves nothing"), "{message}");
-    // armature makes the robot regular as well
+    // Armature also makes the robot regular.
     assert!(again.clone().with_armature(&[0.0, 0.1]).unwrap().singular_joints().is_empty());
-    // a model that is read back from a file has the same properties
+    // A model that is read from a file has the same properties as the stored model.
     for model in [&sick, &cured, &again] {
         let read = read_again(model);
         assert_eq!((read.singular_joints(), read.warnings()), (model.singular_joints(), model.warnings()));
@@ -52,7 +53,7 @@ fn other_inertias_are_judged_anew() {
     }
 }
 
-/// Inertias of dual numbers are checked by their real parts, in the same way as inertias of `f64`.
+/// Checks that inertias of dual numbers are checked by their real parts, in the same way as inertias of `f64`.
 #[test]
 fn dual_inertias_are_judged_as_plain_ones() {
     let seeded = |I: Inertia<f64>| Inertia { mass: Dual64::new(I.mass, 1.0), ..I.lift::<Dual64>() };
@@ -78,8 +79,8 @@ fn dual_inertias_are_judged_as_plain_ones() {
     assert_eq!(cured.with_gravity(nowhere).unwrap_err().to_string(), "gravity: (0, NaN, 0) m/s² is not finite");
 }
 
-/// A robot may be regular although M is singular at one position. Here a slide moves a point mass onto its axis of
-/// rotation. At this position, `aba` returns numbers that are not finite, and iterative functions report an error.
+/// Checks a robot that is regular, but whose M is singular at one position. Here a slide moves a point mass onto its
+/// axis of rotation. At this position, `aba` returns numbers that are not finite, and a simulation reports an error.
 #[test]
 fn a_position_may_be_singular() {
     let (z, x) = (Vec3::new(0.0, 0.0, 1.0), Vec3::new(1.0, 0.0, 0.0));
@@ -131,8 +132,8 @@ fn impossible_numbers_are_refused_by_name() {
     assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 0.9, expected 1");
 }
 
-/// A `chain` of joints has massless bodies between its joints. These massless bodies are intended, so models that are
-/// made from the chain have no warnings.
+/// Checks that intended massless bodies give no warnings. Such bodies are between the joints of a chain that replaces
+/// one joint. Models that are made from the chain must not have warnings either.
 #[test]
 fn chains_stay_without_warnings() {
     let mut builder = ModelBuilder::new("chain");
@@ -151,8 +152,8 @@ fn chains_stay_without_warnings() {
     assert!(made.iter().all(|model| model.warnings().is_empty() && model.singular_joints().is_empty()));
 }
 
-/// Warnings about elements that are left out of a file are kept. They follow the warnings about unusual properties, in
-/// the same order for all sources.
+/// Checks that warnings about elements that were left out of a file are kept. These warnings must follow the warnings
+/// about unusual properties, in the same order for all sources.
 #[test]
 fn warnings_keep_their_order() {
     let text = r#"<mujoco><worldbody><body name="a"><joint axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/>
@@ -170,8 +171,8 @@ fn warnings_keep_their_order() {
     assert!(matches!(cured.warnings(), [Warning::Massless { .. }, Warning::LeftOut { .. }]));
 }
 
-/// Scratch that is prepared for one robot is rejected for another robot with the same tree, if frames or axes of the
-/// robots differ.
+/// Checks that scratch memory prepared for one robot is rejected for another robot with the same tree, if frames or
+/// axes of the robots differ.
 #[test]
 fn plans_know_their_robot() {
     let robot = |length: f64, axis: Vec3<f64>| {
@@ -209,11 +210,11 @@ fn plans_know_their_robot() {
     };
     assert_eq!(accepted(&longer), (false, false));
     assert_eq!(accepted(&turned), (false, false));
-    // scratch is accepted for the same robot with other constants, or read from a file
+    // Scratch memory is accepted for the same robot with other constants, and for the same robot read from a file.
     let heavier = one.with_inertias(|_, I| I.scale(2.0)).unwrap().with_gravity(Vec3::zero()).unwrap();
     assert_eq!(accepted(&heavier), (true, true));
     assert_eq!(accepted(&read_again(&one)), (true, true));
-    // stored placements are accepted only for robots whose joints and frames have the same placements
+    // Stored placements are accepted only for robots whose joints and frames have the same placements.
     let mut data = Data::<f64>::new(&one);
     forward_kinematics(&one, &mut data, &[0.3; 4]);
     assert!(data.placements(&one).is_some() && data.placements(&heavier).is_some());
@@ -232,7 +233,7 @@ fn plans_know_their_robot() {
     forward_kinematics(&seeded, &mut duals, &[0.3.into(); 4]);
     assert!(duals.placements(&one).is_some());
     assert_panic("tests/suite/validity.rs", "another robot", || _ = duals.placements(&longer));
-    // another kind of joint gives another tree hash
+    // Another type of joint gives another tree hash.
     let mut builder = ModelBuilder::new("slides");
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.1));
     builder.body("b", WORLD, Joint::Prismatic { axis: y }, Se3::identity(), rod);

@@ -1,4 +1,4 @@
-//! Batches: many states at once give the same bits as single states.
+//! Tests of batches: the result for each of many states has the same bits as the result of a single call.
 
 use crate::common::panics::{Panic, panic_of};
 use crate::common::table::Input;
@@ -20,18 +20,18 @@ fn states(model: &Model, n: usize, seed: u64) -> States<f64> {
     States::of(&random(model, n, seed))
 }
 
-/// Tolerance between two computations with different rounding, relative to the largest entry: some hundred roundings of
-/// a matrix with condition number 1e3.
+/// Tolerance between two computations with different rounding, relative to the largest entry. It is some hundred
+/// rounding errors of a matrix with condition number 1e3.
 const ROUNDING: f64 = 1e-11;
 
-/// Matrices that are written by rows have the entries of each state's matrix. The last group of states is not full.
+/// Checks that matrices written by rows have the entries of each state's matrix. The last group of states is not full.
 #[test]
 fn matrices_by_rows() {
     for model in models(2) {
         let (n, count) = (model.nv(), 19);
         let s = states(&model, count, 5);
         let mut batch = Batch::new(&model, count, 2);
-        // symmetric matrices may be written by columns, which equal the rows up to rounding
+        // Symmetric matrices may be written by columns, whose entries equal the entries of the rows up to rounding.
         let check = |matrices: Matrices<'_, f64>, symmetric: bool| {
             let mut rows = vec![f64::NAN; count * n * n];
             matrices.write_rows(&mut rows);
@@ -54,7 +54,8 @@ fn matrices_by_rows() {
     }
 }
 
-/// A writer writes the same results that the batch returns, by rows. On one thread, it does not allocate.
+/// Checks that a writer writes the results of the batch by rows into slices of the caller. On one thread, the writer
+/// must not allocate.
 #[test]
 fn written_to_places() {
     const COUNT: usize = 19;
@@ -128,9 +129,9 @@ fn a_place_that_is_missing() {
     );
 }
 
-/// Each state of a batch has the bits of a single call, for any number of states and threads, and for full and partial
-/// groups. On one thread, a batch does not allocate after the first call of a function. On an emulated processor
-/// (`CONDYLE_EMULATED`), the test uses only two robots and few states.
+/// Checks that each state of a batch has the bits of a single call. The test uses different numbers of states and
+/// threads, and full and partial groups. On one thread, a batch must not allocate after the first call of a function.
+/// On an emulated processor (`CONDYLE_EMULATED`), the test uses only two robots and few states.
 #[test]
 fn every_state_is_a_single_call() {
     const MOST: usize = 19;
@@ -176,7 +177,7 @@ fn every_state_is_a_single_call() {
     });
 }
 
-/// In each function, a state with NaN does not affect the other states.
+/// Checks that in each function, a state with NaN does not affect the other states.
 #[test]
 fn a_state_that_is_not_a_number_stays_alone() {
     const STATES: usize = 9;
@@ -205,7 +206,8 @@ fn a_state_that_is_not_a_number_stays_alone() {
     });
 }
 
-/// Results for a robot without coordinates are empty. The number of forces or the capacity gives the number of states.
+/// Checks that the results for a robot without coordinates are empty. The number of states is then taken from the
+/// number of forces or from the capacity.
 #[test]
 fn no_coordinates() {
     let model = &fixed();
@@ -225,7 +227,7 @@ fn no_coordinates() {
     });
 }
 
-/// A batch only allocates memory for the requested results, and for the scratch of its threads.
+/// Checks that a batch allocates memory only for the requested results and for the scratch memory of its threads.
 #[test]
 fn memory_by_state() {
     const STATES: [usize; 2] = [1000, 3000];
@@ -286,7 +288,7 @@ fn another_robot() {
     _ = Batch::<f64>::new(&arm, 2, 1).gravity(&quadruped, &condyle_dynamics::neutral(&quadruped));
 }
 
-/// Every function gives the results of single calls for a robot without coordinates too.
+/// Checks that every function gives the results of single calls also for a robot without coordinates.
 #[test]
 fn every_function_without_coordinates() {
     let model = &fixed();
@@ -303,14 +305,14 @@ fn every_function_without_coordinates() {
                 (row.one)(model, &mut data, &mut set, input, &mut expected);
             }
             (row.many)(model, &mut batch, &mut constraints, &States::of(&inputs), &mut found);
-            // compare bits without the sign, because the sign of NaN may differ
+            // Compare bits without the sign bit, because the sign of NaN may differ.
             let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>();
             assert_eq!(bits(&found), bits(&expected), "{}, {level}", row.name);
         }
     });
 }
 
-/// A changed target of a constraint applies to all states.
+/// Checks that a changed target of a constraint applies to all states.
 #[test]
 fn targets_of_constraints() {
     let _best = best_level();
@@ -343,7 +345,7 @@ fn constraints_of_another_batch() {
     _ = Batch::<f64>::new(model, 2, 1).constrained_dynamics(model, &mut constraints, &q, &v, &v, &[]);
 }
 
-/// A copy of a batch computes the same bits as the original, and shares no memory with the original.
+/// Checks that a copy of a batch computes the same bits as the original, and does not share memory with the original.
 #[test]
 fn copies_compute_alone() {
     let _best = best_level();
@@ -361,7 +363,7 @@ fn copies_compute_alone() {
     let (mut one, mut constraints) = (copy.clone(), held(model, &copy));
     let first = one.constrained_dynamics(model, &mut constraints.clone(), &s.q, &s.v, &s.x, &[]).a.to_vec();
     assert_eq!(copy.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a, first);
-    // copy a batch that was never called with forces; the first call with forces must not allocate
+    // Copy a batch that was never called with forces. The first call of the copy with forces must not allocate.
     let (mut without, rnea) = (Batch::new(model, 11, 1), batch.rnea(model, &s.q, &s.v, &s.x, &s.f_ext).to_vec());
     without.rnea(model, &s.q, &s.v, &s.x, &[]);
     let mut with = without.clone();
@@ -369,13 +371,13 @@ fn copies_compute_alone() {
     assert_eq!((count, with.rnea(model, &s.q, &s.v, &s.x, &s.f_ext)), (0, &rnea[..]));
 }
 
-/// Creates the constraints with which the rows of `table.rs` are called.
+/// Creates the constraints that the functions in `table.rs` receive.
 fn held(model: &Model, batch: &Batch) -> condyle_dynamics::BatchConstraints {
     let (held, proximal) = constraints(model);
     batch.constraints(model, &held, proximal).unwrap()
 }
 
-/// Every function reports an argument of wrong length in the file of the caller.
+/// Checks that every function reports an argument of wrong length. The panic must give the caller's file.
 #[test]
 fn wrong_lengths_are_reported_at_the_call() {
     let _best = best_level();

@@ -1,4 +1,5 @@
-//! Derivatives by dual numbers in several directions at a time, compared with hand-written derivatives.
+//! Tests of derivatives by dual numbers in lanes, one direction per lane. The results are compared with the analytical
+//! derivatives.
 
 use crate::common::table::Input;
 use crate::common::{Worst, rng};
@@ -7,12 +8,12 @@ use condyle_dynamics::{
     Data, Force, LaneJacobian, Matrix, Model, Scalar, StateFunction, aba, aba_derivatives, rnea, rnea_derivatives,
 };
 
-/// Tolerance between two exact methods with some thousand roundings each. For forward dynamics, it includes the
-/// condition number of M.
+/// Tolerance between two exact methods with some thousand rounding errors each. For forward dynamics, the tolerance
+/// includes the condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 5;
 
-/// Function `rnea` or `aba` of (q, v, x).
+/// Function `rnea` or `aba` of the concatenated arguments (q, v, x).
 struct Dynamics<'m> {
     model: &'m Model,
     f_ext: &'m [Force<f64>],
@@ -64,7 +65,8 @@ fn of_dynamics() {
     });
 }
 
-/// Selected columns equal the columns of the whole Jacobian, in any requested order; the other columns are zero.
+/// Checks that selected columns equal the columns of the whole Jacobian, in any requested order. The other columns must
+/// be zero.
 #[test]
 fn along_some_directions() {
     let models = models(TREES);

@@ -1,4 +1,5 @@
-//! Several knots in a vector register give the same bits as single calls, at the same SIMD level.
+//! Tests of several knots in a vector register. Each lane must have the same bits as a single call at the same SIMD
+//! level.
 
 use crate::common::table::{Input, Output, kernels};
 use crate::common::{long_branches, rng};
@@ -24,7 +25,7 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Marker with which this test may name vector types.
+/// Token that gives this test access to the vector types of all SIMD levels.
 struct Here;
 
 // SAFETY: `each_level` only runs SIMD levels that this processor supports.
@@ -64,7 +65,7 @@ fn knots_are_single_calls<S: Vector>(models: &[Model]) {
                 let found: Vec<f64> = found.numbers.iter().map(|x| x.unpack()[k]).collect();
                 assert!(found == expected.numbers, "{name} has other bits in lane {k} of {}, on\n{model}", S::LANES);
             }
-            // a lane with NaN does not affect the other lanes
+            // A lane with NaN must not affect the other lanes.
             let mut broken = knots.clone();
             broken[1] = broken[1].map(|_| f64::NAN);
             let mut beside = Output::new(model);

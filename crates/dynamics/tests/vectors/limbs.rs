@@ -1,5 +1,5 @@
-//! Branches (limbs) of one robot in parallel lanes, compared with a computation body by body. (At the baseline SIMD
-//! level, both computations are body by body.)
+//! Tests of limbs: branches of one robot that are computed in parallel lanes. The results are compared with a
+//! computation body by body. (At the baseline SIMD level, both computations are body by body.)
 
 use crate::best_level;
 use crate::common::contacts::random_constraints;
@@ -12,8 +12,8 @@ use condyle_dynamics::{
 };
 use nalgebra::DMatrix;
 
-/// Tolerances between sums in different orders, over at most some tens of bodies. The tolerance of results with M⁻¹
-/// includes the condition number of M.
+/// Tolerance between sums over at most some tens of bodies, added in different orders. `TOLERANCE_ABA` is for results
+/// with M⁻¹ and includes the condition number of M.
 const TOLERANCE: f64 = 1e-12;
 const TOLERANCE_ABA: f64 = 1e-8;
 
@@ -49,7 +49,7 @@ fn many_limbs(seed: u64, root: Joint) -> Model {
     tree.build()
 }
 
-/// Returns two error records: for sums, and for results that contain M⁻¹.
+/// Returns two records of the largest error: for sums, and for results that contain M⁻¹.
 fn sums_and_inverses() -> [Worst; 2] {
     [Worst::new("sums", TOLERANCE), Worst::new("inverses", TOLERANCE_ABA)]
 }
@@ -94,7 +94,7 @@ fn compare(model: &Model, worst: &mut [Worst; 2], seed: u64) {
     }
 }
 
-/// Returns the inputs whose derivatives use the results of an earlier pass.
+/// Returns the inputs with derivatives that use the results of an earlier pass.
 fn inputs(model: &Model) -> impl Iterator<Item = Input> {
     let last = model.bodies().len() - 1;
     [
@@ -151,7 +151,8 @@ fn the_numbers_of_body_after_body() {
     }
 }
 
-/// Compares q̈, λ and J with limbs in lanes and body by body. The residuals agree up to rounding.
+/// Compares the q̈, λ and J of limbs in lanes with the values computed body by body. The residuals must agree up to
+/// rounding.
 fn compare_constrained(
     m: &Model,
     constraints: &[ContactConstraint],
@@ -177,8 +178,8 @@ fn compare_constrained(
     }
 }
 
-/// Constrained dynamics equals a computation body by body, for constraints between all kinds of bodies, including the
-/// base and the world.
+/// Checks constrained dynamics against a computation body by body. The constraints are between all kinds of bodies,
+/// including the base and the world.
 #[test]
 fn constrained_dynamics_of_body_after_body() {
     let _level = best_level();
@@ -190,15 +191,15 @@ fn constrained_dynamics_of_body_after_body() {
         let mut rng = rng(seed as u64);
         let state = State::random(&model, &mut rng);
         let mut constraints = random_constraints(&model, &state, &mut rng);
-        constraints.retain(|c| c.kind.rows() >= 3); // lines and planes do not support lanes
+        constraints.retain(|c| c.kind.rows() >= 3); // constraints to lines and planes do not support lanes
         for proximal in [ProximalSettings::default(), ProximalSettings { mu: 1e-6, iterations: 3 }] {
             compare_constrained(&model, &constraints, proximal, &mut worst, &state);
         }
     }
 }
 
-/// One sole of the humanoid is constrained twice, so that six rows are redundant. The other sole is constrained by
-/// points.
+/// Checks redundant constraints. One sole of the humanoid is constrained twice, so that six rows are redundant. The
+/// other sole is constrained at points.
 #[test]
 fn redundant_constraints_of_body_after_body() {
     let _level = best_level();
@@ -214,7 +215,7 @@ fn redundant_constraints_of_body_after_body() {
     compare_constrained(&model, &[], ProximalSettings::default(), &mut worst, &state);
 }
 
-/// A `Data` can also be used with a copy of its robot that has another armature, gravity or inertia.
+/// Checks that a `Data` can also be used with a copy of its robot that has another armature, gravity or inertia.
 #[test]
 fn of_the_model_that_is_given() {
     let _level = best_level();
@@ -237,7 +238,8 @@ fn of_the_model_that_is_given() {
     }
 }
 
-/// A clone of a `Data` that has never been used with forces computes the same bits, with and without forces.
+/// Checks that a clone of a `Data` computes the same bits, with and without forces, if the original was never used with
+/// forces.
 #[test]
 fn with_cloned_data() {
     let _level = best_level();
@@ -254,13 +256,13 @@ fn with_cloned_data() {
     }
 }
 
-/// A NaN in one limb only affects the results of this limb and of the base.
+/// Checks that a NaN in one limb affects only the results of this limb and of the base.
 #[test]
 fn what_is_not_a_number_stays_in_its_limb() {
     let _level = best_level();
     let model = robots::quadruped();
     let State { q, mut v, a, .. } = State::random(&model, &mut rng(0));
-    v[7] = f64::NAN; // the first leg's second joint
+    v[7] = f64::NAN; // second joint of the first leg
     let mut data = Data::new(&model);
     let tau = rnea(&model, &mut data, &q, &v, &a, &[]);
     assert!(tau[6..9].iter().all(|x| x.is_nan()) && tau[9..].iter().all(|x| x.is_finite()), "{tau:?}");
@@ -279,8 +281,8 @@ fn a_robot_of_loose_bodies() {
     compare(&builder.build().expect("it is well-formed"), &mut worst, 0);
 }
 
-/// The fingers of a hand have different lengths. So some steps do not have a body in each lane, and the order of steps
-/// is not the order of bodies.
+/// Checks hands whose fingers have different lengths. Then some steps do not have a body in each lane, and the order of
+/// the steps differs from the order of the bodies.
 #[test]
 fn fingers_of_all_lengths() {
     let _level = best_level();
@@ -298,8 +300,8 @@ fn fingers_of_all_lengths() {
     }
 }
 
-/// After each algorithm, the stored placements are the placements at the position of the last call. After a call that
-/// needs no placements, no placements are stored.
+/// Checks the placements that each algorithm leaves in a `Data`. They must be the placements at the position of the
+/// last call. An algorithm that computes no placements leaves none.
 #[test]
 fn calls_leave_their_placements() {
     let _level = best_level();
@@ -336,7 +338,7 @@ fn calls_leave_their_placements() {
     }
 }
 
-/// Placements that are stored in lanes are rejected for a robot whose base has another placement.
+/// Checks that placements stored in lanes are rejected for a robot whose base has another placement.
 #[test]
 fn placements_of_limbs_know_their_robot() {
     let _level = best_level();
@@ -349,7 +351,7 @@ fn placements_of_limbs_know_their_robot() {
     aba(&quadruped, &mut data, &q, &o, &o, &[]);
     assert_panic("tests/vectors/limbs.rs", "another robot than `raised`", || _ = data.placements(&raised));
     assert!(data.placements(&quadruped).is_some());
-    // placements stored in lanes are accepted for the same robot with other inertias
+    // Placements stored in lanes are accepted for the same robot with other inertias.
     aba(&quadruped, &mut data, &q, &o, &o, &[]);
     assert!(data.placements(&quadruped.with_inertias(|_, I| I.scale(2.0)).unwrap()).is_some());
 }

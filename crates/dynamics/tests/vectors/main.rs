@@ -1,5 +1,5 @@
-//! Tests of several states in a vector register, and of several branches of one state, at every SIMD level of this
-//! processor.
+//! Tests of several states in a vector register, and of several limbs of one state in parallel lanes. The tests run at
+//! every SIMD level of this processor.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]
@@ -17,12 +17,12 @@ use condyle_dynamics::Model;
 use condyle_dynamics::level::{Level, pin};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
-/// Lock of the SIMD level, which all threads share. Either one test uses all levels in turn, or several tests use the
-/// best level.
+/// Lock of the SIMD level, which is common to all threads. Either one test uses all levels one after the other, or
+/// several tests use the best level at the same time.
 static LEVEL: RwLock<()> = RwLock::new(());
 
-/// Returns all kinds of robots without limbs, because single calls with branches in parallel lanes add in another
-/// order.
+/// Returns robots of all kinds, for which single calls do not compute limbs in parallel lanes. Sums over parallel limbs
+/// have another order.
 fn models(trees: u64) -> Vec<Model> {
     common::all_models(trees).into_iter().map(|model| model.with_limbs(false)).collect()
 }
@@ -38,7 +38,7 @@ fn each_level(test: impl Fn(Level)) {
     }
 }
 
-/// Keeps the best SIMD level in use while the returned guard exists.
+/// Selects the best SIMD level. The level stays selected while the returned guard exists.
 fn best_level() -> RwLockReadGuard<'static, ()> {
     let shared = LEVEL.read().unwrap_or_else(PoisonError::into_inner);
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).expect("there is the baseline");

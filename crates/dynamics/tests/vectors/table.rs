@@ -1,5 +1,5 @@
-//! Table of every function of a batch, each with the same function for a single state. The results of both functions
-//! have the same order.
+//! Table of the functions of a batch. Each row also has the same function for a single state, whose results have the
+//! same order.
 
 use crate::common::table::Input;
 use condyle_dynamics::{
@@ -16,7 +16,7 @@ use condyle_dynamics::{
 use condyle_spatial::block::Real;
 use nalgebra::DMatrix;
 
-/// Arguments of many states, one after the other.
+/// Arguments of many states. Each field holds the numbers of all states, one state after the other.
 pub(crate) struct States<T> {
     pub(crate) q: Vec<T>,
     pub(crate) v: Vec<T>,
@@ -32,7 +32,7 @@ impl<T: Copy> States<T> {
     }
 }
 
-/// Results of a function: for each result, the numbers of all states.
+/// Results of a function. Each entry of `results` holds the numbers of one result for all states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Found<T> {
     pub(crate) results: Vec<Vec<T>>,
@@ -40,7 +40,7 @@ pub(crate) struct Found<T> {
 }
 
 impl<T: Copy> Found<T> {
-    /// Appends numbers to the next result. They are the numbers of all states, or of one more state.
+    /// Appends numbers to the next result: the numbers of all states at once, or the numbers of one more state.
     fn extend(&mut self, numbers: impl Iterator<Item = T>) {
         if self.results.len() == self.next {
             self.results.push(Vec::new());
@@ -49,18 +49,18 @@ impl<T: Copy> Found<T> {
         self.next += 1;
     }
 
-    /// Starts again with the first result.
+    /// Continues with the first result, to append the numbers of the next state.
     pub(crate) fn again(&mut self) {
         self.next = 0;
     }
 
-    /// Returns empty results with the same capacity.
+    /// Returns empty lists of results with the same capacity.
     pub(crate) fn emptied(&self) -> Self {
         Self { results: self.results.iter().map(|of| Vec::with_capacity(of.len())).collect(), next: 0 }
     }
 }
 
-/// Result of a function, for one state or for many states.
+/// Result of a function that can be stored in a `Found`, for one state or for many states.
 trait Put<T> {
     fn put(self, to: &mut Found<T>);
 }
@@ -120,7 +120,8 @@ fn put_poses<T: Real>(poses: Poses<'_, T>, [states, each]: [usize; 2], to: &mut 
     to.extend((0..states).flat_map(|k| (0..each).flat_map(move |i| of_pose(poses.at(k, i)))));
 }
 
-/// Returns the number of states; if q is empty, the capacity of the batch.
+/// Returns the number of states, computed from the length of q. If the robot has no coordinates, returns the capacity
+/// of the batch.
 fn count<T: Real>(m: &Model, b: &Batch<T>, s: &States<T>) -> usize {
     s.q.len().checked_div(m.nq()).unwrap_or(b.capacity())
 }
@@ -153,8 +154,8 @@ macro_rules! argument {
     };
 }
 
-/// Creates a row for each function. An entry lists the arguments and the fields of the result: first arrays, then
-/// fields that are plain numbers for a single state.
+/// Creates a row for each function. An entry lists the arguments and the fields of the result. Fields after the
+/// semicolon are plain numbers for a single state.
 macro_rules! rows {
     ($($name:ident($($argument:ident),*) $({ $($($member:ident).+),+ $(; $($number:ident),+)? })?;)*) => { vec![$(Row {
         name: stringify!($name),
@@ -176,8 +177,8 @@ macro_rules! rows {
     };
 }
 
-/// Creates a row for each function of a frame or a body. The row uses the last frame or body, and each reference frame.
-/// Names after `fills` are matrices that the function fills.
+/// Creates a row for each function of a frame or a body. The row calls the function for the last frame or body, in each
+/// reference frame. Names after `fills` are matrices that the function fills.
 macro_rules! questions {
     ($T:ident; $($name:ident($of:ident) after $pass:ident($($argument:ident),*) $(fills [$($member:ident),+])?;)*) => {
         vec![$(Row {
@@ -211,7 +212,8 @@ macro_rules! questions {
     };
 }
 
-/// Creates a row for each sum over the bodies. The marker `[number]` is for sums that are single numbers.
+/// Creates a row for each quantity that is a sum over the bodies. The marker `[number]` is for sums that are single
+/// numbers.
 macro_rules! sums {
     ($($name:ident after $pass:ident($($argument:ident),*) $([$number:ident])?;)*) => { vec![$(Row {
         name: stringify!($name),
@@ -239,8 +241,8 @@ fn last_body(model: &Model) -> usize {
 const SMOOTHING: f64 = 0.1;
 const RESTITUTION: f64 = 0.3;
 
-/// Returns all kinds of inputs for which a robot has derivatives. Only robots with moving bodies have derivatives with
-/// respect to an inertia.
+/// Returns the inputs for which a robot has derivatives. Only robots with moving bodies have derivatives with respect
+/// to an inertia.
 fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
     use condyle_dynamics::Input::*;
     let last = last_body(model);
@@ -249,8 +251,8 @@ fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
         .chain((last > 0).then_some(Inertia(last)))
 }
 
-/// Returns a contact and a loop, with one more iteration than needed. For a robot that cannot move, returns no
-/// constraints.
+/// Returns a contact and a loop constraint, with one iteration more than needed. The list is empty for a robot that
+/// cannot move.
 pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, ProximalSettings) {
     let (bodies, proximal) = (model.bodies().len(), ProximalSettings { mu: 1e-6, iterations: 2 });
     if bodies == 1 {

@@ -1,14 +1,14 @@
-//! Clarabel as a back end: the reference solver.
+//! Back end with clarabel, the reference solver.
 //!
-//! Clarabel requires A x + s = b with s in a product of cones, in sparse matrices with a fixed pattern. For each shape
-//! of a program (its sizes, and which bounds are finite or equal), a solver is built once and kept. If a set of
-//! contacts returns, only numbers must be updated. The pattern holds all entries that have been non-zero so far. When
-//! another entry becomes non-zero, for example when a robot leaves a symmetric posture, the solver is built again.
-//! Clarabel allocates once in each solve; a new shape or pattern allocates more.
+//! Clarabel requires A x + s = b with s in a product of cones, in sparse matrices with a fixed pattern. A solver is
+//! built once for each shape of a program and kept. The shape consists of the sizes, and of the bounds that are finite
+//! or equal. If a set of contacts returns, only numbers must be updated. The pattern holds all entries that have been
+//! non-zero so far. When another entry becomes non-zero, for example when a robot leaves a symmetric posture, the
+//! solver is built again. Clarabel allocates once in each solve; a new shape or pattern causes more allocations.
 //!
-//! In most ticks a robot is far from most of its limits. A row of G is left out until a solution comes close to one of
-//! the row's bounds. If a solution violates a row that was left out, the program is solved again with this row. So the
-//! final solution satisfies all rows.
+//! In most ticks a robot is far from most of its limits. So clarabel gets a row of G only if a recent solution was
+//! close to one of the row's bounds. If a solution violates a row that was left out, the program is solved again with
+//! this row. So the final solution satisfies all rows.
 
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
 use ::clarabel::algebra::CscMatrix;
@@ -16,22 +16,22 @@ use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus,
 use condyle_linalg::dot;
 use std::time::Instant;
 
-/// Regularisation added to diagonals before a factor is refined. Clarabel's own value, 1e-8, requires refinement in
-/// each solve.
+/// Regularisation added to the diagonal entries of a matrix before its factorisation. Clarabel's own value, 1e-8,
+/// requires iterative refinement in each solve.
 const REGULARISATION: f64 = 1e-11;
 
-/// Maximum number of stored shapes. If it is exceeded, the shape that was not used for the longest time is removed.
+/// Maximum number of stored shapes. A new shape replaces the shape that was not used for the longest time.
 const KEPT: usize = 16;
 
 /// Distance to a bound below which a row counts as close, relative to the width between the row's bounds (or to its
 /// only bound).
 const CLOSE: f64 = 0.1;
 
-/// Number of consecutive solutions that must be away from a row of G before the row is left out again. It is large
-/// because a solver must be built when the row returns.
+/// Number of consecutive solutions that must be far from a row of G before the row is left out again. The number is
+/// large, because the return of a row requires a new solver.
 const PATIENCE: u32 = 1000;
 
-/// Number of solves with all rows that follow a failed solve in which rows were left out.
+/// Number of solves with all rows after a failed solve without some of the rows.
 const RETRIES: u32 = 10;
 
 /// A row of clarabel's A x + s = b.
@@ -68,7 +68,8 @@ impl Row {
         }
     }
 
-    /// Returns whether recent solutions were close to the row. Equalities, fixed rows and cones always matter.
+    /// Returns whether the solver needs the row. It needs all equalities, fixed rows and cones, and the rows to which
+    /// recent solutions were close.
     fn matters(self, away: &[u32]) -> bool {
         match self {
             Row::Lower(i) | Row::Upper(i) => away[i] < PATIENCE,
@@ -109,15 +110,15 @@ fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) {
     rows.extend((0..cone_rows).map(Row::Cone));
 }
 
-/// A solver for one shape.
+/// Solver for programs of one shape.
 struct Shape {
     size: Size,
     cones: Vec<usize>,
     /// All rows of the program.
     all: Vec<Row>,
-    /// Number of consecutive solutions away from each row of G.
+    /// Number of consecutive solutions that were far from each row of G, up to now.
     away: Vec<u32>,
-    /// Rows in the solver.
+    /// Rows that the solver has.
     rows: Vec<Row>,
     /// Entries of P's upper triangle and of A, column by column.
     entries: [Vec<(usize, usize)>; 2],
@@ -128,8 +129,8 @@ struct Shape {
 }
 
 impl Shape {
-    /// Builds a solver for the rows that matter. The pattern holds the program's non-zero entries and the additional
-    /// entries `more`.
+    /// Builds a solver for the needed rows. The pattern holds the program's non-zero entries and the additional entries
+    /// `more`.
     fn new(
         program: &ConeProgram,
         all: Vec<Row>,
@@ -165,11 +166,13 @@ impl Shape {
             tol_feas: tolerance,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
-            // Refine as accurately as the tolerance requires: clarabel's own 1e-13 costs a sixth of the time.
+            // Refine only as accurately as the tolerance requires, because clarabel's own 1e-13 costs a sixth of the
+            // time.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
             static_regularization_constant: REGULARISATION,
-            // Numbers can be replaced only if neither presolve nor the removal of zeros has changed the pattern.
+            // Numbers can only be replaced if the pattern stays the same. So switch off presolve and the removal of
+            // zeros.
             presolve_enable: false,
             input_sparse_dropzeros: false,
             ..DefaultSettings::default()
@@ -182,7 +185,8 @@ impl Shape {
         Self { size, cones, all, away, rows, entries, values, linear, right_side, solver }
     }
 
-    /// Notes to which rows of G a solution is close. Returns whether the solution violates a row that the solver lacks.
+    /// Updates for each row of G whether the solution is close to it. Returns whether the solution violates a row that
+    /// the solver lacks.
     fn compare(&mut self, program: &ConeProgram, x: &[f64]) -> bool {
         let mut violated = false;
         for (i, away) in self.away.iter_mut().enumerate() {
@@ -195,12 +199,13 @@ impl Shape {
         violated
     }
 
-    /// Returns whether the solver has all rows that matter now.
+    /// Returns whether the solver has all rows that are now needed.
     fn is_complete(&self) -> bool {
         self.all.iter().filter(|row| row.matters(&self.away)).eq(&self.rows)
     }
 
-    /// Returns whether the pattern contains all non-zero entries of a program. If it does, replaces the numbers.
+    /// Replaces the numbers in the solver, if the pattern contains all non-zero entries of the program. Returns whether
+    /// it does.
     fn update(&mut self, program: &ConeProgram) -> bool {
         for (k, &(i, j)) in self.entries[0].iter().enumerate() {
             self.values[0][k] = program.P[(j, i)];
@@ -236,7 +241,7 @@ fn gather(program: &ConeProgram, rows: &[Row], entries: &[Vec<(usize, usize)>; 2
     ]
 }
 
-/// Sets the limits of a solver; allocates if the limits change.
+/// Sets the limits of iterations and time in a solver. Allocates if these limits change.
 fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
     let given = solver.settings();
     if (given.max_iter, given.time_limit) != (max_iter, time_limit) {
@@ -301,7 +306,8 @@ impl Clarabel {
         self.shapes.push(Shape::new(program, self.rows.clone(), away, more, &self.settings));
     }
 
-    /// Solves with the rows to which solutions were close, within the iterations and the time that earlier rounds left.
+    /// Solves the program with the needed rows. The limits of iterations and time include the earlier solves of the
+    /// same program.
     fn solve_with_rows(&mut self, program: &ConeProgram, iterations: u32, started: Instant) -> Outcome {
         self.prepare(program);
         let Settings { max_iterations, time_limit, .. } = self.settings;
@@ -364,7 +370,7 @@ impl Solver for Clarabel {
             }
             if failed || round > 0 {
                 let soon = PATIENCE - if failed { RETRIES } else { 1 };
-                shape.away.iter_mut().for_each(|away| *away = (*away).min(soon)); // all rows matter now
+                shape.away.iter_mut().for_each(|away| *away = (*away).min(soon)); // all rows are needed now
             }
         }
         unreachable!("in the third round no row is left out")

@@ -1,4 +1,4 @@
-//! A dense convex program with second-order cones, in memory of fixed size. Nothing here refers to robots.
+//! Dense convex program with second-order cones, in memory of fixed size. This module does not depend on robots.
 //!
 //! ```text
 //! minimise     ½ xᵀ P x + cᵀ x
@@ -25,7 +25,7 @@ pub(crate) use program::{ConeProgram, Size};
 /// Conditions under which a solver stops.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Maximum of the residuals and of the duality gap, each relative to the terms of which it is the difference.
+    /// Maximum of the residuals and of the duality gap. Each is relative to the terms from which it is computed.
     pub tolerance: f64,
     /// Maximum number of iterations of the cold and the warm start together.
     pub max_iterations: u32,
@@ -42,13 +42,13 @@ impl Default for Settings {
 /// Point from which a solver starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Start {
-    /// From the data alone.
+    /// Start from the data of the program alone.
     Cold,
-    /// From the last solution, if that solution has the program's size and the solver supports it.
+    /// Start from the last solution, if that solution has the program's size and the solver supports a warm start.
     Warm,
 }
 
-/// Reason why a solve has no minimiser.
+/// Reason for which a solve found no minimiser.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum Status {
     /// The constraints contradict each other.
@@ -69,9 +69,9 @@ pub(crate) enum Status {
     /// A number of the program is NaN, or is infinite where it must be finite. Nothing was solved.
     #[error("`{name}[{index}]` is not finite")]
     NotFinite {
-        /// The field of [`ConeProgram`].
+        /// Name of the invalid field of [`ConeProgram`].
         name: &'static str,
-        /// Index of the invalid number in that field, counted column by column.
+        /// Index of the invalid number in this field, counted column by column.
         index: usize,
     },
 }
@@ -81,11 +81,12 @@ pub(crate) enum Status {
 pub(crate) struct Outcome {
     /// Number of iterations of all attempts together.
     pub iterations: u32,
-    /// Whether the solver reached the solution from the last solution.
+    /// Whether the solver reached the solution from a warm start.
     pub warm: bool,
-    /// Whether the solution meets only the reduced tolerances.
+    /// Whether the solution meets only the reduced tolerance.
     pub reduced: bool,
-    /// Reason, if x is not the minimiser. x is then the last iterate and finite, or zero if nothing was solved.
+    /// Reason for which x is not the minimiser, if so. Then x is the last iterate and finite, or zero if nothing was
+    /// solved.
     pub stopped: Option<Status>,
 }
 
@@ -100,10 +101,10 @@ pub(crate) struct Multipliers<'s> {
     pub cones: &'s [f64],
 }
 
-/// A solver of programs up to a maximum size, its capacity.
+/// Solver of programs up to a maximum size, the solver's capacity.
 pub(crate) trait Solver {
-    /// Sets the start of the next warm solve, for a program of this size. A solver that always starts cold does
-    /// nothing.
+    /// Sets the starting point of the next warm solve, for a program of this size. A solver that always starts cold
+    /// does nothing.
     fn start_from(&mut self, _x: &[f64], _multipliers: Multipliers<'_>) {}
 
     /// Minimises the program's objective.

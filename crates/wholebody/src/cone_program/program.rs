@@ -1,9 +1,9 @@
-//! A program and its sizes.
+//! Convex program with second-order cones, and its sizes.
 
 use super::Status;
 use nalgebra::DMatrix;
 
-/// Sizes of a program: numbers of unknowns and constraints, either in use or at most.
+/// Sizes of a program: numbers of unknowns and constraints. They are either the numbers in use or the maximum numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Size {
     /// Length of x.
@@ -16,11 +16,11 @@ pub(crate) struct Size {
     pub cone_rows: usize,
 }
 
-/// Numbers of a program. Matrices and vectors have the dimensions of the capacity. A solver reads only their first rows
-/// and columns, up to the size in use.
+/// Matrices and vectors of a program, with the dimensions of the capacity. A solver reads only their first rows and
+/// columns, up to the size in use.
 #[derive(Clone, Debug)]
 pub(crate) struct ConeProgram {
-    /// Size in use; each number is at most the number of the capacity.
+    /// Size in use. Each number is at most the number in the capacity.
     pub size: Size,
     /// P: n × n, positive semidefinite; only the lower triangle is read.
     pub P: DMatrix<f64>,
@@ -40,14 +40,14 @@ pub(crate) struct ConeProgram {
     pub Ft: DMatrix<f64>,
     /// h.
     pub h: Vec<f64>,
-    /// Dimension of each cone in use, at least 2, or 1 for the constraint s₁ ≥ 0. The sum of all dimensions is
+    /// Dimension of each cone in use: at least 2, or 1 for the constraint s₀ ≥ 0. The sum of all dimensions is
     /// `size.cone_rows`.
     pub cones: Vec<usize>,
 }
 
 impl ConeProgram {
-    /// Creates a program of zeros and infinite bounds whose size is the capacity, but without cones. Cones with up to
-    /// `cone_rows` rows may be added later.
+    /// Creates a program of zeros and infinite bounds whose size in use is the capacity. It has no cones; the caller
+    /// may add cones with up to `cone_rows` rows.
     pub(crate) fn new(capacity: Size) -> Self {
         let Size { unknowns, equalities, rows, cone_rows } = capacity;
         Self {
@@ -70,7 +70,7 @@ impl ConeProgram {
         Size { unknowns: self.c.len(), equalities: self.b.len(), rows: self.lower.len(), cone_rows: self.h.len() }
     }
 
-    /// Returns the coefficients of an equality for writing: one number for each unknown of the capacity.
+    /// Returns a mutable slice of the coefficients of an equality: one number for each unknown of the capacity.
     pub(crate) fn equality_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.At.as_mut_slice()[i * most..][..most]
@@ -94,24 +94,24 @@ impl ConeProgram {
         }
     }
 
-    /// Returns the coefficients of a row: one number for each unknown of the capacity.
+    /// Returns the coefficients of a row of G: one number for each unknown of the capacity.
     pub(crate) fn row(&self, i: usize) -> &[f64] {
         &self.Gt.as_slice()[i * self.c.len()..][..self.c.len()]
     }
 
-    /// Returns the coefficients of a row, for writing.
+    /// Returns a mutable slice of the coefficients of a row of G.
     pub(crate) fn row_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.Gt.as_mut_slice()[i * most..][..most]
     }
 
-    /// Returns the coefficients of a row of a cone, for writing.
+    /// Returns a mutable slice of the coefficients of a row of a cone.
     pub(crate) fn cone_row_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.Ft.as_mut_slice()[i * most..][..most]
     }
 
-    /// Checks that all numbers that a solver reads are finite (bounds may be infinite), and that the size in use fits.
+    /// Checks that all numbers that a solver reads are finite (bounds may be infinite). Also checks the size in use.
     ///
     /// # Errors
     /// [`Status::NotFinite`] names the first number that is not finite.
@@ -160,7 +160,7 @@ impl ConeProgram {
 
 /// Checks that the numbers of a column are finite, from index `from` on. `first` is the column's offset in the matrix.
 fn finite(name: &'static str, column: &[f64], from: usize, first: usize) -> Result<(), Status> {
-    // 0 · x is 0 for each finite x, and NaN for all others. Eight independent sums add these products.
+    // 0 · x is 0 for each finite x, and NaN otherwise. Add these products in eight independent sums.
     let (eights, rest) = column[from..].as_chunks::<8>();
     let mut sums = [0.0; 8];
     for x in eights {

@@ -1,9 +1,10 @@
-//! Optimality conditions at a step.
+//! Check of the optimality conditions after a step.
 #![allow(dead_code, unreachable_pub)] // each test file uses only some of the functions
 
 use condyle_wholebody::{KktResiduals, References, WholeBodyController};
 
-/// Tolerance of the first three errors in [`KktResiduals`]; its documentation explains the number.
+/// Tolerance of the first three errors in [`KktResiduals`]. The documentation of this type gives the reason for
+/// 1e-7.
 pub const OPTIMALITY: f64 = 1e-7;
 const GAP: f64 = 1e-6;
 

@@ -1,4 +1,4 @@
-//! A standing quadruped and a humanoid, and checks that use no formula of the controller.
+//! A standing quadruped, a humanoid, and checks of commands. The checks do not use the controller's own formulas.
 #![allow(dead_code, non_snake_case, unreachable_pub)] // each test file uses only some of the functions
 
 use condyle_dynamics::{Act, Data, Force, Model, Se3, Vec3, forward_kinematics, integrate, rnea};
@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 pub const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
 
-/// Tolerance of equalities (N, m/s²). Forces are about 100 N, and the solver's relative tolerance is 1e-9.
+/// Tolerance of equalities (N, m/s²). Contact forces are about 100 N, and the solver's relative tolerance is 1e-9.
 pub const EQUALITY: f64 = 1e-6;
 
 /// Returns a position of the quadruped with knees inwards and feet on the ground.
@@ -32,7 +32,7 @@ pub fn controller(model: &Model, contacts: &[FrictionContact]) -> WholeBodyContr
     WholeBodyController::new(model, contacts, &tasks(), Settings::default()).unwrap()
 }
 
-/// Returns a position of the humanoid with bent knees, and level soles under the hips.
+/// Returns a position of the humanoid with bent knees, and with level soles under the hips.
 pub fn squat(model: &Model) -> Vec<f64> {
     let mut q = condyle_dynamics::neutral(model);
     for side in ["left", "right"] {
@@ -45,7 +45,7 @@ pub fn squat(model: &Model) -> Vec<f64> {
     q
 }
 
-/// Returns contacts of the humanoid's two soles, of 20 by 10 cm.
+/// Returns contacts of the humanoid's two soles, each 20 cm by 10 cm.
 pub fn soles(friction: f64) -> Vec<FrictionContact> {
     ["left_sole", "right_sole"].map(|sole| FrictionContact::sole(sole, friction, [0.2, 0.1])).to_vec()
 }
@@ -54,12 +54,13 @@ pub fn humanoid_tasks() -> Vec<Task> {
     vec![Task::com(), Task::orientation("pelvis"), Task::angular_momentum(), Task::posture()]
 }
 
-/// Returns a random position near the quadruped's stance, and a random velocity.
+/// Returns a random position near the quadruped's stance, and a random velocity. `distance` and `speed` are their
+/// maximum sizes.
 pub fn state(model: &Model, seed: u64, distance: f64, speed: f64) -> (Vec<f64>, Vec<f64>) {
     near(model, &stance(), seed, distance, speed)
 }
 
-/// Returns a random position near `centre`, and a random velocity.
+/// Returns a random position near `centre`, and a random velocity. `distance` and `speed` are their maximum sizes.
 pub fn near(model: &Model, centre: &[f64], seed: u64, distance: f64, speed: f64) -> (Vec<f64>, Vec<f64>) {
     let mut rng = StdRng::seed_from_u64(seed);
     let mut draw = |scale: f64| (0..model.nv()).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect::<Vec<_>>();
@@ -69,7 +70,7 @@ pub fn near(model: &Model, centre: &[f64], seed: u64, distance: f64, speed: f64)
     (q, v)
 }
 
-/// Returns the accelerations of each contact and of the centre of mass: ẍ along the path q(t) = q ⊕ (t v + ½ t² a).
+/// Returns the acceleration ẍ of each contact and of the centre of mass, along the path q(t) = q ⊕ (t v + ½ t² a).
 pub fn accelerations(
     model: &Model,
     contacts: &[FrictionContact],
@@ -94,7 +95,7 @@ pub fn accelerations(
     (feet, com)
 }
 
-/// Computes M q̈ + h − Jᵀ f by one pass of inverse dynamics with the contact forces as external forces.
+/// Computes M q̈ + h − Jᵀ f by one pass of inverse dynamics. The contact forces f are the external forces of this pass.
 pub fn inverse_dynamics(
     model: &Model,
     contacts: &[FrictionContact],
@@ -109,7 +110,7 @@ pub fn inverse_dynamics(
         let frame = model.frame(&contact.frame).unwrap();
         let body = model.frames()[frame].body;
         let point = placements.frame(frame).translation;
-        let about_origin = Force::new(f.linear, f.angular + point.cross(f.linear)); // about the world's origin
+        let about_origin = Force::new(f.linear, f.angular + point.cross(f.linear)); // moment about the world's origin
         f_ext[body] += placements.body(body).act_inv(about_origin);
     }
     rnea(model, &mut data, q, v, &command.a, &f_ext).to_vec()
@@ -128,8 +129,8 @@ pub fn max_abs(x: impl IntoIterator<Item = f64>) -> f64 {
     x.into_iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Checks dynamics, held contacts, momentum, cones and centre of pressure to [`EQUALITY`]. Every command passes if
-/// contacts are held without gains.
+/// Checks dynamics, held contacts, momentum, cones and centre of pressure up to [`EQUALITY`]. Every command must pass,
+/// if contacts are held without gains.
 pub fn check(
     model: &Model,
     contacts: &[FrictionContact],
@@ -148,7 +149,7 @@ pub fn check(
     check_forces(model, contacts, q, v, references, command);
 }
 
-/// Checks a command as [`check`] does, except the acceleration of contacts.
+/// Checks a command like [`check`], except the accelerations of the contacts.
 pub fn check_forces(
     model: &Model,
     contacts: &[FrictionContact],
@@ -194,7 +195,7 @@ pub fn check_forces(
                 let moment = (f.angular - middle.cross(f.linear)).dot(n);
                 assert!(moment.abs() < yaw * f_n + EQUALITY, "{}: it turns, {moment:.1e} N m", contact.frame);
             }
-            // For each edge of the polygon, the moment about the edge must not tip the sole over the edge.
+            // At each edge of the polygon, the moment about the edge must not tip the sole over the edge.
             let count = corners.len();
             for k in 0..count {
                 let (a, b) = (R * corners[k], R * corners[(k + 1) % count]);

@@ -1,9 +1,9 @@
-//! Recorded ticks of robots that stand, walk and trot while they are pushed. The back ends are timed and compared on
-//! them.
+//! Recorded ticks of robots that stand, walk and trot while they are pushed. Programs use the recordings to time and to
+//! compare the back ends.
 //!
-//! Condyle's own constrained dynamics close the loop. Feet that touch according to the references are held on the
-//! ground, even if the ground would have to pull. The controller receives velocities with noise, and does not know the
-//! pushes. The same arguments give the same recording on processors with the same vector instructions.
+//! Condyle's own constrained dynamics close the loop. If a foot touches according to the references, the ground holds
+//! the foot, even if it must pull. The controller receives velocities with noise, and does not know the pushes. On
+//! processors with the same vector instructions, the same arguments give the same recording.
 #![allow(dead_code, unreachable_pub)] // each program uses only some of the functions
 
 use condyle_dynamics::{
@@ -27,21 +27,23 @@ const HOLD: f64 = 50.0;
 /// Interval from the beginning of one push to the next, and duration of a push (s).
 const PUSHES: [f64; 2] = [0.5, 0.1];
 
-/// Durations (s) in a biped's step. The weight moves to one foot; the other foot is unloaded, swings and is loaded.
+/// Durations (s) of the phases of a biped's step. First the weight moves to one foot; then the other foot is unloaded,
+/// swings and is loaded.
 const SHIFT: f64 = 1.2;
 const FADE: f64 = 0.1;
 const SWING: f64 = 0.5;
 /// Length and height of a biped's step (m).
 const STEP: [f64; 2] = [0.1, 0.05];
-/// Durations (s), height (m) and speed (m/s) of a trot. Half a period consists of two fades and a swing.
+/// Durations (s), height (m) and speed (m/s) of a trot. Half a period consists of a fade, a swing and another fade.
 const TROT_FADE: f64 = 0.03;
 const TROT_SWING: f64 = 0.2;
 const TROT_HEIGHT: f64 = 0.05;
 const TROT_SPEED: f64 = 0.25;
-/// Additional reach of a foot, divided by the unwanted speed of the trunk (s): about √(h / g), with h half a metre.
+/// Additional reach of a swinging foot (m) per unwanted speed of the trunk (m/s). The value is about √(h / g) with h =
+/// 0.5 m.
 const CAPTURE: f64 = 0.2;
 
-/// A robot standing on its feet.
+/// Robot that stands on its feet.
 pub struct Robot {
     pub name: String,
     pub model: Model,
@@ -53,12 +55,12 @@ pub struct Robot {
     push: f64,
 }
 
-/// Constants of a robot. Joints and frames are given by name.
+/// Constants of a robot. Joints and frames are identified by name.
 struct Description {
     name: &'static str,
     trunk: &'static str,
     feet: &'static [&'static str],
-    /// Texts and angles: a joint whose name contains the text has this angle.
+    /// Pairs of a text and an angle: a joint whose name contains the text has this angle.
     bent: &'static [(&'static str, f64)],
 }
 
@@ -101,7 +103,7 @@ const ROBOTS: [Description; 4] = [
 ];
 
 impl Robot {
-    /// Loads an embedded robot, or one of the robots listed above from its URDF.
+    /// Loads an embedded robot, or a robot from the list above with its URDF file.
     pub fn new(name: &str, urdf: Option<&str>) -> Result<Self, Box<dyn std::error::Error>> {
         let known = ROBOTS.iter().find(|robot| robot.name == name).ok_or_else(|| format!("no robot `{name}`"))?;
         let options = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };
@@ -139,10 +141,10 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Returns the settings of the recorded controller.
+    /// Returns the settings of the controller that makes the recording.
     pub fn settings() -> Settings {
         let contact_gains = Gains { stiffness: 0.0, damping: 40.0 };
-        // With this weight, the distribution of the load among the feet exceeds rounding errors.
+        // Without this weight, rounding errors would determine how the load is distributed among the feet.
         Settings { contact_gains, force_weight: 1e-5, ..Settings::default() }
     }
 
@@ -160,7 +162,7 @@ impl Robot {
     }
 }
 
-/// Input of a controller at a tick.
+/// Arguments of a controller's step at a tick.
 #[derive(Clone)]
 pub struct Tick {
     pub q: Vec<f64>,
@@ -168,14 +170,14 @@ pub struct Tick {
     pub references: References,
 }
 
-/// Rises smoothly from 0 at s = 0 to 1 at s = 1. Returns value, slope and curvature at s.
+/// Computes a function that rises smoothly from 0 at s = 0 to 1 at s = 1. Returns its value, slope and curvature at s.
 fn smooth(s: f64) -> [f64; 3] {
     let s = s.clamp(0.0, 1.0);
     let rest = s * (1.0 - s);
     [s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * rest * rest, 60.0 * rest * (1.0 - 2.0 * s)]
 }
 
-/// A robot and the ground.
+/// Simulation of a robot on the ground.
 struct World<'m> {
     model: &'m Model,
     data: Data<f64>,
@@ -207,11 +209,11 @@ impl World<'_> {
     }
 }
 
-/// References of a gait.
+/// Generator of the references of a gait.
 struct Gait<'r> {
     robot: &'r Robot,
     start: References,
-    /// Position at which each foot is held, or from which the foot swings.
+    /// Position of each foot while it is held, or at the start of its swing.
     feet: Vec<Vec3<f64>>,
     /// Position of the centre of mass at the beginning of a step.
     from: Vec3<f64>,
@@ -222,7 +224,7 @@ impl Gait<'_> {
     /// Index of the first foot among the frames of the references.
     const FEET: usize = 1;
 
-    /// Writes the references at a time t, for this position and velocity of the centre of mass.
+    /// Writes the references at time t, for the given position and velocity of the centre of mass.
     fn write(&mut self, t: f64, com: [Vec3<f64>; 2], references: &mut References) {
         if self.robot.is_biped() { self.walk(t, references) } else { self.trot(t, com, references) }
     }
@@ -240,7 +242,7 @@ impl Gait<'_> {
         frame.acceleration.linear.z += height * 2.0 * (PI / duration).powi(2) * (cos * cos - sin * sin);
     }
 
-    /// Writes quasi-static steps; the left foot carries the weight first.
+    /// Writes references of quasi-static steps. The left foot carries the weight first.
     fn walk(&mut self, t: f64, references: &mut References) {
         let duration = SHIFT + FADE + SWING + FADE;
         let step = (t / duration) as usize;
@@ -264,7 +266,7 @@ impl Gait<'_> {
         references.contacts[swings].activation = activation(t - SHIFT, FADE, SWING);
     }
 
-    /// Writes steps of diagonal pairs of feet, one pair after the other.
+    /// Writes references of a trot, in which diagonal pairs of feet swing alternately.
     fn trot(&mut self, t: f64, [com, velocity]: [Vec3<f64>; 2], references: &mut References) {
         let duration = 2.0 * TROT_FADE + TROT_SWING;
         let step = (t / duration) as usize;
@@ -291,8 +293,8 @@ impl Gait<'_> {
     }
 }
 
-/// Returns the activation of a contact: 1, then falling to 0 within `fade`, 0 during the swing, and rising to 1 within
-/// `fade`.
+/// Returns the activation of a contact at time t. It falls from 1 to 0 within `fade`, is 0 during the swing, and rises
+/// to 1 within `fade`.
 fn activation(t: f64, fade: f64, swing: f64) -> f64 {
     let (down, up) = (1.0 - t / fade, (t - fade - swing) / fade);
     down.max(up).clamp(0.0, 1.0)

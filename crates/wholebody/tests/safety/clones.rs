@@ -1,11 +1,11 @@
-//! Clones of a controller continue as the original does.
+//! Tests that clones of a controller continue like the original.
 
 use crate::common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Command, Formulation, Settings, Task, WholeBodyController};
 
-/// Makes step k near the stance. In the course of the steps, contacts appear and disappear, and some states and
-/// references are invalid. Tasks have two priorities.
+/// Makes step k near the stance. From step to step, contacts appear and disappear, and some states and references are
+/// invalid. Tasks have two priorities.
 fn tick(controller: &mut WholeBodyController, k: u64) -> Command {
     let model = robots::quadruped();
     let (q, v) = state(&model, k / 4, 0.05, 0.2);
@@ -24,7 +24,7 @@ fn described(settings: Settings) -> WholeBodyController {
     WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks, settings).unwrap()
 }
 
-/// With Condyle's own solver, clones continue with the same bits from any tick, with and without warm starts.
+/// Checks Condyle's own solver: from any tick, clones continue with the same bits, with and without warm starts.
 #[test]
 fn a_clone_has_the_same_bits() {
     for (warm_start, formulation) in
@@ -43,17 +43,18 @@ fn a_clone_has_the_same_bits() {
             }
             tick(&mut controller, k);
         }
-        // Earlier clones have not changed the controller: one that was never cloned gives the same command.
+        // Earlier clones have not changed the controller: a controller that was never cloned gives the same command.
         let mut alone = described(Settings { warm_start, formulation, ..Settings::default() });
         let last = (0..24).map(|k| tick(&mut alone, k)).last().unwrap();
         assert_eq!(format!("{last:?}"), format!("{:?}", controller.command()));
     }
 }
 
-/// With clarabel, whose solvers are built again, commands of clones agree up to clarabel's tolerance.
+/// Checks that commands of clones agree up to clarabel's tolerance if clarabel is the solver. A clone builds clarabel's
+/// solvers again.
 #[test]
 fn a_clone_with_clarabel_has_the_same_solution() {
-    // With these weights and this tolerance, forces and efforts are unique enough to be compared.
+    // With these weights and this tolerance, forces and efforts are accurate enough to be compared.
     let (backend, tolerance) = (Backend::Clarabel, 1e-11);
     let settings = Settings { backend, tolerance, force_weight: 1e-5, ..Settings::default() };
     let mut controller = WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks(), settings).unwrap();
@@ -66,7 +67,7 @@ fn a_clone_with_clarabel_has_the_same_solution() {
     }
 }
 
-/// Rejects numbers of another controller, too few or too many numbers, and invalid numbers.
+/// Checks that `restore` rejects numbers of another controller, too few or too many numbers, and invalid numbers.
 #[test]
 fn numbers_of_another_controller_are_refused() {
     let mut controller = described(Settings::default());
@@ -80,7 +81,7 @@ fn numbers_of_another_controller_are_refused() {
     assert!(!restored(&other.carried()));
     for value in [f64::NAN, -1.0, 0.5, 1e300] {
         let mut broken = numbers.clone();
-        broken[0] = value; // The first number tells whether a contact touches.
+        broken[0] = value; // the first number tells whether a contact touches
         assert!(!restored(&broken), "{value}");
     }
 }

@@ -1,4 +1,5 @@
-//! An invalid rotation in a state or in references gives a safe command, and a status that names the joint or frame.
+//! Tests that an invalid rotation in a state or in references gives a safe command, and a status that names the joint
+//! or frame.
 
 use crate::common::*;
 use condyle_dynamics::{Data, Joint, Mat3, Model, ModelBuilder, Se3, Vec3, WORLD, gravity, neutral, robots};
@@ -18,8 +19,8 @@ fn scaled(q: &[f64], part: std::ops::Range<usize>, factor: f64) -> Vec<f64> {
     q
 }
 
-/// Returns a robot with a fixed base and one joint of each kind whose position contains a quaternion or a pair (cos,
-/// sin).
+/// Returns a robot with a fixed base and one joint of each kind that has a quaternion or a pair (cos, sin) in its
+/// position.
 fn turning() -> Model {
     let mut builder = ModelBuilder::new("turning");
     let (axis, down) = (Vec3::new(0.0, 0.0, 1.0), Se3::new(Mat3::identity(), Vec3::new(0.1, 0.0, -0.3)));
@@ -48,7 +49,7 @@ fn a_quaternion_has_length_1() {
         assert_eq!(controller.reason(), format!("joint `root_joint`: {fault}"));
         assert_eq!(controller.hold(&bad).unwrap_err().to_string(), format!("joint `root_joint`: {fault}"));
     }
-    // Small errors of the length are allowed. The opposite quaternion is the same rotation.
+    // Small errors of a quaternion's length are allowed. The opposite quaternion describes the same rotation.
     for factor in [1.0, -1.0, 1.0 + 5e-4, 1.0 - 5e-4] {
         let near = scaled(&q, 3..7, factor);
         controller.step(&near, &v, &references).solved().unwrap();
@@ -57,7 +58,8 @@ fn a_quaternion_has_length_1() {
     }
 }
 
-/// References made at a valid position are valid, even if the length of a rotation differs from 1 by the allowed error.
+/// Checks that references made at a valid position are valid. The length of a rotation in this position may differ from
+/// 1 by the allowed error.
 #[test]
 fn references_of_a_valid_position_are_valid() {
     let model = robots::quadruped();
@@ -124,8 +126,8 @@ fn a_reference_rotation_is_one() {
     controller.step(&q, &v, &good).solved().unwrap();
 }
 
-/// Gravity compensation uses the last valid state, before and after the first solution, whatever arguments follow this
-/// state.
+/// Checks that gravity compensation uses the last valid state. This holds before and after the first solution, whatever
+/// arguments follow this state.
 #[test]
 fn the_safe_command_is_of_the_last_valid_state() {
     let model = robots::quadruped();
@@ -139,7 +141,7 @@ fn the_safe_command_is_of_the_last_valid_state() {
         assert_eq!(command.tau[6..], gravity(&model, &mut data, at)[6..]);
     };
     let bad = |q: &[f64]| scaled(q, 3..7, 0.0);
-    compensation(&mut controller, &bad(&stance()), &neutral(&model)); // no state was valid yet
+    compensation(&mut controller, &bad(&stance()), &neutral(&model)); // before the first valid state
     for seed in 0..3 {
         let (q, v) = state(&model, seed, 0.2, 0.0);
         controller.step(&q, &v, &references).solved().unwrap();
@@ -149,7 +151,7 @@ fn the_safe_command_is_of_the_last_valid_state() {
     }
 }
 
-/// Finite numbers of any size always give a finite command.
+/// Checks that finite numbers of any size give a finite command.
 #[test]
 fn huge_numbers_are_safe() {
     let model = robots::quadruped();

@@ -1,9 +1,9 @@
-//! One side of the rows, lower or upper: s = ±(G x − bound) ≥ 0 with its multiplier z ≥ 0. All operations are element
-//! by element and vectorised.
+//! Lower or upper bounds of all rows, with slack variables s = ±(G x − bound) ≥ 0 and multipliers z ≥ 0. All operations
+//! are element by element and vectorised.
 
 use condyle_linalg::{Vector, Vectorized};
 
-/// The lower or the upper bounds of all rows. A row without this bound has s = z = 1, and its s and z never change.
+/// Lower or upper bounds of all rows. A row without this bound has s = z = 1, and its s and z never change.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
     /// 1 for lower bounds, −1 for upper bounds.
@@ -35,14 +35,14 @@ impl Side {
     }
 }
 
-/// Computes r = ±(G x − bound) − s and d = z / s; adds ±z to `multipliers`, sᵀ z to `gap`, ±bᵀ z to `support`.
+/// Computes r = ±(G x − bound) − s and d = z / s. Adds ±z to `multipliers`, and updates `sums`.
 pub(super) struct Residuals<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],
     pub bound: &'a [f64],
     pub Gx: &'a [f64],
     pub multipliers: &'a mut [f64],
-    /// max |r| / max(1, s), sᵀ z, ± boundᵀ z.
+    /// Maximum of |r| / max(1, s), sum of s z, and sum of ±bound z.
     pub sums: &'a mut [f64; 3],
 }
 
@@ -77,7 +77,8 @@ impl Vectorized for Residuals<'_> {
     }
 }
 
-/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz. The term ds dz is only used with `second_order`.
+/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz. The term ds dz is only used if `second_order` is
+/// true.
 pub(super) struct Target<'a> {
     pub side: &'a Side,
     pub has: &'a [f64],
@@ -100,7 +101,8 @@ impl Vectorized for Target<'_> {
     }
 }
 
-/// Computes ds = ±G dx + r and dz = (ξ − z ds) / s with ξ as in [`Target`]. Also finds the greatest of −ds/s and −dz/z.
+/// Computes the direction ds = ±G dx + r and dz = (ξ − z ds) / s with ξ as in [`Target`]. Also raises `inverse_step` to
+/// the greatest of −ds/s and −dz/z.
 pub(super) struct Direction<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],

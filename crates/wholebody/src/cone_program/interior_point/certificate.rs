@@ -1,21 +1,21 @@
-//! Certificates: proofs that no solution exists.
+//! Certificates: proofs that a program has no solution.
 
 use super::cone::margin;
 use super::scaled::Scaled;
 use crate::cone_program::Status;
 use condyle_linalg::{dot, max_abs};
 
-/// Tolerance of a certificate: size of the terms that should be zero, relative to the other terms. The reduced
-/// tolerance applies if the iterates stop improving.
+/// Tolerance of a certificate: maximum size of the terms that should be zero, relative to the other terms.
+/// `REDUCED_TOLERANCE` applies if the iterates stop improving.
 const TOLERANCE: f64 = 1e-9;
 pub(super) const REDUCED_TOLERANCE: f64 = 1e-5;
-/// Minimum size of an x that may be a direction in which the objective is unbounded; each unknown has a unit in which
-/// its size is about one.
+/// Minimum size of an iterate x that may prove an unbounded objective. In the units of the method, the unknowns of a
+/// solution have size about one.
 const FAR: f64 = 1e3;
-/// Minimum decrease of the objective along a direction of size one.
+/// Minimum decrease of the objective along a direction of size one that proves an unbounded objective.
 const FALL: f64 = 1e-6;
 
-/// An iterate and the quantities derived from it.
+/// Iterate, and the quantities from which its certificate is computed.
 pub(super) struct Candidate<'a> {
     pub data: &'a Scaled,
     pub x: &'a [f64],
@@ -31,13 +31,13 @@ pub(super) struct Candidate<'a> {
 
 impl Candidate<'_> {
     /// Returns the distance of the iterate from a proof that no x satisfies the constraints. Every feasible x satisfies
-    /// `support` ≤ (Kᵀ z + E y)ᵀ x. So a `force` of zero with a positive `support` is such a proof.
+    /// `support` ≤ (Kᵀ z + E y)ᵀ x. So a positive `support` with a `force` ‖Kᵀ z + E y‖ of zero is such a proof.
     pub(super) fn exclusion(&self) -> f64 {
         let size = max_abs(&self.x[..self.data.n]);
         if self.support > 0.0 { self.force * (1.0 + size) / self.support } else { f64::INFINITY }
     }
 
-    /// Returns the status that the iterate proves, or `None`.
+    /// Returns the status that the iterate proves, or `None` without a proof.
     pub(super) fn verdict(&self) -> Option<Status> {
         if self.exclusion() <= TOLERANCE {
             return Some(Status::Infeasible);

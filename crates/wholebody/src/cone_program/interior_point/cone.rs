@@ -1,5 +1,5 @@
-//! The algebra of a second-order cone Q = {s : ‖s₁‖ ≤ s₀}, and Nesterov and Todd's scaling of a pair (s, z) in the
-//! cone's interior.
+//! Algebra of a second-order cone Q = {s : ‖s₁‖ ≤ s₀}, and Nesterov and Todd's scaling of a pair (s, z) in the interior
+//! of Q.
 //!
 //! W = η (2 v vᵀ − J) with J = diag(1, −1, …, −1) is the matrix for which W z = W⁻¹ s = λ. Let s̄ = s / √(sᵀ J s), z̄ =
 //! z / √(zᵀ J z), γ = √((1 + s̄ᵀ z̄) / 2) and η⁴ = sᵀ J s / zᵀ J z. With w = (s̄ + J z̄) / (2 γ):
@@ -49,7 +49,7 @@ pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -
     for i in 1..s.len() {
         w[i] = half * (s[i] * rs - z[i] * rz);
     }
-    // w has the determinant 1. Its first entry is computed from the others, so that this holds to the last digit.
+    // w has the determinant 1. To satisfy this to the last digit, compute the first entry of w from the other entries.
     w[0] = (1.0 + tail(w, w)).sqrt();
     let eta = (ds / dz).sqrt().sqrt();
     apply(eta, w, z, lambda);
@@ -97,7 +97,7 @@ pub(super) fn divide(lambda: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// Returns 1 / α for the greatest α with λ + α d ∈ Q; the result is not positive if α is unbounded.
+/// Returns 1 / α for the greatest α with λ + α d ∈ Q. If α is unbounded, the result is zero or negative.
 ///
 /// The result is (‖ρ₁‖ − ρ₀) / √(λᵀ J λ), where λ̄ = λ / √(λᵀ J λ), ρ₀ = λ̄ᵀ J d and ρ₁ = d₁ − (ρ₀ + d₀) / (1 + λ̄₀)
 /// λ̄₁.
@@ -116,7 +116,8 @@ pub(super) fn inverse_step(lambda: &[f64], d: &[f64]) -> f64 {
 
 /// Computes s and z with s ∘ z = μ e and s − z = v. In the cone's algebra, s = (v + √(v² + 4 μ e)) / 2 and z = s − v.
 ///
-/// The eigenvalues of v are v₀ ± ‖v₁‖. Source: Fukushima, Luo and Tseng (2002), smoothing of complementarity.
+/// The square root is computed from the eigenvalues of v, v₀ ± ‖v₁‖. Source: Fukushima, Luo and Tseng (2002), smoothing
+/// of complementarity.
 #[inline(always)]
 pub(super) fn split(v: &[f64], mu: f64, s: &mut [f64], z: &mut [f64]) {
     let radius = tail(v, v).sqrt();

@@ -3,8 +3,8 @@
 use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
 use super::scaled::{Cone, Scaled};
 
-/// Evaluates the expression with a constant `dim` if the cone is a friction cone, so that the compiler can unroll its
-/// loops.
+/// Evaluates an expression that depends on a cone's dimension `dim`. For friction cones `dim` is the constant 3, so
+/// that the compiler can unroll loops.
 macro_rules! by_dimension {
     ($value:expr, $dim:ident => $expression:expr) => {
         match $value {
@@ -17,8 +17,8 @@ macro_rules! by_dimension {
     };
 }
 
-/// Slack variables s = h + F x in the product of cones, and multipliers z. Vectors with a tilde are scaled: d̃s = W⁻¹
-/// ds, d̃z = W dz.
+/// Slack variables s = h + F x and multipliers z of all cones. A tilde marks a scaled direction: d̃s = W⁻¹ ds, d̃z = W
+/// dz.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cones {
     pub s: Vec<f64>,
@@ -57,7 +57,7 @@ impl Cones {
         }
     }
 
-    /// Computes r and the multipliers; adds the contributions of the cones to the sums [‖r‖∞, sᵀ z, −hᵀ z].
+    /// Computes r and the multipliers. Adds the contributions of the cones to `sums`, which are ‖r‖∞, sᵀ z and −hᵀ z.
     pub(super) fn residuals(&mut self, h: &[f64], Fx: &[f64], multipliers: &mut [f64], sums: &mut [f64; 3]) {
         for i in 0..h.len() {
             self.r[i] = h[i] + Fx[i] - self.s[i];
@@ -68,7 +68,7 @@ impl Cones {
         }
     }
 
-    /// Computes W and λ of each cone; returns false if a pair (s, z) is not in the interior.
+    /// Computes W and λ of each cone. Returns false if a pair (s, z) is not in the interior of its cone.
     pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
         cones.iter().enumerate().all(|(k, cone)| by_dimension!(cone.dim, dim => self.scale_one(k, cone.at, dim)))
     }
@@ -84,7 +84,7 @@ impl Cones {
         true
     }
 
-    /// Computes B = (W⁻¹ F)ᵀ, in the rows in which F is non-zero.
+    /// Computes B = (W⁻¹ F)ᵀ in the rows of Fᵀ that have non-zero entries.
     #[inline(always)]
     pub(super) fn scale_rows(&self, data: &Scaled, B: &mut [f64]) {
         let (ld, m) = (data.ld, data.rows());
@@ -94,7 +94,7 @@ impl Cones {
             let F = &data.K[(m + cone.at) * ld + rows.start..];
             let (head, tail) = B[cone.at * ld + rows.start..].split_at_mut(ld);
             let (f0, head) = (&F[..n], &mut head[..n]);
-            // At first, `head` stores w₁ᵀ F₁; below it gets the first row of the result.
+            // Until the last loop, `head` stores w₁ᵀ F₁. The last loop replaces it by the first row of the result.
             head.fill(0.0);
             for i in 1..cone.dim {
                 let f = &F[i * ld..][..n];
@@ -126,7 +126,7 @@ impl Cones {
     }
 
     /// Computes p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, and the target W⁻¹ (p − W⁻¹ r). The term d̃s ∘ d̃z is only
-    /// used with `second_order`.
+    /// used if `second_order` is true.
     pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
             by_dimension!(cone.dim, dim => self.target_one(k, cone.at, dim, centre, second_order, target));
@@ -159,7 +159,8 @@ impl Cones {
         apply_inverse(eta, w, y, &mut target[at]);
     }
 
-    /// Computes ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds); raises `inverse` to the inverse of the greatest step.
+    /// Computes the direction ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds). Raises `inverse` to the inverse of the greatest
+    /// step length.
     pub(super) fn direction(&mut self, cones: &[Cone], Fdx: &[f64], inverse: &mut f64) {
         for (k, cone) in cones.iter().enumerate() {
             by_dimension!(cone.dim, dim => self.direction_one(k, cone.at, dim, Fdx, inverse));

@@ -1,16 +1,16 @@
-//! The iteration: the length of each step, and the conditions under which the iteration ends.
+//! Iteration of the interior-point method: the length of each step, and the conditions under which the iteration ends.
 
 use super::certificate::REDUCED_TOLERANCE;
 use super::workspace::Workspace;
 use crate::cone_program::Status;
 use std::time::Instant;
 
-/// Minimum and maximum of a step's share of the distance to the boundary. The share is 1 minus a tenth of the
-/// predictor's shortfall. The maximum keeps each slack variable larger than the rounding errors of the terms of which
-/// it is the difference.
+/// Minimum and maximum of the step length, relative to the distance to the boundary. This ratio is 1 minus a tenth of
+/// the predictor's shortfall, which is 1 minus the predictor's step length. The maximum keeps each slack variable
+/// larger than the rounding errors of the terms from which the variable is computed.
 const TO_BOUNDARY: [f64; 2] = [0.99, 0.9999];
 const SHORTFALL: f64 = 0.1;
-/// Share of the allowed duality gap at which the last steps aim.
+/// Duality gap at which the last steps aim, relative to the allowed gap.
 const AIM: f64 = 0.1;
 /// Maximum number of consecutive iterations that come closer neither to a solution nor to a proof that none exists.
 const PATIENCE: u32 = 5;
@@ -18,7 +18,7 @@ const PATIENCE: u32 = 5;
 const SHORT_STEP: f64 = 1e-7;
 /// Maximum error of a solution with reduced accuracy, as a multiple of the tolerance.
 const REDUCED: f64 = 1e4;
-/// Ratio of the dual residual to its expected value above which later solves get one more refinement. There are at most
+/// Ratio of the dual residual to its expected value above which later solves get one more refinement, up to
 /// `REFINEMENTS`.
 const INEXACT: f64 = 2.0;
 const REFINEMENTS: usize = 2;
@@ -29,7 +29,7 @@ pub(super) struct Limits {
     pub tolerance: f64,
     /// Maximum number of iterations, including the iterations of earlier attempts.
     pub iterations: u32,
-    /// Start time, and the seconds allowed from then on.
+    /// Start time, and the maximum time after it (s).
     pub clock: Option<(Instant, f64)>,
 }
 
@@ -74,8 +74,8 @@ impl Workspace {
             // Predictor: a step towards s ∘ z = 0.
             let inverse = self.direction(0.0, false, refinements);
             let shortfall = if inverse > 1.0 { 1.0 - inverse.recip() } else { 0.0 };
-            // Corrector: a step towards s ∘ z = σ μ e with Mehrotra's σ = (1 − α)³. The gap becomes no smaller than
-            // needed.
+            // Corrector: a step towards s ∘ z = σ μ e with Mehrotra's σ = (1 − α)³. `AIM` keeps the gap from becoming
+            // smaller than needed.
             let sigma = shortfall * shortfall * shortfall;
             let centre = (sigma * measure.mu).max(AIM * tolerance * measure.scale);
             let inverse = self.direction(centre, true, refinements);

@@ -2,11 +2,11 @@
 //!
 //! The method is Mehrotra's predictor and corrector, with Nesterov and Todd's scaling of bounds and second-order cones.
 //! Each iteration factorises P + Gᵀ D G + Fᵀ W⁻² F once and solves with the factor twice. The iteration starts from the
-//! data, or from the last solution after it was moved back into the interior. Blocks of zeros in rows are skipped.
-//! Nothing allocates after construction, the same numbers give the same bits, and no result is NaN.
+//! data, or from the last solution, which is first moved back into the interior. Blocks of zeros in rows are skipped.
+//! After construction the method does not allocate memory. The same numbers give the same bits, and no result is NaN.
 //!
 //! Sources: Mehrotra (1992); Nesterov and Todd (1998); Vandenberghe, *The CVXOPT linear and quadratic cone program
-//! solvers* (2010). The formulas are Vandenberghe's, but a row may have two sides.
+//! solvers* (2010). The formulas are Vandenberghe's, extended to rows with a lower and an upper bound.
 
 mod bounds;
 mod certificate;
@@ -26,10 +26,10 @@ use solution::Solution;
 use std::time::Instant;
 use workspace::Workspace;
 
-/// Number of iterations after which a cold start replaces a warm one.
+/// Maximum number of iterations from a warm start. A cold start follows.
 const WARM_ITERATIONS: u32 = 20;
 
-/// A dense interior-point method; see the [module](self).
+/// Dense interior-point method; see the [module](self).
 #[derive(Clone, Debug)]
 pub(crate) struct InteriorPoint {
     settings: Settings,
@@ -46,8 +46,8 @@ impl InteriorPoint {
         Self { settings, capacity, size: Size::default(), work, solution }
     }
 
-    /// Minimises the loaded program. Returns whether the solution was reached from the last solution, and the error of
-    /// the result.
+    /// Minimises the loaded program. Returns whether the solution was reached from a warm start, and the error of the
+    /// result.
     fn minimise(&mut self, start: Start, iterations: &mut u32) -> (bool, Result<f64, Status>) {
         let Self { settings, work, solution, .. } = self;
         let Settings { tolerance, max_iterations, time_limit } = *settings;

@@ -1,23 +1,26 @@
-//! The program as the method receives it: padded, without empty constraints, and scaled to numbers of size one.
+//! Program in the form that the interior-point method receives: padded, without empty constraints, and scaled to
+//! numbers of size one.
 //!
-//! The scaled unknowns x̂ are defined by x = D x̂. Dⱼ is the size that the cost alone would give xⱼ: C / √Pⱼⱼ with C =
-//! max |cⱼ| / √Pⱼⱼ. Rows with two bounds limit Dⱼ to [`ROOM`] times the largest xⱼ that they allow if xⱼ is the only
-//! non-zero unknown, max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|. Without this limit, an unreachable task would give a force of little
-//! weight a unit of millions of newtons, in which the force's limits vanish. The cost is divided by the greatest of
-//! |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So one tolerance serves weights that differ by many orders of magnitude, such as the weights of
-//! tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone, have length one.
+//! The scaled unknowns x̂ are defined by x = D x̂. The unit Dⱼ is the size of xⱼ that the cost alone would give: C /
+//! √Pⱼⱼ with C = max |cⱼ| / √Pⱼⱼ. Rows with two bounds limit Dⱼ. If xⱼ is the only non-zero unknown, such a row allows
+//! |xⱼ| ≤ max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|. Dⱼ is at most [`ROOM`] times this value. Without this limit, an unreachable task
+//! would give a force of little weight a unit of millions of newtons. In this unit the force's limits would vanish. The
+//! cost is divided by the greatest of |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So one tolerance serves weights that differ by many orders
+//! of magnitude, such as the weights of tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone, have
+//! length one.
 
 use crate::cone_program::{ConeProgram, Size, Status};
 use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};
 use std::ops::Range;
 
-/// Diagonal entry of P, relative to the greatest one, below which the entry counts as zero when units are chosen.
+/// Threshold below which a diagonal entry of P counts as zero when units are chosen, relative to the greatest diagonal
+/// entry.
 const NO_CURVATURE: f64 = 1e-14;
 /// Maximum ratio of an unknown's unit to the value that the bounds allow if the other unknowns are zero. With a ratio
 /// of 1, programs with a singular P lose digits; from 1000 on, some programs with unreachable tasks have no solution.
 const ROOM: f64 = 30.0;
-/// Minimum of an unknown's unit after bounds have reduced it, relative to the size that the cost gives. P̂ⱼⱼ is then at
-/// least the square of this number, which exceeds rounding errors.
+/// Minimum of an unknown's unit after bounds have reduced the unit, relative to the size that the cost gives. P̂ⱼⱼ is
+/// then at least the square of this number, which exceeds rounding errors.
 const LEAST_SHARE: f64 = 1e-5;
 /// Absolute tolerance for the bounds of a row or cone without coefficients.
 const NO_ROW_TOLERANCE: f64 = 1e-9;
@@ -33,7 +36,7 @@ pub(super) enum Source {
     Cone(usize),
 }
 
-/// A cone: its first row among the cones' rows of this program, its first row in F, and its dimension.
+/// Cone: its first row among the cones' rows of this program, its first row in F, and its dimension.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone {
     pub at: usize,
@@ -43,22 +46,22 @@ pub(super) struct Cone {
     pub scale: f64,
 }
 
-/// Adjacent columns of K that are non-zero in the same range of rows.
+/// Adjacent columns of K whose non-zero entries are in the same range of rows.
 #[derive(Clone, Debug)]
 struct Run {
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
-/// Returns the range of rows that the blocks of a mask cover.
+/// Returns the range of rows in the blocks that a mask marks.
 fn range(mask: u64, n: usize, ld: usize) -> Range<usize> {
     let (block, first) = (block(ld), mask.trailing_zeros() as usize);
     let end = 64 - mask.leading_zeros() as usize;
     if mask == 0 { 0..0 } else { block * first..n.min(block * end) }
 }
 
-/// The scaled program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The columns of K are the
-/// rows of G and of F.
+/// Scaled program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The columns of K are the rows
+/// of G and of F.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scaled {
     /// Number of unknowns.
@@ -70,7 +73,8 @@ pub(super) struct Scaled {
     pub c: Vec<f64>,
     /// D, the unit of each unknown.
     pub units: Vec<f64>,
-    /// Scratch: inverse of the value of each unknown that rows with two bounds allow if the other unknowns are zero.
+    /// Scratch: inverse of a maximum for each unknown. The maximum is the value that rows with two bounds allow if the
+    /// other unknowns are zero.
     inverse_limits: Vec<f64>,
     /// Factor by which P and c were multiplied.
     pub cost: f64,
@@ -94,7 +98,7 @@ pub(super) struct Scaled {
     pub scales: Vec<f64>,
     pub h: Vec<f64>,
     pub cones: Vec<Cone>,
-    /// Number of bounds and cones; sᵀ z is divided by it.
+    /// Number of bounds and cones, the divisor of sᵀ z in the mean complementarity μ.
     pub degree: f64,
 }
 
@@ -139,7 +143,8 @@ impl Scaled {
         self.e.len()
     }
 
-    /// Returns the range of rows in which a column is non-zero, in whole blocks (only the last block may be shorter).
+    /// Returns the range of rows that contains the non-zero entries of a column. It consists of whole blocks, except
+    /// that the last block may be shorter.
     pub(super) fn range(&self, column: usize) -> Range<usize> {
         range(self.masks[column], self.n, self.ld)
     }
@@ -248,7 +253,7 @@ impl Scaled {
         }
     }
 
-    /// Chooses the units of the unknowns and of the cost; the module's documentation gives the formulas.
+    /// Chooses the units of the unknowns and of the cost. The module's documentation gives the formulas.
     fn choose_units(&mut self, program: &ConeProgram) {
         let (n, most) = (program.size.unknowns, program.capacity().unknowns);
         let (P, c) = (|j: usize| program.P.as_slice()[j * most + j], &program.c[..n]);
@@ -256,7 +261,7 @@ impl Scaled {
         let units = &mut self.units[..n];
         let mut size = 0.0_f64;
         for j in 0..n {
-            // The cost gives no size for an unknown without curvature: use the greatest curvature.
+            // For an unknown without curvature, the cost gives no size: use the greatest curvature.
             let curvature = match P(j) {
                 own if own > NO_CURVATURE * greatest => own,
                 _ if greatest > 0.0 => greatest,
@@ -268,7 +273,7 @@ impl Scaled {
         // Without any curvature, the unit of length is 1.
         let length = if greatest > 0.0 && size > 0.0 { size } else { 1.0 };
 
-        // max |Gᵢⱼ| / max(|lᵢ|, |uᵢ|)
+        // inverse of the largest value that row i allows: max |Gᵢⱼ| / max(|lᵢ|, |uᵢ|)
         let inverse = &mut self.inverse_limits[..n];
         inverse.fill(0.0);
         for i in 0..program.size.rows {
@@ -349,7 +354,7 @@ impl Scaled {
     }
 }
 
-/// Returns √Σ (xᵢ Dᵢ)², in eight independent sums.
+/// Returns √Σ (xᵢ Dᵢ)², computed with eight independent sums.
 fn length(x: &[f64], D: &[f64]) -> f64 {
     let (eights, units) = (x.chunks(8), D.chunks(8));
     let mut sums = [0.0; 8];

@@ -1,17 +1,17 @@
-//! A solution in the units of the program.
+//! Solution in the units of the original program.
 
 use super::scaled::Source;
 use super::workspace::Workspace;
 use crate::cone_program::{Multipliers, Size};
 
-/// x and the multipliers. The vectors have the sizes of the capacity.
+/// Unknowns x and all multipliers. The vectors have the sizes of the capacity.
 #[derive(Clone, Debug)]
 pub(super) struct Solution {
-    /// Number of unknowns of the program that this solution solves; `None` if it solves no program.
+    /// Number of unknowns of the program that has this solution; `None` if there is no such program.
     pub solves: Option<usize>,
     pub x: Vec<f64>,
     pub y: Vec<f64>,
-    /// Multipliers z of the lower and of the upper bounds; the field `z` is their difference.
+    /// Multipliers of the lower and of the upper bounds. The field `z` is their difference.
     pub sides: [Vec<f64>; 2],
     pub z: Vec<f64>,
     pub w: Vec<f64>,
@@ -46,7 +46,7 @@ impl Solution {
         }
     }
 
-    /// Returns the multiplier of a constraint's lower (k = 0) or upper bound, for the constraint with this origin.
+    /// Returns the multiplier of the lower (k = 0) or upper (k = 1) bound of the constraint `source`.
     pub(super) fn of(&self, source: Source, k: usize) -> f64 {
         match source {
             Source::Row(i) => self.sides[k][i],
@@ -56,7 +56,7 @@ impl Solution {
         }
     }
 
-    /// Stores the iterate of the workspace, in the units of the program.
+    /// Stores the iterate of the workspace, converted to the units of the original program.
     pub(super) fn read(&mut self, work: &Workspace) {
         self.clear();
         let data = &work.data;

@@ -6,11 +6,12 @@ use super::solution::Solution;
 use super::workspace::Workspace;
 use condyle_linalg::{View, add_product_vector, max_abs};
 
-/// Weight of s² relative to the cost in a cold start. It is also the ratio of z to s.
+/// Weight ω of s² relative to the cost in a cold start. The ratio of z to s is then also ω.
 const WEIGHT: f64 = 0.1;
-/// Distance from the boundary of the cone to which a cold start moves s.
+/// Distance to the boundary of a cone after a cold start has moved s into the cone.
 const INSIDE: f64 = 1.0;
-/// √μ of a warm start, relative to the error of the last solution in this program; μ stays within `CENTRE`.
+/// √μ of a warm start, relative to the error of the last solution in the new program. √μ is limited to the interval
+/// `CENTRE`.
 const SHARE: f64 = 0.02;
 const CENTRE: [f64; 2] = [1e-10, 1e-2];
 
@@ -78,15 +79,15 @@ impl Workspace {
         true
     }
 
-    /// Takes x and y from the last solution. Computes s and z from s − z = (h + F x) − z* and s ∘ z = μ e, where z* is
-    /// the last z.
+    /// Takes x and y from the last solution, whose multipliers are z*. Computes s and z from s − z = (h + F x) − z* and
+    /// s ∘ z = μ e.
     ///
-    /// Each pair (s, z) is exactly central. Where s or z is large, it differs from the last pair by μ / s only. s and z
-    /// are comparable, since all numbers are in units of size one. √μ is proportional to the last solution's error in
-    /// this program, because changes of this size turn a bound on or off.
+    /// Each pair (s, z) is exactly central. If s or z is large, the pair differs from the last pair by about μ / s
+    /// only. The sizes of s and z are comparable, since all numbers are in units of size one. √μ is proportional to the
+    /// error of the last solution in the new program, because changes of this size can activate or release a bound.
     ///
-    /// Source: Chen and Harker (1993), the smoothing of complementarity. Here it gives a start, in the algebra of the
-    /// cones.
+    /// Source: Chen and Harker (1993), smoothing of complementarity. Here the smoothing gives a starting point, in the
+    /// algebra of the cones.
     pub(super) fn warm_start(&mut self, last: &Solution) {
         let Self { data, sides, cones, x, y, Kx, multipliers, Px, forces, rd, .. } = self;
         let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());
@@ -117,7 +118,7 @@ impl Workspace {
                 multipliers[m + at] = cones.z[at];
             }
         }
-        // Error of the last solution in this program: the norms of P x + c − Kᵀ z − E y and of min(s, z).
+        // Error of the last solution in the new program: the norms of P x + c − Kᵀ z − E y and of min(s, z).
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);

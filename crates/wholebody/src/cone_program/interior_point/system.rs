@@ -1,4 +1,5 @@
-//! Linear system of each iteration. It is positive definite in x; the equalities are solved by a Schur complement.
+//! Linear system of each iteration. Its matrix H for x is positive definite; the equalities are solved by a Schur
+//! complement.
 //!
 //! ```text
 //! [ H   −Eᵀ ] [dx]   [r₁]        H = P + Gᵀ D G + Fᵀ W⁻² F
@@ -6,7 +7,7 @@
 //! ```
 //!
 //! With H = L Lᵀ and X = E L⁻ᵀ: X Xᵀ dy = r₂ − X L⁻¹ r₁, Lᵀ dx = L⁻¹ r₁ + Xᵀ dy. If equalities exist, Eᵀ E is added to
-//! H and Eᵀ r₂ to r₁. This does not change the solution, and makes H regular if it is singular only without Eᵀ E.
+//! H and Eᵀ r₂ to r₁. The solution stays the same, and H + Eᵀ E can be regular even if H is singular.
 
 use super::scaled::Scaled;
 use condyle_linalg::{
@@ -14,20 +15,20 @@ use condyle_linalg::{
     transposed_product_vector,
 };
 
-/// Regularisation added to diagonal entries of H, which have size one for costs of size one. Refinement removes the
-/// effect of the regularisation.
+/// Regularisation added to diagonal entries of H. These entries have size one for costs of size one. Iterative
+/// refinement removes the effect of the regularisation.
 const REGULARISATION: f64 = 1e-13;
-/// Regularisation relative to the diagonal entry. It is as large as a few rounding errors of a factorisation.
+/// Regularisation relative to the diagonal entry, as large as a few rounding errors of a factorisation.
 const RELATIVE_REGULARISATION: f64 = 1e-15;
-/// Regularisation added to diagonal entries of X Xᵀ, which have size one for costs of size one.
+/// Regularisation added to diagonal entries of X Xᵀ. These entries have size one for costs of size one.
 const DUAL_REGULARISATION: f64 = 1e-13;
-/// Factor of the regularisation from one attempt to the next. A new attempt follows a pivot that was not positive.
+/// Factor by which the regularisation grows after a pivot that was not positive.
 const GROWTH: f64 = 1e3;
 const ATTEMPTS: usize = 4;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// Lower triangle of [H; E], later of its factor.
+    /// Lower triangle of [H; E], later overwritten by its factor.
     H: Vec<f64>,
     ldh: usize,
     /// Inverse of the factor's diagonal.
@@ -38,7 +39,7 @@ pub(super) struct System {
     n: usize,
     me: usize,
     r: Vec<f64>,
-    /// r₂ in a refinement.
+    /// Right side r₂ during a refinement.
     re: Vec<f64>,
     more: Vec<f64>,
     more_y: Vec<f64>,
@@ -58,8 +59,8 @@ impl System {
         }
     }
 
-    /// Takes the sizes of a program and the non-zero blocks of its columns; writes E, and writes zeros into the columns
-    /// of K.
+    /// Copies the sizes of a program and the non-zero blocks of its columns. Writes E, and writes zeros into the
+    /// columns of K.
     pub(super) fn prepare(&mut self, data: &Scaled) {
         let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
         (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
@@ -70,14 +71,14 @@ impl System {
         B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
         for k in 0..columns + me {
             let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
-            // W⁻¹ combines the rows of a cone: each result has the union of the rows' blocks.
+            // W⁻¹ combines the rows of a cone: each resulting row has the union of the blocks of these rows.
             let mask = if k < columns { data.masks[k] } else { mask(row) };
             B.multiply([k, k], [mask, mask]);
         }
     }
 
-    /// Factorises P + B Bᵀ, after `B` has been written. Returns false if the factorisation fails even with the greatest
-    /// regularisation.
+    /// Factorises P + B Bᵀ, after the caller has written `B`. Returns false if the factorisation fails even with the
+    /// greatest regularisation.
     pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
         let Self { H, ldh, B, n, me, inverse, .. } = self;
         let (n, me, ldh, ld) = (*n, *me, *ldh, data.ld);
@@ -131,8 +132,8 @@ impl System {
         backward_solve(L, inverse, x);
     }
 
-    /// Replaces r₁ by dx and r₂ by dy, and writes K dx. `weigh` turns K dx into [D G dx; W⁻² F dx] for the
-    /// `refinements`.
+    /// Replaces r₁ in `x` by dx and r₂ in `y` by dy, and writes K dx. In each refinement, `weigh` replaces K dx by [D G
+    /// dx; W⁻² F dx].
     pub(super) fn solve(
         &mut self,
         data: &Scaled,
@@ -148,7 +149,7 @@ impl System {
         re[..me].copy_from_slice(&y[..me]);
         self.solve_once(data, x, y);
         for _ in 0..refinements {
-            // residuals r₁ − H dx + Eᵀ dy and r₂ − E dx
+            // Compute the residuals r₁ − H dx + Eᵀ dy and r₂ − E dx.
             data.multiply(x, Kdx);
             weigh(Kdx);
             for i in 0..n {
@@ -179,7 +180,7 @@ impl System {
     }
 }
 
-/// Replaces S, which is not positive, by the factor of −S. Returns whether the factorisation succeeds.
+/// Replaces S, which is not positive definite, by the factor of −S. Returns whether the factorisation succeeds.
 fn factorize_schur(S: &mut [f64], stride: usize, me: usize, regularisation: f64) -> bool {
     for j in 0..me {
         for x in &mut S[j * stride + j..][..me - j] {

@@ -1,4 +1,4 @@
-//! The iterate, its residuals, and the directions of the steps.
+//! Iterate of the interior-point method, its residuals, and the directions of the steps.
 
 use super::bounds::{Direction, Residuals, Side, Target};
 use super::certificate::Candidate;
@@ -11,8 +11,8 @@ use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_product_vector, at_level, copy_scaled, dot, max_abs, transposed_product_vector,
 };
 
-/// Minimum of the cost's unit, in the units of the method. The gap is relative to this unit plus the size of the
-/// objective.
+/// Minimum of the constant in the relative duality gap, which is the gap divided by this constant plus |objective|. The
+/// constant is at most 1, in the units of the method.
 const SMALL_COST: f64 = 1e-6;
 
 /// All memory of the method, except the results.
@@ -29,19 +29,20 @@ pub(super) struct Workspace {
     pub dx: Vec<f64>,
     pub dy: Vec<f64>,
     pub Kdx: Vec<f64>,
-    /// z of the rows (lower − upper) and of the cones; the next field is the sum of their targets, with the same signs.
+    /// Multipliers of the rows (lower − upper) and of the cones. The field `target` is the sum of the targets of these
+    /// constraints, with the same signs.
     pub multipliers: Vec<f64>,
     pub target: Vec<f64>,
     /// Sum of z / s over both sides of each row.
     pub D: Vec<f64>,
-    /// P x, Kᵀ z + E y, P x + c − Kᵀ z − E y, and E x − e, in this order of the fields.
+    /// P x, Kᵀ z + E y, P x + c − Kᵀ z − E y, and E x − e: the fields `Px`, `forces`, `rd` and `re`.
     pub Px: Vec<f64>,
     pub forces: Vec<f64>,
     pub rd: Vec<f64>,
     pub re: Vec<f64>,
 }
 
-/// Computes D and B: √D G and W⁻¹ F.
+/// Computes D, and B with the rows √D G and W⁻¹ F.
 struct Scale<'a> {
     data: &'a Scaled,
     sides: &'a [Side; 2],
@@ -67,15 +68,16 @@ impl Vectorized for Scale<'_> {
 /// Measures of the distance between an iterate and a solution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measure {
-    /// sᵀ z per bound or cone; the next field is the size of the objective per bound or cone.
+    /// Mean complementarity: sᵀ z divided by the number of bounds and cones. The field `scale` is the size of the
+    /// objective, divided by the same number.
     pub mu: f64,
     pub scale: f64,
     /// ‖P x + c − Kᵀ z − E y‖∞.
     pub dual: f64,
-    /// Greatest of the residuals and the gap, each relative to the terms of which it is the difference. NaN if one of
-    /// them is not finite.
+    /// Greatest of the relative residuals and the relative gap. Each is relative to the terms from which it is
+    /// computed. The result is NaN if a residual or the gap is not finite.
     pub error: f64,
-    /// Status that the iterate proves, if any.
+    /// Status that the iterate proves, or `None` without a proof.
     pub certificate: Option<Status>,
     /// Distance of the iterate from a proof that no solution exists.
     pub exclusion: f64,
@@ -179,8 +181,8 @@ impl Workspace {
         true
     }
 
-    /// Computes the direction towards s ∘ z = `centre` e. With `second_order`, corrects it by the second-order term of
-    /// the last direction. Returns the inverse of the greatest step.
+    /// Computes the direction towards s ∘ z = `centre` e. If `second_order` is true, corrects it by the second-order
+    /// term of the last direction. Returns the inverse of the greatest step length.
     pub(super) fn direction(&mut self, centre: f64, second_order: bool, refinements: usize) -> f64 {
         let Self { data, system, sides, cones, dx, dy, Kdx, target, D, rd, re, .. } = self;
         let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());

@@ -1,4 +1,4 @@
-//! A solve allocates nothing, whatever sizes are in use.
+//! Tests that a solve does not allocate memory, whatever sizes are in use.
 
 #[path = "../../../../../tests/common/counting.rs"]
 mod counting;
@@ -15,7 +15,7 @@ fn a_solve_allocates_nothing() {
     let mut solver = InteriorPoint::new(program.capacity(), Settings::default());
     for tick in 0..10 {
         walk.write(tick, &mut program);
-        // In each tick, contacts appear and disappear, rows become equalities, and bounds vanish.
+        // In each tick, contacts appear and disappear, rows become equalities, and bounds become infinite.
         program.cones.truncate(8 - tick % 3);
         program.size.cone_rows = 3 * program.cones.len();
         program.size.rows = 96 - tick;

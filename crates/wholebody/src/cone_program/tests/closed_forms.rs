@@ -1,8 +1,8 @@
-//! Programs whose solutions are known.
+//! Tests of programs whose solutions are known in closed form.
 
 use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start};
 
-/// Relative tolerance of x: the square root of the remaining gap, for directions in which the objective is flat.
+/// Relative tolerance of x. Where the objective is flat, it is the square root of the remaining gap.
 const TOLERANCE: f64 = 1e-7;
 
 const SHARP: Settings = Settings { tolerance: 1e-13, max_iterations: 50, time_limit: f64::INFINITY };
@@ -15,7 +15,7 @@ fn near(a: &[f64], b: &[f64]) {
     assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < TOLERANCE * (1.0 + b.abs())), "{a:?} is not {b:?}");
 }
 
-/// Solves min ½ ‖x − p‖² with x ∈ Q, the projection of p onto the cone. The multiplier is the projection of −p.
+/// Projects p onto a cone: min ½ ‖x − p‖² with x ∈ Q. The multiplier is the projection of −p.
 #[test]
 fn projection_onto_a_cone() {
     for p in [[1.0, 2.0, -2.0], [3.0, 1.0, 1.0], [-3.0, 1.0, 1.0], [0.0, 3.0, 4.0]] {
@@ -40,8 +40,8 @@ fn projection_onto_a_cone() {
     }
 }
 
-/// Solves min ½ ‖x − p‖² with l ≤ x ≤ u, with and without Σ x = 1. The solution is p, shifted by the multiplier of the
-/// sum and clipped.
+/// Projects p onto a box and a plane: min ½ ‖x − p‖² with l ≤ x ≤ u, with and without Σ x = 1. The solution is p,
+/// shifted by the multiplier of the sum and then clipped.
 #[test]
 fn projection_onto_a_box_and_a_plane() {
     let (p, lower, upper) = ([2.0, -1.0, 0.3, 0.5], [0.0, -0.5, 0.5, -9.0], [1.0, f64::INFINITY, 0.5, 9.0]);
@@ -72,7 +72,7 @@ fn projection_onto_a_box_and_a_plane() {
     }
 }
 
-/// Solves for the force f on a block of mass m on an incline of angle α, which friction holds while tan α ≤ μ. The
+/// Computes the force f on a block of mass m on an incline of angle α. Friction holds the block if tan α ≤ μ. The
 /// minimum of ½ ‖f − m g‖² over the friction cone is then f = m g. For larger α, f is the projection of m g onto the
 /// cone, of length m g cos(α − arctan μ) along the cone's edge.
 #[test]

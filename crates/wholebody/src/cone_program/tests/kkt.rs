@@ -10,16 +10,16 @@ fn radius(s: &[f64]) -> f64 {
     s.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Errors in the conditions, each relative to the terms of which it is the difference.
+/// Errors in the Karush–Kuhn–Tucker conditions. Each error is relative to the terms from which it is computed.
 #[derive(Debug, Default)]
 pub(super) struct Errors {
     /// P x + c − Aᵀ y − Gᵀ z − Fᵀ w.
     pub stationarity: f64,
     /// Violation of the constraints.
     pub primal: f64,
-    /// Distance of w from its cone.
+    /// Distance of the multipliers w from their cones.
     pub dual: f64,
-    /// zᵀ s over all bounds and cones, relative to the objective.
+    /// Complementarity zᵀ s over all bounds and cones, relative to the objective.
     pub complementarity: f64,
 }
 

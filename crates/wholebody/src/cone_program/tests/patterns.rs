@@ -1,9 +1,9 @@
-//! Clarabel's pattern grows when numbers become non-zero, and its set of rows grows when limits bind.
+//! Tests that clarabel's pattern grows when numbers become non-zero, and that its set of rows grows when limits bind.
 
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, Settings, Size, Solver, Start, Status};
 
-/// Tolerance of x, whose numbers have size one; both solves have the tolerance 1e-9.
+/// Tolerance of the difference between two solutions whose numbers have size one. Both solves have the tolerance 1e-9.
 const AGREEMENT: f64 = 1e-6;
 
 fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
@@ -15,7 +15,7 @@ fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
     }
 }
 
-/// Tests zeros of P, A, G and F that become non-zero numbers, and zeros again.
+/// Checks solutions when zeros of P, A, G and F become non-zero, and when they become zero again.
 #[test]
 fn numbers_come_where_there_were_zeros() {
     for seed in 0..10 {
@@ -36,7 +36,7 @@ fn numbers_come_where_there_were_zeros() {
     }
 }
 
-/// Returns the program ½ ‖x − a‖² within −1 ≤ x ≤ 1. Its solution is a clipped to this interval.
+/// Returns the program that minimises ½ ‖x − a‖² within −1 ≤ x ≤ 1. Its solution is a clipped to this interval.
 fn within_a_box(a: [f64; 3]) -> ConeProgram {
     let mut program = ConeProgram::new(Size { unknowns: 3, equalities: 0, rows: 3, cone_rows: 0 });
     for i in 0..3 {
@@ -49,7 +49,8 @@ fn within_a_box(a: [f64; 3]) -> ConeProgram {
     program
 }
 
-/// Limits that a solution violates are added within the same solve, with their multipliers, whatever was solved before.
+/// Checks that limits that a solution violates are added within the same solve, with their multipliers, whatever was
+/// solved before.
 #[test]
 fn limits_that_were_far_away_bind() {
     let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());
@@ -68,8 +69,8 @@ fn limits_that_were_far_away_bind() {
     }
 }
 
-/// A program with rows left out is not reported as unbounded, and the iterations of its first solve count towards the
-/// limit.
+/// Checks that a program with rows left out is not reported as unbounded. The iterations of its first solve must count
+/// towards the limit.
 #[test]
 fn rows_left_out_change_no_status() {
     let mut program = within_a_box([0.5, 0.5, 4.0]);
@@ -88,7 +89,7 @@ fn rows_left_out_change_no_status() {
     }
 }
 
-/// A row to which no solution was close for a long time is left out again. Later it returns.
+/// Checks that a row is left out after many solutions far from it, and that it returns later.
 #[test]
 fn limits_come_and_go() {
     let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());

@@ -1,15 +1,16 @@
-//! Random programs of all kinds satisfy the optimality conditions, and agree with clarabel.
+//! Tests that solutions of random programs satisfy the optimality conditions, and agree with clarabel's solutions.
 
 use super::kkt::Errors;
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start};
 
-/// Tolerance of the Karush–Kuhn–Tucker conditions. The solver's tolerance is 1e-9, relative to terms in the solver's
-/// units.
+/// Tolerance of the Karush–Kuhn–Tucker conditions. The solver's own tolerance is 1e-9, relative to terms in the
+/// solver's units.
 const KKT_TOLERANCE: f64 = 1e-8;
-/// Tolerance of the objective, relative to 1 + |objective|; it covers the duality gaps of both solvers.
+/// Tolerance of the objective, relative to 1 + |objective|. It covers the duality gaps of both solvers.
 const OBJECTIVE_TOLERANCE: f64 = 1e-6;
-/// Tolerance of x, whose numbers have size one, for solutions with [`SHARP`] where P has no eigenvalue below 0.1.
+/// Tolerance of x, whose numbers have size one. It applies to solutions with the settings [`SHARP`], if P has no
+/// eigenvalue below 0.1.
 const X_TOLERANCE: f64 = 1e-6;
 const SHARP: Settings = Settings { tolerance: 1e-12, max_iterations: 50, time_limit: f64::INFINITY };
 
@@ -73,7 +74,7 @@ fn both_back_ends_find_the_same_optimum() {
     });
 }
 
-/// Replaces each cone by a pyramid with this number of sides, which lies inside or around the cone.
+/// Replaces each cone by a pyramid with this number of sides. The pyramid lies inside or around the cone.
 fn pyramids(program: &ConeProgram, sides: usize, inside: bool) -> ConeProgram {
     let (n, cones) = (program.size.unknowns, program.cones.len());
     let rows = program.size.rows + sides * cones;
@@ -88,7 +89,7 @@ fn pyramids(program: &ConeProgram, sides: usize, inside: bool) -> ConeProgram {
     let shrink = if inside { half.cos() } else { 1.0 };
     for k in 0..cones {
         for i in 0..sides {
-            // s₀ − (cos, sin)ᵀ (s₁, s₂) ≥ 0, after s₀ is multiplied by `shrink`
+            // One face of the pyramid: s₀ − (cos, sin)ᵀ (s₁, s₂) ≥ 0, where `shrink` multiplies s₀ first.
             let (sin, cos) = (2.0 * half * i as f64).sin_cos();
             let (to, weights) = (program.size.rows + sides * k + i, [shrink, -cos, -sin]);
             for (j, a) in weights.into_iter().enumerate() {
@@ -102,8 +103,8 @@ fn pyramids(program: &ConeProgram, sides: usize, inside: bool) -> ConeProgram {
     out
 }
 
-/// The optimum lies between the optima with inscribed and with circumscribed pyramids. These two optima converge as the
-/// number of sides grows.
+/// Checks that the optimum lies between the optima with inscribed and with circumscribed pyramids. The difference of
+/// these two optima must become smaller as the number of sides grows.
 #[test]
 fn the_optimum_lies_between_those_of_pyramids() {
     let walk = super::walk::Walk::humanoid(3);
@@ -122,7 +123,7 @@ fn the_optimum_lies_between_those_of_pyramids() {
                 (objective(&pyramids(&program, sides, true)), objective(&pyramids(&program, sides, false)));
             let room = 1e-8 * cone.abs();
             assert!(below < cone + room && cone < above + room, "{below} {cone} {above}");
-            assert!(above - below < before / 8.0 + room, "{before} {}", above - below); // the ratio is 16 in theory
+            assert!(above - below < before / 8.0 + room, "{before} {}", above - below); // in theory the ratio is 16
             before = above - below;
         }
     }

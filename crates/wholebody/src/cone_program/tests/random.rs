@@ -1,4 +1,4 @@
-//! Random programs of several kinds; each kind has a property that may make a solver fail.
+//! Random programs of several kinds. Each kind has a property that can make a solver fail.
 
 use crate::cone_program::{ConeProgram, Size};
 use rand::rngs::StdRng;
@@ -59,7 +59,7 @@ impl Draw {
         (0..n).map(|_| self.number()).collect()
     }
 
-    /// Sets P = R Rᵀ + a I, where R has this rank.
+    /// Sets P = R Rᵀ + a I with a random R of the given rank.
     pub(super) fn cost(&mut self, program: &mut ConeProgram, rank: usize, a: f64) {
         let n = program.size.unknowns;
         let R = nalgebra::DMatrix::from_fn(n, rank, |_, _| self.number());
@@ -69,7 +69,7 @@ impl Draw {
         }
     }
 
-    /// Returns a feasible and bounded program with `n` unknowns and these numbers of equalities, rows and cones.
+    /// Returns a feasible and bounded program with `n` unknowns, and with these numbers of equalities, rows and cones.
     pub(super) fn program(&mut self, kind: Kind, n: usize, [equalities, rows, cones]: [usize; 3]) -> ConeProgram {
         let dims: Vec<usize> = (0..cones).map(|k| [3, 3, 4, 2, 5, 1][k % 6]).collect();
         let cone_rows = dims.iter().sum();
@@ -91,7 +91,7 @@ impl Draw {
             }
         }
         if matches!(kind, Kind::Semidefinite | Kind::Vertex) {
-            // The first rows become a box around unknowns that the objective leaves free.
+            // The first rows become a box around the unknowns, because the objective may leave them free.
             for i in 0..rows.min(n) {
                 program.Gt.column_mut(i).fill(0.0);
                 program.Gt[(i, i)] = 1.0;

@@ -1,4 +1,4 @@
-//! Programs without a solution, and solves that end early.
+//! Tests of programs without a solution, and of solves that end early.
 
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start, Status};
@@ -10,7 +10,7 @@ fn ours(program: &ConeProgram) -> InteriorPoint {
     InteriorPoint::new(program.capacity(), Settings::default())
 }
 
-/// Returns a feasible program. Tests spoil its last row, its last equality and its last cone.
+/// Returns a feasible program. The tests write invalid numbers into its last row, its last equality and its last cone.
 fn program(seed: u64) -> ConeProgram {
     Draw::new(seed).program(Kind::Plain, 12, [2, 20, 4])
 }
@@ -50,7 +50,7 @@ fn constraints_that_exclude_each_other_are_proved_to() {
     }
 }
 
-/// Solves min −x₀ + ½ x₁² with x₀ ≥ 0 and ‖x₂‖ ≤ 1 + x₀, which is unbounded.
+/// Checks that an unbounded objective is reported: min −x₀ + ½ x₁² with x₀ ≥ 0 and ‖x₂‖ ≤ 1 + x₀.
 #[test]
 fn an_objective_without_a_lower_bound_is_named() {
     let mut program = ConeProgram::new(Size { unknowns: 3, rows: 1, cone_rows: 2, equalities: 0 });
@@ -88,7 +88,7 @@ fn numbers_that_are_not_finite_are_named() {
         }
     }
     let mut program = program(1);
-    program.P[(3, 5)] = f64::NAN; // the upper triangle is not read
+    program.P[(3, 5)] = f64::NAN; // solvers do not read the upper triangle
     program.lower[2] = f64::INFINITY;
     let stopped = ours(&program).solve(&program, Start::Cold).stopped;
     assert_eq!(stopped, Some(Status::NotFinite { name: "lower", index: 2 }));
@@ -111,7 +111,8 @@ fn limits_end_a_solve_with_a_finite_iterate() {
     }
 }
 
-/// Numbers that are too large, or differ too much in size, for any solver: whatever the status, no result is NaN.
+/// Checks that no result is NaN, whatever the status, if numbers are too large for any solver or differ too much in
+/// size.
 #[test]
 fn wild_numbers_never_become_nan() {
     for seed in 0..200 {

@@ -1,4 +1,4 @@
-//! Programs with the size and structure of a whole-body controller's programs, changing slowly from tick to tick.
+//! Programs with the size and structure of a whole-body controller's programs. They change slowly from tick to tick.
 
 use super::random::Draw;
 use crate::cone_program::{ConeProgram, Size};
@@ -16,8 +16,8 @@ pub(super) struct Walk {
     points: usize,
     tasks: DMatrix<f64>,
     weights: Vec<f64>,
-    /// Amplitude, frequency and phase of each task's target. The next field holds the same numbers for the offset of
-    /// each limit.
+    /// Amplitude, frequency and phase of the motion of each task's target. The field `offsets` holds the same for the
+    /// offset of each limit.
     motion: Vec<[f64; 3]>,
     offsets: Vec<[f64; 3]>,
     references: Vec<[f64; 3]>,
@@ -26,19 +26,19 @@ pub(super) struct Walk {
     /// Amplitude of the change of each coefficient of the rows.
     drift: DMatrix<f64>,
     load: f64,
-    /// Disturbance of the references at each tick and at every fiftieth tick, relative to their size.
+    /// Size of random changes of the references, relative to the references: at each tick, and at every fiftieth tick.
     noise: [f64; 2],
 }
 
 impl Walk {
-    /// Creates programs like a humanoid's, with 44 unknowns. Their rows limit 32 efforts and 64 accelerations, and 8
-    /// points have a friction cone.
+    /// Creates a sequence of programs like a humanoid's, with 44 unknowns. Rows limit 32 efforts and 64 accelerations,
+    /// and 8 contact points have a friction cone.
     pub(super) fn humanoid(seed: u64) -> Self {
         Self::new(seed, 20, 8, [32, 64], 30)
     }
 
-    /// Creates programs like a quadruped's, with 18 unknowns. Their rows limit 12 efforts and 12 accelerations, and 4
-    /// points have a friction cone.
+    /// Creates a sequence of programs like a quadruped's, with 18 unknowns. Rows limit 12 efforts and 12 accelerations,
+    /// and 4 contact points have a friction cone.
     pub(super) fn quadruped(seed: u64) -> Self {
         Self::new(seed, 6, 4, [12, 12], 10)
     }
@@ -75,7 +75,7 @@ impl Walk {
         }
     }
 
-    /// Returns the same sequence with disturbed references.
+    /// Returns the same sequence of programs with disturbed references.
     pub(super) fn disturbed(self, noise: [f64; 2]) -> Self {
         Self { noise, ..self }
     }
@@ -98,7 +98,7 @@ impl Walk {
         program.P.fill(0.0);
         program.c.fill(0.0);
         for j in 0..n {
-            // Each force is attracted to a reference force, which may lie outside of the cone.
+            // The cost attracts each force to a reference force, which may lie outside of the force's friction cone.
             program.P[(j, j)] = 1e-3;
             if j >= na {
                 let reference = if (j - na) % 3 == 2 {
@@ -118,7 +118,8 @@ impl Walk {
                 }
             }
         }
-        // The sum of the forces carries and accelerates the load. Each axis has the weight 1, in units of the load.
+        // The sum of the forces should carry and accelerate the load. The cost of each axis has the weight 1, in units
+        // of the load.
         for axis in 0..3 {
             let of = |j: usize| {
                 if j < na {

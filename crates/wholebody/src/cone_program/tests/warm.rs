@@ -1,4 +1,4 @@
-//! Sequences of programs: a start from the last solution helps, and earlier solves never harm.
+//! Tests of sequences of programs: a warm start saves iterations, and earlier solves do not change results.
 
 use super::kkt::Errors;
 use super::random::{Draw, Kind};
@@ -6,9 +6,9 @@ use super::walk::Walk;
 use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
 
 /// Tolerance of the Karush–Kuhn–Tucker conditions. The solver's tolerance of 1e-9 is relative to the largest term of
-/// all rows; here the error of each row is relative to the largest term of this row.
+/// all rows. Here the error of each row is relative to the largest term of this row.
 const KKT_TOLERANCE: f64 = 1e-7;
-/// Tolerance of the objective, relative to the objective; it covers the duality gaps of both solves.
+/// Tolerance of the objective, relative to the objective. It covers the duality gaps of both solves.
 const OBJECTIVE_TOLERANCE: f64 = 1e-8;
 const TICKS: usize = 200;
 
@@ -58,7 +58,7 @@ fn a_useless_start_gives_way() {
     }
 }
 
-/// Earlier solves leave no trace: a cold start gives the same bits as a new solver.
+/// Checks that earlier solves do not affect a cold start: it gives the same bits as a new solver.
 #[test]
 fn a_cold_start_has_no_memory() {
     let mut used: Option<InteriorPoint> = None;
