@@ -167,10 +167,10 @@ impl Sweep {
     /// predicted state. `curvature` returns whether it wrote the derivatives.
     ///
     /// # Errors
-    /// As [`run`](Self::run).
+    /// The same errors as [`run`](Self::run).
     ///
     /// # Panics
-    /// As [`run`](Self::run).
+    /// The same panics as [`run`](Self::run).
     #[track_caller]
     pub fn run_with(
         &mut self,
@@ -216,7 +216,7 @@ impl FollowingSweep<'_> {
     /// Sweeps the next group of knots, whose first is knot `first`. The first group ends with the terminal knot.
     ///
     /// # Errors
-    /// As [`Sweep::run`]. The sweep is then over.
+    /// The same errors as [`Sweep::run`]. The sweep is then over.
     pub(crate) fn run(
         &mut self,
         first: usize,

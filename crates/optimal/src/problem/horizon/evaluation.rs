@@ -23,7 +23,7 @@ impl Problem {
     /// states of knots that were not reached are zeros.
     ///
     /// # Errors
-    /// As [`rollout`](Self::rollout).
+    /// The same errors as [`rollout`](Self::rollout).
     #[doc(hidden)]
     pub fn rollout_while(&mut self, us: &[f64], mut go_on: impl FnMut() -> ControlFlow<()>) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
