@@ -1,5 +1,5 @@
 //! Solves that diverge return their best iterate, and a resumed solve starts there.
-#![allow(non_snake_case)] // K
+#![allow(non_snake_case)] // names follow the literature: K
 
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};

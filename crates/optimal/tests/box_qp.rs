@@ -1,5 +1,5 @@
 //! Quadratic programs with bounds. The module is compiled into this test by itself, without the rest of the library.
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // names follow the literature
 
 #[allow(dead_code)] // only the sweep uses all items of the module
 #[path = "../src/lq/box_qp.rs"]

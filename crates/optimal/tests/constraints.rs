@@ -1,6 +1,6 @@
 //! Constrained problems: comparison with IPOPT's optima, the conditions of optimality, and infeasible problems.
 
-#![allow(non_snake_case)] // Q
+#![allow(non_snake_case)] // names follow the literature: Q
 
 mod common;
 

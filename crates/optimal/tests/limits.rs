@@ -1,6 +1,6 @@
 //! Robots with limits: comparisons with closed forms, with IPOPT's optimum, and with other formulations; friction cones
 //! hold.
-#![allow(non_snake_case)] // G
+#![allow(non_snake_case)] // names follow the literature: G
 
 #[path = "limits/starts.rs"]
 mod starts;

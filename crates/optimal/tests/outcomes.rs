@@ -1,6 +1,6 @@
 //! A solve reports what is wrong, and its outcome does not depend on how knots and trials are grouped.
 
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // names follow the literature
 
 mod common;
 

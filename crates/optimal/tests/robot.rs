@@ -1,5 +1,5 @@
 //! Free dynamics of robots and their costs: exact derivatives, references, limits.
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // names follow the literature
 
 use condyle_dynamics::{
     Act, Data, FrameKind, Model, ModelBuilder, Se3, UrdfOptions, Vec3, WORLD, forward_kinematics, integrate, neutral,

@@ -1,13 +1,13 @@
-//! Linear dynamics with a quadratic cost, as an action.
-#![allow(non_snake_case)] // the names of the literature
+//! Action with linear dynamics and a quadratic cost.
+#![allow(non_snake_case)] // names follow the literature
 
 use super::action::ActionModel;
 use crate::lq::LqKnot;
 
-/// Action x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper. These matrices and vectors
-/// are fields of an [`LqKnot`].
+/// Action x⁺ = A x + B u + f with the cost ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu and the bounds lower ≤ u ≤ upper.
+/// These matrices and vectors are fields of an [`LqKnot`].
 ///
-/// Without controls it is a terminal action. In Crocoddyl: `ActionModelLQR`.
+/// An `Lqr` without controls is a terminal action. Crocoddyl's equivalent is `ActionModelLQR`.
 ///
 /// ```
 /// use condyle_optimal::{Fddp, LqKnot, Lqr, Problem};

@@ -46,7 +46,7 @@
 //! assert_eq!(solution.status, Status::Converged);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-#![allow(non_snake_case)] // names of matrices follow the literature
+#![allow(non_snake_case)] // names follow the literature
 
 mod activation;
 mod actuation;

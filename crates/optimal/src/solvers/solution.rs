@@ -1,5 +1,5 @@
 //! Solution of a solve: the trajectory, its feedback, the outcome of the solve and a record of its iterations.
-#![allow(non_snake_case)] // K and k are the names in the literature
+#![allow(non_snake_case)] // names follow the literature: K, k
 
 use crate::problem::{Problem, Shape};
 use core::fmt;

@@ -4,7 +4,7 @@
 //! A solve [begins](SolverLoop::begin) from a trajectory and makes one or more [passes](SolverLoop::pass). A pass
 //! iterates on one cost. A solver with an outer method, such as an augmented Lagrangian, changes the cost between
 //! passes. All passes of a solve share the clock, the observer and the timings.
-#![allow(non_snake_case)] // K and k are the names in the literature
+#![allow(non_snake_case)] // names follow the literature: K, k
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;

@@ -1,6 +1,6 @@
 //! Actions without a robot, for tests.
 #![allow(dead_code)] // each test file uses only some of the items
-#![allow(non_snake_case)] // A, B, T, E
+#![allow(non_snake_case)] // names follow the literature: A, B, T, E
 
 use condyle_optimal::{ActionModel, GroupModel, LqKnot, Problem};
 use nalgebra::DMatrix;

@@ -1,5 +1,5 @@
 //! Robots in contact, at impacts, and with other actuations: exact derivatives, and errors.
-#![allow(non_snake_case)] // names of matrices follow the literature
+#![allow(non_snake_case)] // names follow the literature
 
 mod access;
 mod callers;

@@ -4,7 +4,7 @@
 //! The coordinates of knots are packed so that each number has a lane for each knot; the passes of dynamics then run
 //! once for all these knots. The results are unpacked into the data of each knot, because costs and the sweep process
 //! one knot after the other.
-#![allow(non_snake_case)] // J, M
+#![allow(non_snake_case)] // names follow the literature: J, M
 
 use super::kkt_elimination::Tableau;
 use super::limb_elimination::{

@@ -13,7 +13,7 @@
 //! these joints are too small (a straight knee), any acceleration is used. Rows of the base prefer forces. A pivot is
 //! missing only if contacts are redundant; the knot then stays explicit. The limbs in contact, and then the base, are
 //! mostly eliminated before, for several knots at once: see [`limb_elimination`](super::limb_elimination).
-#![allow(non_snake_case)] // J, M, T, U, D
+#![allow(non_snake_case)] // names follow the literature: J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
 use crate::robot::knot_data::Sensitivities;

@@ -15,7 +15,7 @@
 //! posture. The numbers are computed for as many knots as a vector has lanes. Without contacts, the rows of the base
 //! are solved for the accelerations of the base. If B is close to singular at a knot (a straight knee), this knot keeps
 //! its original equations, and its pivots are chosen one by one.
-#![allow(non_snake_case)] // B, J, M, T, Y
+#![allow(non_snake_case)] // names follow the literature: B, J, M, T, Y
 
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
 use crate::robot::contact::path;

@@ -1,5 +1,5 @@
 //! Dynamics of a robot, all kinds: accelerations, costs and limits for a group of knots.
-#![allow(non_snake_case)] // J
+#![allow(non_snake_case)] // names follow the literature: J
 
 use super::batch::{DynamicsKind, Group, KnotBatch, Pass};
 use super::impact::Impact;

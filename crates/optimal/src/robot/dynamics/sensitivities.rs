@@ -1,5 +1,5 @@
 //! Derivatives of the outputs of a knot with respect to its state and its controls.
-#![allow(non_snake_case)] // J
+#![allow(non_snake_case)] // names follow the literature: J
 
 use crate::robot::actuation::Actuation;
 use crate::robot::knot_data::{KnotData, Sensitivities, add_matrix_row};

@@ -1,5 +1,5 @@
 //! Control polynomials: how the controls of a knot change during its duration.
-#![allow(non_snake_case)] // B, S, R
+#![allow(non_snake_case)] // names follow the literature: B, S, R
 
 use super::Integrator;
 use crate::lq::LqKnot;

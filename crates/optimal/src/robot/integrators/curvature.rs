@@ -8,7 +8,7 @@
 //! ```
 //!
 //! where ∂²θ has a block for each group of positions that is not a vector space, and is zero elsewhere.
-#![allow(non_snake_case)] // E
+#![allow(non_snake_case)] // names follow the literature: E
 
 use super::retraction::Retraction;
 use crate::lq::Hessian;

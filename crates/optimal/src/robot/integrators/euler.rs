@@ -1,6 +1,6 @@
 //! Semi-implicit Euler, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), cost ℓ Δt. The term of the limits is
 //! not multiplied by Δt.
-#![allow(non_snake_case)] // A, B
+#![allow(non_snake_case)] // names follow the literature: A, B
 
 use super::accelerations::{slopes, values};
 use super::retraction::Retraction;

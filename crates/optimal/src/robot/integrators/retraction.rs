@@ -1,6 +1,6 @@
 //! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the
 //! identity, except a block for each group of positions that is not a vector space.
-#![allow(non_snake_case)] // T, E
+#![allow(non_snake_case)] // names follow the literature: T, E
 
 use crate::EulerBlock;
 use crate::lq::LARGEST_BLOCK;

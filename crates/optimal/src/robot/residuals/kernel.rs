@@ -1,6 +1,6 @@
 //! Kinematic residuals and their Jacobians, for one knot or for several knots in the lanes of a vector register. Each
 //! kind of residual has its own function, compiled for the SIMD level of the scalar.
-#![allow(non_snake_case)] // J, R, X
+#![allow(non_snake_case)] // names follow the literature: J, R, X
 
 use super::layout::{Plan, ROWS, STRIDE, row_width};
 use super::residual::Residual;

@@ -1,6 +1,6 @@
 //! Layout of the residuals of a knot: how each residual is computed, which quantities it reads, and where its entries
 //! are stored.
-#![allow(non_snake_case)] // W
+#![allow(non_snake_case)] // names follow the literature: W
 
 use super::residual::{Part, Residual};
 use crate::robot::outputs::{Capabilities, Output};

@@ -1,6 +1,6 @@
 //! Rows of the Jacobians of residuals. All rows of a knot are collected. Then the gradient and the Gauss–Newton Hessian
 //! are written once. Each entry of Q, S and R is a sum of products of row entries.
-#![allow(non_snake_case)] // names of matrices follow the literature
+#![allow(non_snake_case)] // names follow the literature
 
 use crate::lq::LqKnot;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product_without_slack};

@@ -1,5 +1,5 @@
 //! Values of residuals, and how the Jacobians of residuals enter the gradient and Hessian of a knot.
-#![allow(non_snake_case)] // D, W
+#![allow(non_snake_case)] // names follow the literature: D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::{Inputs, OwnResidual};
