@@ -1,5 +1,5 @@
-//! Gravity residual: the efforts of a knot minus the efforts that hold the robot still, for one knot or several at
-//! once.
+//! Gravity residual: the efforts of a knot minus the efforts that hold the robot still. It is computed for one knot or
+//! for several knots in SIMD lanes.
 
 use super::kernel::KnotGroup;
 use crate::robot::knot_data::unpack;
@@ -8,7 +8,7 @@ use condyle_spatial::block::Block;
 use condyle_spatial::kernel;
 use nalgebra::DMatrix;
 
-/// Vector M q̈ + h − g at knots with contacts, −g at other knots.
+/// Gravity residual without τ: M q̈ + h − g at knots with contacts, −g at other knots.
 #[derive(Debug)]
 pub(crate) struct GravityResidual<S> {
     /// Value of the vector. Shape: nv.

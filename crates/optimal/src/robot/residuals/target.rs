@@ -1,4 +1,4 @@
-//! Targets of residuals: the reference values, which can be read and changed in place.
+//! Targets of residuals: reference values, which can be read and changed in place.
 
 use super::residual::Residual;
 use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
@@ -14,11 +14,11 @@ use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Target<'a> {
-    /// Reference of a state (nq + nv numbers), of controls (nu), or of efforts or accelerations of joints (nv).
+    /// Reference of a state (nq + nv entries), of controls (nu), or of efforts or accelerations of joints (nv).
     Numbers(&'a [f64]),
     /// Position of a frame's origin or of the centre of mass in the world (m).
     Position(Vec3<f64>),
-    /// Axes of a frame in the world.
+    /// Rotation of a frame in the world.
     Rotation(Mat3<f64>),
     /// Pose of a frame in the world.
     Placement(Se3<f64>),
@@ -62,7 +62,7 @@ impl<'a, const N: usize> From<&'a [f64; N]> for Target<'a> {
 }
 
 impl Target<'_> {
-    /// Returns the name of the kind of target, for error messages.
+    /// Returns a description of the kind of target, for error messages.
     fn kind(&self) -> String {
         match self {
             Self::Numbers(numbers) => format!("{} numbers", numbers.len()),
@@ -109,7 +109,7 @@ impl Residual {
         })
     }
 
-    /// Returns an error if the target does not fit this residual and a robot with nu controls.
+    /// Returns an error if the target does not fit this residual or a robot with nu controls.
     pub(crate) fn check_target(&self, model: &Model, nu: usize, target: Target<'_>) -> Result<(), String> {
         let (nq, nv) = (model.nq(), model.nv());
         match (self, target) {
