@@ -18,8 +18,8 @@ use std::sync::Arc;
 /// q⁺ = q,   v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v,   ℓ = Σ w a(r)
 /// ```
 ///
-/// An impact has no duration and no controls. Residuals are functions of the state before the impact. Of each contact,
-/// only the frame and the axes are used. The equations are the same as in Crocoddyl's `ActionModelImpulseFwdDynamics`.
+/// An impact has no duration and no controls. Residuals are functions of the state before the impact. Only the frame
+/// and the axes of each contact are used. The equations are the same as in Crocoddyl's `ActionModelImpulseFwdDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
