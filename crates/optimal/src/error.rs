@@ -54,7 +54,7 @@ pub enum Error {
     #[error("resume: there is no solution to go on from; call solve first")]
     NothingToResume,
 
-    /// A dimension of one knot's action model differs from the expected one.
+    /// A dimension of one knot's action model differs from the dimension that the problem or the solver expects.
     #[error("knot {knot}: expected {name} = {expected}, found {found}")]
     Dimension {
         /// Index of the knot; N for the terminal one.
@@ -70,18 +70,18 @@ pub enum Error {
     /// A vector or a horizon has a wrong length.
     #[error("`{name}`: expected length {expected}, found {found}")]
     Length {
-        /// Name of the argument.
+        /// Name of the argument with the fault.
         name: &'static str,
         /// Expected length.
         expected: usize,
-        /// Given length.
+        /// Length of the given argument.
         found: usize,
     },
 
     /// An entry of the initial state or of the warm start is infinite or NaN.
     #[error("`{name}[{index}]` is {value}, which is not finite")]
     NotFinite {
-        /// Name of the argument.
+        /// Name of the argument with the fault.
         name: &'static str,
         /// Index of the entry in the flat list of all states or controls.
         index: usize,
@@ -92,7 +92,7 @@ pub enum Error {
     /// A state is invalid for the robot.
     #[error("`{name}`, knot {knot}: {what}")]
     State {
-        /// Name of the argument.
+        /// Name of the argument with the fault.
         name: &'static str,
         /// Index of the knot.
         knot: usize,
@@ -137,10 +137,10 @@ pub enum Error {
         upper: f64,
     },
 
-    /// A term of a robot's cost does not fit the robot.
+    /// A cost term does not fit the robot.
     #[error("cost `{name}`: {what}")]
     Cost {
-        /// Name of the term.
+        /// Name of the cost term.
         name: String,
         /// Description of the fault, including the invalid numbers.
         what: String,
@@ -157,7 +157,7 @@ pub enum Error {
         what: String,
     },
 
-    /// A friction or wrench cone is invalid.
+    /// A friction cone or a wrench cone is invalid.
     #[error("cone: {what}")]
     Cone {
         /// Description of the fault, including the invalid numbers.
@@ -173,7 +173,7 @@ pub enum Error {
         what: String,
     },
 
-    /// The actuation does not fit the robot, or the robot cannot be driven.
+    /// The actuation does not fit the robot or the knot, or the robot's forward dynamics have no solution.
     #[error("actuation: {what}")]
     Actuation {
         /// Description of the fault, including the invalid numbers.

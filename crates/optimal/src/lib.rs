@@ -1,4 +1,5 @@
-//! Optimal control over a horizon: find the controls that minimise a sum of costs along a trajectory.
+//! Solution of optimal control problems over a horizon: computes the controls that minimise a sum of costs along a
+//! trajectory.
 //!
 //! ```text
 //! minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1

@@ -20,7 +20,7 @@ const EXACT: f64 = 1e-9;
 const DIFFERENCES: f64 = 1e-4;
 const DT: f64 = 0.05;
 
-/// Robot with semi-implicit Euler steps and the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
+/// Generic action of a robot with semi-implicit Euler steps and the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
 #[derive(Clone)]
 struct Steps {
     model: Arc<Model>,

@@ -45,7 +45,7 @@ fn kkt_residual_vanishes() {
         for t in 0..horizon {
             let (knot, x, u, next) = (&lq_knots[t], &xs[t], &us[t], multiplier(t + 1));
             let scale = 1.0 + next.amax();
-            // conditions: Q δx + S δu + q + Aᵀλ⁺ = λ,   Sᵀδx + R δu + r + Bᵀλ⁺ = 0
+            // the Karush–Kuhn–Tucker conditions are Q δx + S δu + q + Aᵀλ⁺ = λ, Sᵀδx + R δu + r + Bᵀλ⁺ = 0
             let state = &knot.Q * x + &knot.S * u + &knot.q + knot.A.transpose() * &next - multiplier(t);
             let control = knot.S.transpose() * x + &knot.R * u + &knot.r + knot.B.transpose() * &next;
             assert!(state.amax() < RESIDUAL * scale, "ndx {ndx}, knot {t}: {:e}", state.amax());

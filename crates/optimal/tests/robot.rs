@@ -246,7 +246,7 @@ fn what_does_not_fit_is_refused_by_name() {
 struct OwnFunction {
     nq: usize,
     nv: usize,
-    /// Indices of the coordinates and controls in the residual.
+    /// Indices of the coordinates and controls that the residual reads.
     place: [usize; 2],
 }
 

@@ -30,7 +30,7 @@ const SYMMETRY: f64 = 1e-12;
 /// Relative accuracy of the arm's inverse inertia matrix, whose condition number is 1e4.
 const ROUNDING: f64 = 1e-12;
 
-/// Function ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: the cost of a knot plus a cost of its next state.
+/// Action whose cost is ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: the cost of a knot plus a cost of its next state.
 struct Chained<A>(A);
 
 impl<A: ActionModel> ActionModel for Chained<A> {

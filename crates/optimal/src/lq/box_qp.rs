@@ -1,10 +1,11 @@
-//! Quadratic programs with bounds, solved by projected Newton steps.
+//! Solution of quadratic programs with bounds, by projected Newton steps.
 #![allow(non_snake_case)] // names follow the literature
 
 use condyle_linalg::{SLACK, dot, eliminate, solve_right};
 use nalgebra::DMatrix;
 
-/// Maximum number of Newton steps by Crocoddyl's rule, and then by the careful rule.
+/// Maximum number of Newton steps with Crocoddyl's rule. If they do not converge, the same number of steps follows with
+/// the careful rule.
 const STEPS: usize = 100;
 
 /// Convergence tolerance: largest gradient entry of the free variables at a solution.
@@ -33,7 +34,7 @@ const STEP_LENGTHS: i32 = 10;
 #[derive(Debug, Clone)]
 pub(crate) struct BoxQp {
     pub(crate) x: Vec<f64>,
-    /// Indices of the variables that the last Newton step moved, in ascending order.
+    /// Indices of the variables that were free in the last Newton step, in ascending order.
     pub(crate) free: Vec<usize>,
     gradient: Vec<f64>,
     step: Vec<f64>,
@@ -75,7 +76,7 @@ impl BoxQp {
             self.x[i] = start.min(upper[i]).max(lower[i]);
         }
         for n in 0..2 * STEPS {
-            // g = q + H x
+            // gradient g = q + H x of the objective
             self.gradient[..m].copy_from_slice(q);
             for j in 0..m {
                 for i in 0..m {
@@ -144,7 +145,7 @@ impl BoxQp {
     }
 }
 
-/// Returns ½ xᵀ H x + qᵀ x.
+/// Returns the objective ½ xᵀ H x + qᵀ x.
 fn objective(H: &DMatrix<f64>, q: &[f64], x: &[f64]) -> f64 {
     let curvature: f64 = H.column_iter().zip(x).map(|(column, xj)| xj * dot(column.as_slice(), x)).sum();
     0.5 * curvature + dot(q, x)

@@ -8,8 +8,9 @@
 //! V(x, λ) = ½ xᵀPx + pᵀx + λᵀ(Θ x + θ) − ½ λᵀC λ + const
 //! ```
 //!
-//! The recursion starts after the segment with P = 0, p = 0, Θ = 1, θ = 0, C = 0. The elimination of a Riccati step
-//! then computes V knot by knot, if rows for λ are appended below H (notation as in [`Sweep`](crate::Sweep)):
+//! The recursion starts after the last knot of the segment with P = 0, p = 0, Θ = 1, θ = 0, C = 0. Rows for λ are
+//! appended below the quadratic form H of a Riccati step (notation as in [`Sweep`](crate::Sweep)). The elimination in
+//! the step then computes V knot by knot:
 //!
 //! ```text
 //! ⎡ H       ⎤      ⎡ L  ·   ⎤      Y = Θ⁺B L⁻ᵀ,   Θ = Θ⁺A − Y Xᵀ
@@ -46,7 +47,7 @@ pub(crate) struct Value {
 }
 
 impl Value {
-    /// Creates the value function that is zero for all states, for n states.
+    /// Creates the value function of n states that is zero everywhere.
     pub(crate) fn zeros(n: usize) -> Self {
         Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
     }
@@ -61,16 +62,16 @@ impl Value {
 /// the [`Step`] of the segment. Matrices have padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentValue {
-    /// Matrix Θ.
+    /// Matrix Θ of the term λᵀΘ x, n × n.
     Theta: Vec<f64>,
-    /// Vector θ.
+    /// Vector θ of the term λᵀθ, n entries.
     theta: Vec<f64>,
-    /// Lower triangle of C.
+    /// Lower triangle of the matrix C of the term −½ λᵀC λ.
     C: Vec<f64>,
 }
 
 impl SegmentValue {
-    /// Creates Θ, θ and C of zeros, for n states.
+    /// Creates matrices Θ and C and a vector θ of zeros, for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         let square = || vec![0.0; (n + SLACK) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
@@ -133,7 +134,7 @@ pub(crate) struct Link {
     upper: Vec<f64>,
     /// Product C L.
     CL: Vec<f64>,
-    /// Matrix (C L)ᵀ, and later [Θ, θ − C p₁]ᵀ.
+    /// Matrix (C L)ᵀ, overwritten by [Θ, θ − C p₁]ᵀ.
     rows: Vec<f64>,
     /// Matrix [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride 2n + 1 + SLACK.
     H: Vec<f64>,
@@ -182,7 +183,7 @@ impl Link {
         let Self { C, upper, CL, rows, H, .. } = self;
         let upper = View::new(upper, ld);
 
-        // M = 1 + Lᵀ(C L)
+        // computes M = 1 + Lᵀ(C L)
         copy_symmetric(C, ld, View::new(&segment.C, ldp), n);
         product_with_upper(CL, ld, [n, n], View::new(C, ld), upper);
         transpose(rows, ld, View::new(CL, ld), [n, n]);
@@ -191,7 +192,7 @@ impl Link {
             H[j * ldh + j] += 1.0;
         }
 
-        // [Θ, θ − C p₁]ᵀL
+        // computes [Θ, θ − C p₁]ᵀL
         transpose(rows, ld, View::new(&segment.Theta, ldp), [n, n]);
         for k in 0..n {
             rows[k * ld + n] = segment.theta[k] - dot(&C[k * ld..][..n], &end.p);

@@ -71,7 +71,7 @@ impl ConstraintRows {
         self.rows.is_empty()
     }
 
-    /// Removes all rows, and keeps the memory.
+    /// Removes all rows; the memory is kept.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.numbers.clear();

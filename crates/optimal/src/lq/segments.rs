@@ -5,10 +5,10 @@
 //! The last segment, which needs only a sweep, is therefore 1½ times as long as the others. The times below are counted
 //! in steps of a sweep:
 //! ```text
-//! segment            0      1 … S − 1     S
-//! at the same time          conditional   sweep         1½ N / (S + 1½)
-//! one by one                link          link          1.3 to 1.9 each, from S to 2: what comes after S − 1, …, 0
-//! at the same time   sweep  sweep                       N / (S + 1½)
+//! segment          0      1 … S − 1         S       time
+//! in parallel             conditional V     sweep   1½ N / (S + 1½)
+//! in sequence             link                      1.3 to 1.9 for each link, from segment S − 1 to segment 1
+//! in parallel      sweep  sweep                     N / (S + 1½)
 //! ```
 //! The cuts and the operations depend on S, but not on the number of threads that process the segments. The results are
 //! therefore the same to the last bit for any number of threads.
@@ -44,7 +44,7 @@ pub(crate) struct Segments {
 /// Segment, with its workspace.
 #[derive(Debug, Clone)]
 struct Segment {
-    /// Knots of the segment.
+    /// Index range of the segment's knots.
     knots: Range<usize>,
     step: Step,
     /// Terms Θ, θ and C of the conditional value function; P and p are in `step`.

@@ -16,7 +16,7 @@ pub enum SweepError {
     NotPositive {
         /// Index of the knot.
         knot: usize,
-        /// Row of the pivot.
+        /// Index of the pivot's row in Quu.
         row: usize,
         /// Value of the pivot.
         pivot: f64,
@@ -37,7 +37,7 @@ pub enum SweepError {
 
 /// Options of a sweep, the same for all knots.
 pub(super) struct SweepOptions<'a> {
-    /// Number that is added to the diagonals of Quu and Vxx.
+    /// Regularisation, which is added to the diagonals of Quu and Vxx.
     pub(super) regularisation: f64,
     /// Whether a form may defer the computation of gains: see [`Gains`](super::feedback::Gains).
     pub(super) defers_gains: bool,
@@ -46,7 +46,7 @@ pub(super) struct SweepOptions<'a> {
 }
 
 impl SweepOptions<'_> {
-    /// Returns the options for linear dynamics, with gains that are not deferred.
+    /// Returns the options of a sweep without curvature of the dynamics and without deferred gains.
     pub(super) fn linear(regularisation: f64) -> Self {
         Self { regularisation, defers_gains: false, curvature: None }
     }

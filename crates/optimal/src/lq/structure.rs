@@ -88,7 +88,7 @@ impl DynamicsStructure {
         &mut self.blocks
     }
 
-    /// Returns Δt and the blocks, if the structure is semi-implicit Euler.
+    /// Returns Δt and the blocks; `None` if the structure is not semi-implicit Euler.
     pub(crate) fn euler(&self) -> Option<(f64, &[EulerBlock])> {
         Some((self.dt?, &self.blocks))
     }
@@ -115,7 +115,7 @@ pub(crate) struct InverseDynamicsForm {
     pub(crate) dependent: Vec<usize>,
     /// Matrix U of δu = U (w, δv, δq). Its zero masks are not written, because not every form reads them.
     pub(crate) efforts: SparseRows,
-    /// Matrix D, with one row for each dependent coordinate.
+    /// Matrix D of the equations for dependent coordinates, one row for each.
     pub(crate) steps: SparseRows,
     /// Matrix G: its rows are the gradients of residuals that depend on more than δq.
     pub(crate) costs: SparseRows,

@@ -13,11 +13,11 @@ pub(crate) struct ActionView<'a> {
     pub(super) actions: Actions<'a>,
 }
 
-/// Source of the actions.
+/// Source of the actions of a view.
 pub(super) enum Actions<'a> {
     /// Actions of the problem, followed by its terminal action.
     Own(&'a mut [Box<dyn ActionModel>], &'a mut dyn ActionModel),
-    /// Copies, one of each action except the terminal one.
+    /// Copies of all actions except the terminal one; `None` where no copy exists.
     Copied(&'a mut [Option<Box<dyn ActionModel>>]),
 }
 

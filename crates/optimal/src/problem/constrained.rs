@@ -13,7 +13,7 @@ use std::any::Any;
 /// [`AugmentedLagrangian`](crate::AugmentedLagrangian) sets the multipliers y and the penalty 1/μ:
 ///
 /// ```text
-/// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: into the bounds
+/// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: projection on the bounds
 /// ```
 ///
 /// The Hessian of the term is the Gauss–Newton approximation. A solver without support for constraints treats the term
@@ -40,7 +40,7 @@ impl Constrained {
         Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu }
     }
 
-    /// Returns the action, if its type is `T`.
+    /// Returns the wrapped action, if its type is `T`.
     pub fn action_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
         let action: &mut dyn Any = self.action.as_mut();
         action.downcast_mut()
@@ -59,8 +59,8 @@ impl Constrained {
         self.multipliers.value(t, 0, &self.g, lower, upper)
     }
 
-    /// Adds the gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, and likewise r, R and S.
-    /// Here d and D are the term's first and second derivatives with respect to g.
+    /// Adds the gradient and the Gauss–Newton Hessian of the constraints' term: q += gₓᵀ d, Q += gₓᵀ D gₓ, and likewise
+    /// r, R and S. Here d and D are the term's first and second derivatives with respect to g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {

@@ -86,17 +86,17 @@ pub struct Results<'a> {
     /// Accelerations and forces; empty if they are not stored. Each knot has an equal share of the slice, and uses the
     /// beginning of its share.
     pub(crate) motions: &'a mut [f64],
-    /// LQ knots with the derivatives.
+    /// LQ knots that receive the derivatives.
     pub(crate) lq_knots: &'a mut [LqKnot],
 }
 
 impl<'a> Results<'a> {
-    /// Returns results that receive values.
+    /// Returns outputs for an evaluation of values.
     pub(crate) fn values(next: &'a mut [f64], costs: &'a mut [f64], motions: &'a mut [f64]) -> Self {
         Self { next, costs, motions, lq_knots: &mut [] }
     }
 
-    /// Returns results that receive derivatives.
+    /// Returns outputs for an evaluation of derivatives.
     pub(crate) fn derivatives(lq_knots: &'a mut [LqKnot]) -> Self {
         Self { next: &mut [], costs: &mut [], motions: &mut [], lq_knots }
     }
@@ -161,7 +161,7 @@ pub trait KnotGroup {
     }
 }
 
-/// Evaluates a group of knots of any action.
+/// Evaluates a group of knots, for any type of action.
 #[track_caller]
 pub(crate) fn evaluate(
     action: &mut dyn ActionModel,

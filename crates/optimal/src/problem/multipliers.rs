@@ -7,7 +7,7 @@ use std::sync::Arc;
 /// knot, the following term is added to the cost of the action,
 ///
 /// ```text
-/// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: into the bounds
+/// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: projection on the bounds
 /// ```
 ///
 /// whose derivative with respect to g is e / μ. Its Gauss–Newton curvature is 1/μ outside the bounds and at equalities,
@@ -45,7 +45,7 @@ impl Clone for Multipliers {
     }
 }
 
-/// Constraints of a knot, and their multipliers.
+/// Constraints of a knot with their bounds and their multipliers.
 pub struct Bounded<'a> {
     /// Number of constraints of the knot.
     pub(crate) count: usize,

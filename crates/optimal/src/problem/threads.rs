@@ -28,7 +28,7 @@ const PATIENCE: usize = 4096;
 pub(crate) struct Copies {
     /// Copy of each action, for each thread except the calling one.
     of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
-    /// First knot of each group, and the end of the horizon.
+    /// Index of the first knot of each group, followed by the number of knots.
     cuts: Vec<usize>,
     /// Index of the action that evaluates each group.
     owners: Vec<usize>,
@@ -42,7 +42,7 @@ impl Copies {
         self.of.first_mut().map(Vec::as_mut_slice)
     }
 
-    /// Drops the copies of an action that may have changed, or that is new.
+    /// Drops the copies of an action that is new or may have changed.
     pub(crate) fn forget(&mut self, action: usize) {
         for copies in &mut self.of {
             copies.resize_with(copies.len().max(action + 1), || None);
@@ -164,7 +164,7 @@ impl Copies {
 pub(super) struct Knots<'a> {
     /// Indices of the knots.
     pub(super) knots: &'a [usize],
-    /// States and controls.
+    /// States of all knots; the next field contains the controls.
     pub(super) xs: &'a [f64],
     pub(super) us: &'a [f64],
     /// Number of entries of a state.

@@ -129,7 +129,7 @@ impl Activation {
         }
     }
 
-    /// Returns an error message if this activation is invalid or does not fit a residual of n numbers.
+    /// Returns an error message if this activation is invalid or does not fit a residual with n entries.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
             true if numbers.iter().any(|x| x.is_nan()) => Some(format!("its {name} holds a NaN")),

@@ -44,7 +44,7 @@ impl Contact {
 /// on one body. No result depends on this value.
 pub(super) const SHARED: f64 = 1.0;
 
-/// Returns the constraints of `contacts`, with the damping μ in J M⁻¹ Jᵀ + μ 1.
+/// Returns the constraints of `contacts` as one set, with the damping μ in J M⁻¹ Jᵀ + μ 1.
 pub(super) fn constraint_set<S: Scalar>(
     model: &Model,
     contacts: &[Contact],
@@ -67,7 +67,7 @@ fn named(contacts: &[Contact], error: condyle_dynamics::Error) -> Error {
     }
 }
 
-/// Returns an error for contacts that cannot form a set of constraints.
+/// Returns an error if the contacts cannot form a set of constraints for the robot.
 pub(super) fn check_contacts(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     check_together(model, contacts, damping)?;
     let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();

@@ -20,7 +20,7 @@ pub struct CostMut<'a> {
 }
 
 impl CostMut<'_> {
-    /// Returns the term.
+    /// Returns the cost term.
     pub fn get(&self) -> &Cost {
         self.cost
     }
@@ -43,7 +43,7 @@ impl CostMut<'_> {
         Ok(())
     }
 
-    /// Sets the weight. Allocates nothing.
+    /// Sets the weight of the cost term. Allocates nothing.
     ///
     /// # Errors
     /// [`Error::Cost`] if the weight is negative or not finite.
@@ -53,7 +53,7 @@ impl CostMut<'_> {
         Ok(())
     }
 
-    /// Sets the activation.
+    /// Sets the activation of the cost term.
     ///
     /// # Errors
     /// [`Error::Cost`] if the weights or bounds of the activation are invalid, or if their number differs from the
@@ -127,7 +127,7 @@ impl Problem {
     /// terminal knot. Returns whether such a cost exists.
     ///
     /// # Errors
-    /// The first error of `change`. Costs that were changed before this error stay changed.
+    /// The first error that `change` returns. Costs that were changed before this error stay changed.
     pub fn change_costs(
         &mut self,
         name: &str,

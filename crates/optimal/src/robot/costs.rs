@@ -18,9 +18,9 @@ pub struct Cost {
     pub name: String,
     /// Weight w, finite and at least 0. A term with the weight 0 is not computed.
     pub weight: f64,
-    /// Residual r.
+    /// Residual r of the term.
     pub residual: Residual,
-    /// Activation a.
+    /// Activation a of the term.
     pub activation: Activation,
 }
 

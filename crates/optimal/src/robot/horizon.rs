@@ -72,7 +72,7 @@ impl<T> PerModel<T> {
     }
 }
 
-/// Values of the knots of a horizon: one common value, and separate values for single knots.
+/// List of the values of a horizon's knots: a common value, and separate values for single knots.
 #[derive(Clone, Debug)]
 pub(crate) struct PerKnot<T> {
     /// Common value, followed by the separate values of single knots.
@@ -193,7 +193,7 @@ impl HorizonTerms {
         Ok(found)
     }
 
-    /// Sets separate costs for knot t, which replace the common costs there.
+    /// Sets separate costs for knot t, which replace the common costs at this knot.
     pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         Error::check_size("knot", t, MOST_KNOTS)?;
         let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs).map_err(|error| match error {

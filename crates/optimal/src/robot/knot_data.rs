@@ -28,7 +28,8 @@ pub(crate) struct KnotData {
     /// Derivatives of J q̈ + γ with respect to q, v and q̈. The last matrix is J, which also gives ∂τ/∂λ = −Jᵀ. Shape:
     /// rows × nv.
     pub dcontact_acceleration: [DMatrix<f64>; 3],
-    /// Derivatives of the equations of motion, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
+    /// Derivatives of the equations of motion, row after row, in the layout of a
+    /// [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
     /// Number of eliminations that are already done in `equations`. The eliminations are, in order, of the limbs and of
     /// the base.

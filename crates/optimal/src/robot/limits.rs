@@ -163,12 +163,12 @@ impl Limits {
         Ok(())
     }
 
-    /// Returns the sets of all knots of all models.
+    /// Returns the limit sets of all knots and all models.
     fn all(&self) -> impl Iterator<Item = &LimitSet> {
         self.sets.all().iter().flat_map(PerKnot::all)
     }
 
-    /// Returns the largest number of limited entries at a knot.
+    /// Returns the largest number of constraint rows of a knot.
     fn most(&self) -> usize {
         self.all().map(|set| set.terms.len()).max().unwrap_or(0)
     }
@@ -214,7 +214,7 @@ impl Limits {
         (terms, LimitObjective { multipliers, t })
     }
 
-    /// Calls `visit` with the limits of knot t: bounds, names and multipliers.
+    /// Calls `visit` with the bounds, names and multipliers of the limits of knot t.
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
         let LimitSet { terms, lower, upper, parts } = self.sets.at(t).at(t);
         visit(Bounded { count: terms.len(), lower, upper, parts, multipliers: &mut self.multipliers });

@@ -113,7 +113,7 @@ impl Problem {
     /// ```
     ///
     /// # Panics
-    /// If t > N, or the solution has another horizon, or other dimensions at knot t.
+    /// If t > N, or if the horizon of the solution or its dimensions at knot t differ from the problem's.
     #[track_caller]
     pub fn motion(&mut self, solution: &Solution, t: usize) -> Option<KnotMotion> {
         self.assert_knot(t);

@@ -25,8 +25,8 @@ pub(crate) struct Capabilities {
     pub impulse: bool,
     /// Whether accelerations are controls, and also the forces of contacts.
     pub inverse: bool,
-    /// Basis Nᵀ of the joint efforts that no control can produce, if accelerations are controls. Shape: undriven
-    /// efforts × nv, row after row.
+    /// Orthonormal basis Nᵀ of the joint efforts that no control can produce; empty unless accelerations are controls.
+    /// Shape: undriven efforts × nv, row after row.
     pub undriven: Vec<f64>,
     /// Name of each contact, and the range of its rows in λ.
     pub contacts: Vec<(String, Range<usize>)>,

@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// Optimal control problem of a robot as data, including the robot. The data can be stored in a file, sent, and solved
 /// again. [`build`](Self::build) checks the data and creates the [`Problem`].
 ///
-/// All formats of serde can be used. In JSON an infinite bound is `null`.
+/// All formats of serde are supported. In JSON an infinite bound is `null`.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -45,7 +45,7 @@ use std::sync::Arc;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RobotProblem {
-    /// Robot.
+    /// Robot of the problem.
     pub model: Model,
     /// Initial state (q, v).
     pub x0: Vec<f64>,
@@ -65,12 +65,12 @@ pub struct RobotProblem {
 pub struct Knot {
     /// Dynamics, which give the next state.
     pub dynamics: Dynamics,
-    /// Costs.
+    /// Common costs at all indices of the horizon.
     pub costs: Vec<Cost>,
     /// Costs that replace `costs` at single knots. The key is the index of the knot in the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
-    /// Limits.
+    /// Common limits at all indices of the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub limits: Vec<Limit>,
     /// Limits that replace `limits` at single knots. The key is the index of the knot in the horizon.
@@ -112,24 +112,24 @@ pub enum Dynamics {
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Motion in contact: [`ContactDynamics`](super::ContactDynamics).
     Contact {
         /// Contacts that hold during the knot.
         contacts: Vec<Contact>,
-        /// Damping μ (1/kg).
+        /// Damping μ of the contacts (1/kg).
         damping: f64,
         /// Actuation matrix S, nv × nu.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Impact: [`ImpulseDynamics`].
@@ -138,14 +138,14 @@ pub enum Dynamics {
         contacts: Vec<Contact>,
         /// Coefficient of restitution ε, from 0 to 1.
         restitution: f64,
-        /// Damping μ (1/kg).
+        /// Damping μ of the contacts (1/kg).
         damping: f64,
     },
     /// Free motion, with accelerations as controls: [`FreeInverseDynamics`](super::FreeInverseDynamics).
     Inverse {
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Motion in contact, with accelerations and contact forces as controls:
@@ -157,9 +157,9 @@ pub enum Dynamics {
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Terminal knot, after the last step of the horizon: [`FreeDynamics::terminal`].

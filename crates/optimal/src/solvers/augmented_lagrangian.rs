@@ -18,9 +18,9 @@ use nalgebra::DVector;
 ///
 /// ```text
 /// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω
-///          if the constraints hold to η:   y ← (z − Π z) / μ,   η and ω fall
-///          else:                           μ falls
-/// until    the constraints and the gradient of the Lagrangian ℓ + yᵀg, along the dynamics, vanish to the tolerances
+///          if the violation is below the tolerance η:   y ← (z − Π z) / μ,   and η and ω become smaller
+///          else:                                        μ becomes smaller
+/// until    the violations, and the gradient of the Lagrangian ℓ + yᵀg under the dynamics, are below the tolerances
 /// ```
 ///
 /// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
@@ -75,7 +75,7 @@ use nalgebra::DVector;
 /// ```
 #[derive(Debug, Clone)]
 pub struct AugmentedLagrangian {
-    /// Settings of the constraints; may be changed between solves.
+    /// Settings for the constraints; may be changed between solves.
     pub settings: ConstraintSettings,
     /// Settings of the inner solves. The solver chooses the tolerances itself. The time budget applies to all inner
     /// solves together.
@@ -90,7 +90,7 @@ pub struct AugmentedLagrangian {
     lost: bool,
 }
 
-/// Residuals of the stopping tests, in addition to the residuals in [`Outcome`].
+/// Residuals of the stopping tests that [`Outcome`] does not contain.
 struct Residuals {
     /// Largest gap, or largest violation of a constraint that controls can change, whichever is larger.
     primal: f64,
@@ -135,7 +135,8 @@ impl AugmentedLagrangian {
     /// the controls that hold x̂₀ still: see [`ConstraintSettings::restart`].
     ///
     /// # Errors
-    /// [`Error`] as for [`Fddp::solve`](crate::Fddp::solve), or if no value satisfies the bounds of a constraint.
+    /// The errors of [`Fddp::solve`](crate::Fddp::solve). Also an [`Error`] if no value satisfies the bounds of a
+    /// constraint.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut |_: &Iteration| {})
     }
@@ -199,7 +200,7 @@ impl AugmentedLagrangian {
         &self.solver.iterate.solution
     }
 
-    /// Returns the state of the constraints after the last solve.
+    /// Returns the results for the constraints of the last solve.
     pub fn outcome(&self) -> &Outcome {
         &self.outcome
     }
@@ -263,7 +264,7 @@ impl AugmentedLagrangian {
             let stopped = self.solver.pass(problem, settings, pass, watch);
             self.outcome.solves += 1;
             self.outcome.iterations += self.solver.iterate.solution.trace.len();
-            // computes z − Π z at the iterate, and the residuals of the stopping tests
+            // computes the violations z − Π z at the iterate, and the residuals of the stopping tests
             residuals = self.measure(problem);
             if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
                 self.lost = stopped == Status::NotFinite;

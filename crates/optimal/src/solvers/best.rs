@@ -18,7 +18,7 @@ const RUNAWAY: f64 = 1e8;
 /// iterate with the lower cost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Merit {
-    /// Largest gap.
+    /// Largest gap of the iterate.
     pub(super) gap: f64,
     pub(super) cost: f64,
     /// Whether the iterate counts as feasible.

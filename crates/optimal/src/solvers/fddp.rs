@@ -13,14 +13,14 @@ use crate::problem::Problem;
 /// 2014; Mastalli et al., RA-L 2022). While gaps exist, the bounds only clamp the controls of trials. Afterwards, the
 /// sweep minimises each knot's quadratic model within the bounds.
 ///
-/// The warm start may have gaps f, where the trajectory does not satisfy the dynamics. One iteration is
+/// The warm start may have gaps f, where the trajectory does not satisfy the dynamics. One iteration consists of:
 ///
 /// ```text
 /// derivatives   at the iterate, if it is new
 /// sweep         k, K, Vx, Vxx; repeated with a larger regularisation while Quu is not positive definite
-/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap; accepted if it lowers the cost
-///               by more than `accept` times the expected α (d₁ + ½ α d₂), or, while gaps exist, raises it by less
-///               than `accept_ascent` times that
+/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap. The rollout is accepted if it lowers
+///               the cost by more than `accept` times the expected decrease α (d₁ + ½ α d₂). While gaps exist, it is
+///               also accepted if it raises the cost by less than `accept_ascent` times the expected rise
 /// ```
 ///
 /// An iterate counts as feasible after the first full step, because a step of length α = 1 closes all gaps at once. The

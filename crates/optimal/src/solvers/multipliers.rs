@@ -4,7 +4,7 @@ use super::outcome::{Violation, ViolationKind};
 use crate::error::Error;
 use crate::problem::{PENALTY, Problem, Visit};
 
-/// State of all constraints at a trajectory.
+/// Measurements of all constraints at a trajectory.
 #[derive(Debug, Default)]
 pub(super) struct Measured {
     /// Largest violation; `None` if all constraints hold exactly.
@@ -20,7 +20,7 @@ pub(super) struct Measured {
 }
 
 impl Problem {
-    /// Passes the constraints of knot t to `visit`, in their order.
+    /// Calls `visit` for the constraints of knot t, in their order.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         if let Some(group) = self.action_mut(t).knot_group_mut() {
             group.constraints(t, visit);

@@ -23,7 +23,7 @@ const SECOND: usize = 4;
 /// or third of these searches, a shorter step is needed.
 const WARY: usize = 3;
 
-/// Outcome of a line search: data of the accepted trial, or else of the last trial that stayed finite.
+/// Outcome of a line search: data of the accepted trial, or of the last trial that stayed finite if none was accepted.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Search {
     pub(super) step: f64,
@@ -34,7 +34,7 @@ pub(super) struct Search {
     pub(super) accepted: bool,
     /// Reason why the search ended early, if the solve must stop.
     pub(super) stopped: Option<Status>,
-    /// Whether the iterate before the accepted step is now the best one.
+    /// Whether the iterate before the accepted step was stored as the best one.
     pub(super) left_best: bool,
 }
 
@@ -45,7 +45,7 @@ pub(super) struct Surroundings<'a, 'o> {
     pub(super) merit: Merit,
     /// Best iterate before the current one.
     pub(super) best: &'a mut Best,
-    /// Feedback and value functions.
+    /// Feedback and value functions of all knots.
     pub(super) feedback: &'a [KnotFeedback],
     pub(super) settings: &'a Settings,
     pub(super) clock: &'a mut Clock,
@@ -215,7 +215,7 @@ struct Rule<'a> {
     expected: [f64; 2],
     /// Products Vxx f of all knots, if the expected decrease includes the gaps.
     curved_gaps: Option<&'a [f64]>,
-    /// States and cost of the iterate.
+    /// States of the iterate; the next field is the cost of the iterate.
     xs: &'a [f64],
     cost: f64,
 }

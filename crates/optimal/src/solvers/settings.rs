@@ -61,8 +61,8 @@ pub struct Settings {
     /// Tolerance of the expected decrease |d₁ + ½ d₂| of the cost. A solve has converged when the iterate before the
     /// last step was feasible and the expected decrease is below the tolerance.
     pub tolerance: f64,
-    /// Tolerance for problems with bounds on controls, whose expected decrease does not include the multipliers of the
-    /// bounds.
+    /// Tolerance that replaces `tolerance` for problems with bounds on controls. The expected decrease of such problems
+    /// does not include the multipliers of the bounds.
     pub tolerance_bounded: f64,
     /// Whether a warm start outside the bounds on controls is moved into the bounds, entry by entry, before a solve.
     /// This applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl does not
@@ -108,7 +108,7 @@ pub struct Settings {
     pub regularisation_min: f64,
     /// Largest regularisation; a solve that reaches it stops.
     pub regularisation_max: f64,
-    /// Factor by which the regularisation rises and falls.
+    /// Factor by which the regularisation is raised or lowered.
     pub regularisation_factor: f64,
     /// Step length above which an accepted step lowers the regularisation.
     pub regularisation_decrease_above: f64,
@@ -234,7 +234,7 @@ pub struct ConstraintSettings {
     pub penalty_start: f64,
     /// Largest penalty 1/μ.
     pub penalty_max: f64,
-    /// Factor by which the penalty 1/μ rises.
+    /// Factor by which the penalty 1/μ is raised.
     pub penalty_factor: f64,
     /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold x̂₀ still
     /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if its status is `NotFinite`, or if

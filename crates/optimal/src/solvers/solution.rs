@@ -29,9 +29,9 @@ pub enum Status {
     Interrupted,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
-    /// The penalty reached its limit, and constraints are still violated. This is not a proof of infeasibility: another
-    /// warm start, or a larger penalty, may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the
-    /// largest violation.
+    /// The penalty reached its limit, and constraints are still violated. This does not prove infeasibility: another
+    /// warm start or a larger penalty may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest
+    /// violation.
     ConstraintsViolated,
     /// No solution exists. The initial state x̂₀ violates a constraint of knot 0 that no control can change, for
     /// example a built-in residual of the state alone. [`Outcome::worst`](crate::Outcome::worst) names this constraint.
@@ -80,7 +80,7 @@ impl fmt::Display for Status {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Iteration {
-    /// Index of the iteration, from 0.
+    /// Index of the iteration; the first iteration has the index 0.
     pub iteration: usize,
     /// Cost of the iterate after the step.
     pub cost: f64,

@@ -46,7 +46,7 @@ pub(super) struct SolverLoop {
 /// Options of a pass that the calling solver sets, in addition to the settings.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pass {
-    /// Tolerance that replaces the tolerance in the settings.
+    /// Tolerance that replaces the tolerance in the settings; `None` for the tolerance in the settings.
     pub(super) tolerance: Option<f64>,
     /// Whether a warm start without gaps counts as feasible if a control lies on its bound. In Crocoddyl such a warm
     /// start is not feasible, so the bounds only clamp trials until the first full step. If bounds are active, the full
@@ -89,10 +89,10 @@ impl SolverLoop {
         }
     }
 
-    /// Begins an attempt to solve `problem`, from a warm start or else from the last trajectory.
+    /// Begins an attempt to solve `problem`, from a warm start if one is given, else from the last trajectory.
     ///
     /// # Errors
-    /// [`Error`] as documented for [`Fddp::solve`](crate::Fddp::solve).
+    /// The errors of [`Fddp::solve`](crate::Fddp::solve).
     pub(super) fn begin(
         &mut self,
         problem: &mut Problem,

@@ -87,7 +87,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Phase of an iteration.
+/// Phase of an iteration whose duration is predicted.
 #[derive(Clone, Copy)]
 pub(super) enum Phase {
     CalcDiff,
@@ -124,7 +124,7 @@ impl Recent {
     }
 }
 
-/// Time limit of a solve, and the recent durations of each phase.
+/// Clock of a solve: its time limit, and the recent durations of each phase.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clock {
     /// Beginning and time limit of the solve; `None` without a time limit.

@@ -1,4 +1,4 @@
-//! Clock that the host of a WebAssembly module provides, for example a browser.
+//! Clock of a WebAssembly module, which its host provides, for example a browser.
 
 use core::ops::Add;
 use std::sync::OnceLock;

@@ -14,7 +14,7 @@ use nalgebra::DVector;
 /// Tolerance of the equation of motion after a factorisation, with forces of a few hundred newtons.
 const BALANCE: f64 = 1e-8;
 
-/// Constraint without rows.
+/// Path constraint without rows.
 struct Nothing;
 
 impl PathConstraint for Nothing {

@@ -36,7 +36,7 @@ pub(in crate::lq) struct Driven {
     /// zeros. Shape: `stride` × (MOST + MOST_COSTS); empty for larger robots.
     rows: Vec<f64>,
     stride: usize,
-    /// Number of scaled rows.
+    /// Number of rows in use in `rows`.
     count: usize,
     /// Scratch of [`take_gains`].
     y: Vec<f64>,

@@ -102,7 +102,7 @@ pub(super) struct Steps {
     both: Vec<f64>,
     /// Gradient with respect to y: Δt Eᵀp_q + p_v.
     pub(super) py: Vec<f64>,
-    /// Columns of P E or P T that differ from the columns of P, with the stride of P.
+    /// Products P E or P T, computed only in the columns of blocks; with the stride of P.
     PB: Vec<f64>,
 }
 

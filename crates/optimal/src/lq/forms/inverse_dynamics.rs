@@ -44,7 +44,7 @@ pub(super) struct InverseDynamics {
     products: OuterProducts,
     /// Half of the block Π_dd of the dependent coordinates. Shape: dependent × dependent, with padding rows.
     half: Vec<f64>,
-    /// Columns of Ψ for dependent coordinates. Shape: n × dependent, with padding rows.
+    /// Scratch: columns of Ψ for dependent coordinates. Shape: n × dependent, with padding rows.
     below: Vec<f64>,
     gains: Gains,
 }

@@ -74,7 +74,7 @@ impl Sizes {
         if self.room[0] > 0 { self.m } else { 0 }
     }
 
-    /// Returns the number of rows that the forms need below H.
+    /// Returns the number of rows below H that the forms need.
     pub(super) fn rows_below(self) -> usize {
         Driven::rows_below(self.n, self.m)
     }

@@ -63,7 +63,7 @@ pub struct Problem {
     shape: Shape,
     /// Runs of consecutive knots with the same action, as long as possible: (index of the action, knots).
     runs: Vec<(usize, Range<usize>)>,
-    /// Indices 0, 1, …, N; the knots of a group are a slice of this vector.
+    /// Indices 0, 1, …, N of the knots. A group passes a slice of this vector as its indices.
     knots: Vec<usize>,
     /// Copies of the models, for other threads.
     copies: Copies,
@@ -127,7 +127,7 @@ impl Problem {
     /// costs that this model has for all knots. The models are [notified](ActionModel::shift) of the shift and of the
     /// new indices of their knots. Allocates nothing.
     ///
-    /// [`Fddp::shift`](crate::Fddp::shift) moves the solver's trajectory accordingly.
+    /// The solver's trajectory is moved by [`Fddp::shift`](crate::Fddp::shift).
     ///
     /// # Errors
     /// [`Error::UnknownModel`] if the model does not exist, [`Error::NoNextState`] if the model may serve only the

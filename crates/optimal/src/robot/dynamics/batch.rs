@@ -71,7 +71,7 @@ impl<'a> Group<'a> {
     }
 }
 
-/// Kind of dynamics with its workspace.
+/// Workspace of each kind of dynamics.
 #[derive(Debug)]
 pub(crate) enum Pass<S> {
     None,

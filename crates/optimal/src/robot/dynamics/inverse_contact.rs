@@ -24,8 +24,8 @@ pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 ///
 /// ```text
 /// (q̈, λ) = u,   τ = M q̈ + h − Jᵀλ,   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
-/// Nᵀτ = 0        nothing drives some coordinates     (Nᵀ S = 0: of a floating base the first 6 rows of τ)
-/// J q̈ + γ = 0    contacts hold
+/// Nᵀτ = 0        no effort without a motor (Nᵀ S = 0; for a floating base, the first 6 rows of τ)
+/// J q̈ + γ = 0    no acceleration of contacts
 /// ```
 ///
 /// The last two equations are [`Limit`]s, called `undriven efforts` and `contact …`. Every such knot has these limits;

@@ -5,9 +5,9 @@
 //! rows is solved for:
 //!
 //! ```text
-//! J δa            + c_v δv + c_q δq = 0         contacts stay            → the accelerations of the limbs in contact
-//! M_b δa − J_bᵀ δf + r_v δv + r_q δq = 0         nothing drives the base  → forces, and accelerations if these cannot
-//! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        the joints               → δu
+//! J δa            + c_v δv + c_q δq = 0         contacts do not accelerate   → accelerations of the limbs in contact
+//! M_b δa − J_bᵀ δf + r_v δv + r_q δq = 0         the base has no motor        → forces, or else accelerations
+//! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        motors drive the joints      → δu
 //! ```
 //!
 //! Gauss–Jordan elimination solves each row of the first two groups for one unknown. It chooses the unknown with the
@@ -27,7 +27,7 @@ use core::ops::Range;
 
 /// Smallest accepted pivot among the preferred unknowns, relative to the row's largest entry.
 pub(super) const PREFERENCE: f64 = 1e-2;
-/// Pivot that counts as zero, relative to the row's largest entry before the elimination.
+/// Largest pivot that counts as zero, relative to the row's largest entry before the elimination.
 const REDUNDANT: f64 = 1e-7;
 
 /// Size of the tableau of a knot. The tableau has a row for each row of a contact and for each coordinate, and columns
@@ -35,7 +35,7 @@ const REDUNDANT: f64 = 1e-7;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tableau {
     pub nv: usize,
-    /// Number of rows of all contacts.
+    /// Number of constraint rows of all contacts.
     pub rows: usize,
 }
 
@@ -342,7 +342,7 @@ impl Gather<'_> {
     }
 }
 
-/// Sensitivities of a knot with respect to (w, δv, δq); see [`KktElimination::sensitivities`].
+/// Sensitivities of a knot's outputs with respect to (w, δv, δq); see [`KktElimination::sensitivities`].
 pub(crate) struct Unknowns<'a> {
     elimination: &'a KktElimination,
     form: &'a InverseDynamicsForm,
@@ -350,7 +350,7 @@ pub(crate) struct Unknowns<'a> {
 }
 
 impl Unknowns<'_> {
-    /// Computes g += c times row k of `rows`.
+    /// Adds c times row k of `rows` to g.
     fn add(&self, rows: &SparseRows, k: usize, c: f64, g: &mut Row<'_>) {
         let row = &rows.numbers[k * self.form.stride..];
         let (u, x) = row.split_at(g.u.len());

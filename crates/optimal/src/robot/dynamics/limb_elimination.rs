@@ -7,7 +7,7 @@
 //! eliminated from the equations of motion:
 //!
 //! ```text
-//! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i of the equations that the limb is in
+//! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i with entries in the limb's columns l
 //! ```
 //!
 //! Then the rows of the base are solved in the same way for forces. If there are not enough forces, accelerations are
@@ -37,7 +37,7 @@ const CHOSEN_ELSEWHERE: f64 = 1e-3;
 /// Block of the tableau: a number of rows that are solved for the same number of columns.
 #[derive(Clone, Debug, PartialEq)]
 struct Block {
-    /// Rows of the block.
+    /// Range of the block's rows in the tableau.
     rows: Range<usize>,
     /// Columns for which the rows are solved. They belong to coordinates or to forces.
     solved: Vec<usize>,
@@ -157,7 +157,7 @@ impl LimbElimination {
         [limbs, base].into_iter().filter(|elimination| !elimination.blocks.is_empty()).collect()
     }
 
-    /// Returns the solved rows of a tableau, each with the column for which it is solved.
+    /// Returns the rows that this elimination solves, each with the column for which the row is solved.
     pub(crate) fn solved(&self) -> Vec<(usize, usize)> {
         self.blocks.iter().flat_map(|block| block.rows.clone().zip(block.solved.iter().copied())).collect()
     }
@@ -264,7 +264,7 @@ kernel! {
         let mut rest = inverses;
         for Block { rows, solved, compared, least, .. } in &elimination.blocks {
             let n = rows.len();
-            // W = [B D], with the rows scaled by D
+            // initialises W = [D B, D], where the diagonal matrix D contains the scale factors of the rows
             let mut W = [[S::zero(); 2 * MOST]; MOST];
             for (k, r) in rows.clone().enumerate() {
                 let row = &T[r * stride..][..stride];

@@ -211,8 +211,8 @@ impl RobotDynamics {
     /// Creates the dynamics of a robot with an actuation and a kind of dynamics.
     ///
     /// # Errors
-    /// [`Error::Contact`] for contacts that do not fit; [`Error::Cost`] for a term that does not fit;
-    /// [`Error::Actuation`] for the actuation of another robot, and for a robot whose forward dynamics have no
+    /// [`Error::Contact`] for contacts that do not fit the robot; [`Error::Cost`] for a cost term that does not fit the
+    /// robot; [`Error::Actuation`] for the actuation of another robot, and for a robot whose forward dynamics have no
     /// solution.
     pub(crate) fn new(
         model: Arc<Model>,

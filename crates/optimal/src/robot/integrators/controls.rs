@@ -10,9 +10,9 @@ use crate::lq::LqKnot;
 /// The control vector w of the knot contains the values of u at the nodes of the polynomial, one after the other.
 ///
 /// ```text
-/// constant    u(s) = w                                             nu entries
-/// linear      u(s) = (1 − 2 s) w₀ + 2 s w₁                         at s = 0 and ½
-/// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials            at s = 0, ½, 1; by `RungeKutta3` at 0, ⅓, ⅔
+/// constant    u(s) = w                                     one node
+/// linear      u(s) = (1 − 2 s) w₀ + 2 s w₁                 nodes at s = 0 and ½
+/// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials    nodes at s = 0, ½, 1; with `RungeKutta3` at 0, ⅓, ⅔
 /// ```
 ///
 /// Dynamics and costs are computed at the stages of the [`Integrator`], each with its own u(s). Semi-implicit Euler has
@@ -33,9 +33,9 @@ pub enum ControlPolynomial {
     /// Constant controls: one node.
     #[default]
     Constant,
-    /// Polynomial of first degree: two nodes.
+    /// First-degree polynomial: two nodes.
     Linear,
-    /// Polynomial of second degree: three nodes.
+    /// Second-degree polynomial: three nodes.
     Quadratic,
 }
 

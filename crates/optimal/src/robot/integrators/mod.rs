@@ -218,7 +218,7 @@ impl<M: ContinuousModel> Integrated<M> {
             (Method::Impact, ..) => {
                 let nv = inner.nv();
                 let Derivatives { da_dq, da_dv, .. } = slopes(inner, lane, input, 1.0, group, knot);
-                // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v], as for an Euler step with Δt = 0
+                // the Jacobian A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v] has the structure of an Euler step with Δt = 0
                 knot.structure.set_euler(0.0, &[]);
                 knot.A.fill_with_identity();
                 let mut below = knot.A.rows_mut(nv, nv);

@@ -52,7 +52,8 @@ impl<'a, S: Scalar> RobotState<'a, S> {
         Self { model, t, q, v, u, data, placed: false }
     }
 
-    /// Returns the placements of all bodies and frames at q. They are computed at the first call and kept.
+    /// Returns the placements of all bodies and frames at q. The first call computes the placements; later calls return
+    /// the stored ones.
     pub fn placements(&mut self) -> Placements<'_, S> {
         if !self.placed {
             forward_kinematics(self.model, self.data, self.q);

@@ -8,7 +8,7 @@ use condyle_dynamics::Model;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;
 
-/// Plan for the computation of a residual, made once for a robot.
+/// Plan for the computation of a residual, created once for a robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// Number of entries of the residual.
@@ -113,14 +113,14 @@ impl Add for KnotLayout {
 pub(crate) struct Requirements {
     pub placements: bool,
     pub velocities: bool,
-    /// Jacobian of the centre of mass.
+    /// Whether a residual reads the Jacobian of the centre of mass.
     pub com: bool,
     pub momentum: bool,
-    /// Efforts g that hold the robot still.
+    /// Whether a residual reads the efforts g that hold the robot still.
     pub gravity: bool,
-    /// Efforts M q̈ + h of joints and contacts together.
+    /// Whether a residual reads the efforts M q̈ + h of joints and contacts together.
     pub inertia: bool,
-    /// Change of the velocity of the centre of mass at an impact.
+    /// Whether a residual reads the velocity change of the centre of mass at an impact.
     pub impulse_com: bool,
 }
 

@@ -59,28 +59,28 @@ pub enum Residual {
     },
     /// Twist log(refXo oXf) from the target to the frame, expressed in the target's frame: 6 entries, linear first.
     FramePlacement {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired pose of the frame in the world.
         target: Se3<f64>,
     },
     /// Error p − p_ref of a frame's position, 3 entries along the world's axes.
     FrameTranslation {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired position of the frame's origin in the world (m).
         target: Vec3<f64>,
     },
     /// Rotation error log(R_refᵀ R) of a frame, 3 entries along the target's axes.
     FrameRotation {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired rotation of the frame in the world.
         target: Mat3<f64>,
     },
     /// Velocity error v − v_ref of a frame, 6 entries, linear first.
     FrameVelocity {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired velocity (m/s, rad/s).
         target: Motion<f64>,
@@ -102,14 +102,14 @@ pub enum Residual {
     FrictionCone {
         /// Name of the contact.
         contact: String,
-        /// Cone whose rows are used.
+        /// Cone that defines the rows.
         cone: FrictionCone,
     },
     /// Rows of a wrench cone times the wrench w of a rigid contact. See [`WrenchCone::bounds`].
     WrenchCone {
         /// Name of the contact.
         contact: String,
-        /// Cone whose rows are used.
+        /// Cone that defines the rows.
         cone: WrenchCone,
     },
     /// Limits ±τ_x − ½ size_y f_z and ±τ_y − ½ size_x f_z of a rigid contact. They are at most 0 while the centre of
@@ -147,7 +147,7 @@ pub(crate) enum Part {
     Diagonal,
     /// Block of Q for the positions.
     Positions,
-    /// Whole Hessian.
+    /// All blocks of the Hessian.
     All,
 }
 
@@ -223,8 +223,7 @@ impl Residual {
         }
     }
 
-    /// Returns the reference frame in which the residual is expressed; `None` if the kind of residual has no such
-    /// choice.
+    /// Returns the reference frame of the residual's axes; `None` if the kind of residual has fixed axes.
     pub(crate) fn reference(&self) -> Option<ReferenceFrame> {
         match self {
             Self::FrameVelocity { reference, .. } => Some(*reference),

@@ -175,8 +175,9 @@ fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     }
 }
 
-/// Computes C = Σ left rightᵀ over the first `length` rows of `left` and `right`. The rows and columns of C begin at
-/// two given offsets in these rows. Sums on both sides of the diagonal are equal.
+/// Computes C = Σ left rightᵀ over the first `length` rows of `left` and `right`. The rows of C correspond to entries
+/// of `left`, and the columns of C to entries of `right`, each from a given offset. Both triangles of C contain the
+/// same sums.
 fn outer(
     C: &mut [f64],
     ldc: usize,

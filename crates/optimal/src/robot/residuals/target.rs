@@ -29,7 +29,7 @@ pub enum Target<'a> {
     Force(Force<f64>),
 }
 
-/// Conversions into targets.
+/// Defines conversions of values into targets.
 macro_rules! targets {
     ($($Type:ty => $variant:ident),*) => {$(
         impl From<$Type> for Target<'_> {
@@ -75,7 +75,7 @@ impl Target<'_> {
     }
 }
 
-/// Returns an error if one of the numbers called `name` is not finite.
+/// Returns an error if an entry of `numbers` is not finite; the error contains `name`.
 fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     match numbers.iter().position(|x| !x.is_finite()) {
         None => Ok(()),
@@ -84,7 +84,7 @@ fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     }
 }
 
-/// Returns an error if the matrix called `name` is not a rotation.
+/// Returns an error if the matrix R is not a rotation; the error contains `name`.
 pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
     match R.is_rotation() {
         true => Ok(()),

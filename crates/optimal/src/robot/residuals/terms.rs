@@ -6,7 +6,7 @@ use super::view::ResidualView;
 use crate::lq::LqKnot;
 use crate::robot::knot_data::Sensitivities;
 
-/// Residual that contributes to the objective: a cost or a limit.
+/// Cost or limit: a residual that contributes to the objective.
 pub(crate) trait Term {
     fn residual(&self) -> &Residual;
 

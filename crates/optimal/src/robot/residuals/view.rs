@@ -20,7 +20,7 @@ pub(crate) struct Scratch {
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
-    /// Rows of all Jacobians.
+    /// Rows of the Jacobians of all residuals.
     pub rows: Rows,
     /// Jacobian of the difference of configurations; only the blocks of groups are read. Shape: nv × nv.
     D: DMatrix<f64>,
