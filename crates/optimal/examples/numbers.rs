@@ -1,5 +1,5 @@
-//! Prints results of dynamics and of optimal control, one line each, and the duration of an iteration of FDDP. The
-//! output serves to compare processors and SIMD levels.
+//! Prints results of dynamics and of optimal control, one line each, and the duration of one iteration of FDDP. The
+//! output is used to compare processors and SIMD levels.
 //!
 //! ```text
 //! CONDYLE_LEVEL=baseline cargo run --release -p condyle-optimal --example numbers
@@ -18,8 +18,8 @@ use std::sync::Arc;
 
 /// Feet of the quadruped.
 const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
-/// Number of solves, of which the fastest is timed. A browser needs many solves, because it recompiles code that runs
-/// often.
+/// Number of solves, of which the fastest gives the reported time. A browser needs many solves, because it recompiles
+/// code that runs often.
 const SOLVES: usize = if cfg!(debug_assertions) { 1 } else { 300 };
 
 fn main() {
@@ -32,7 +32,8 @@ fn main() {
     print!("{numbers}");
 }
 
-/// Web page in which the program runs. It selects whether vectors are used, provides a clock, and receives the output.
+/// Functions of the web page that runs the program: the page selects whether SIMD is used, provides a clock, and
+/// receives the output.
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 #[allow(unsafe_code)]
 mod page {
@@ -41,7 +42,7 @@ mod page {
 
     #[link(wasm_import_module = "page")]
     unsafe extern "C" {
-        /// Returns whether vector instructions are used.
+        /// Returns whether SIMD instructions are used.
         safe fn vectors() -> bool;
         /// Returns the current time (ms).
         safe fn now() -> f64;
@@ -73,7 +74,7 @@ fn report() -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// Returns n numbers between −1 and 1, different ones for each seed.
+/// Returns n numbers between −1 and 1, which depend on the seed.
 fn numbers(seed: usize, n: usize) -> Vec<f64> {
     (0..n).map(|k| ((seed * 131 + k * 29 + 17) % 101) as f64 / 50.0 - 1.0).collect()
 }
@@ -85,7 +86,7 @@ fn position(model: &Model, seed: usize) -> Vec<f64> {
     q
 }
 
-/// Prints the results of single calls of the dynamics.
+/// Prints the results of single calls of dynamics algorithms.
 fn calls(model: &Model, text: &mut String) -> std::fmt::Result {
     let (name, nv, mut data) = (model.name(), model.nv(), Data::new(model));
     for seed in 0..4 {
@@ -105,7 +106,7 @@ fn calls(model: &Model, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// Prints the results of a batch of states, one state more than fills the vector lanes.
+/// Prints the results of a batch with one state more than the number of SIMD lanes.
 fn batch(model: &Model, text: &mut String) -> std::fmt::Result {
     const STATES: usize = 9;
     let all = |of: &dyn Fn(usize) -> Vec<f64>| (0..STATES).flat_map(of).collect::<Vec<f64>>();
@@ -136,7 +137,7 @@ fn standing() -> Vec<f64> {
     q
 }
 
-/// Problem with a warm start.
+/// Optimal control problem with a warm start.
 struct Task {
     problem: Problem,
     xs: Vec<f64>,
@@ -149,12 +150,12 @@ fn reach() -> Result<Task, Box<dyn Error>> {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.3, 0.4, -0.2, 1.2, 0.1, 0.8, 0.2], vec![0.0; 7]].concat();
     let state = || Residual::State { reference: x0.clone() };
-    // without these weights, rounding would decide where the arm is free to move
+    // without these weights, rounding errors would decide the motion in directions that do not move the tool
     let rest = || Activation::Weighted([[0.1; 7], [1.0; 7]].concat());
     let effort = Residual::Control { reference: vec![0.0; 7] };
     let mut data = Data::new(&*arm);
     let tool = forward_kinematics(&arm, &mut data, &x0[..7]).frame(arm.frame("tool")?).translation;
-    // the target is near, because rounding errors grow over a long distance
+    // the target is near, because rounding errors grow with the distance
     let target = tool + Vec3::new(0.05, -0.04, 0.06);
     let point = Residual::FrameTranslation { frame: "tool".into(), target };
     let running =

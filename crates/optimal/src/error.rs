@@ -1,20 +1,20 @@
-//! Faults of a problem, a warm start or the settings, found before a solve begins.
+//! Errors of a problem, a warm start or the settings, which are found before a solve begins.
 
-/// Fault of a problem, a warm start or the settings.
+/// Error of a problem, a warm start or the settings.
 ///
 /// The outcome of a solve is not an error: see [`Status`](crate::Status).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The horizon lacks a knot before the terminal one.
+    /// The horizon has no knot before the terminal one.
     #[error("the horizon is empty: a problem needs at least one knot before the terminal one")]
     EmptyHorizon,
 
-    /// The states have no entries, as with a robot that has only fixed joints: nothing can be controlled.
+    /// The states have no entries, so nothing can be controlled. An example is a robot with only fixed joints.
     #[error("the states have no numbers: a problem needs at least one")]
     EmptyState,
 
-    /// A knot uses the index of an action model that the problem does not contain.
+    /// A knot has the index of an action model that the problem does not contain.
     #[error("knot {knot}: there is no action model {index}, the problem holds {models}")]
     UnknownModel {
         /// Knot that uses the model.
@@ -25,7 +25,7 @@ pub enum Error {
         models: usize,
     },
 
-    /// A model made for the end of a horizon is used at an earlier knot.
+    /// A model that may serve only the terminal knot is used at an earlier knot.
     #[error(
         "knot {knot}: models[{index}] has no next state, as an action of the end; a running one has a duration or an impact"
     )]
@@ -43,23 +43,23 @@ pub enum Error {
         nu: usize,
     },
 
-    /// A problem cannot be copied, because one of its actions cannot.
+    /// A problem cannot be copied, because one of its actions cannot be copied.
     #[error("{}: cannot be copied, as its `try_clone` returns `None`", model_name(*.model))]
     NoCopy {
         /// Index of the model; `None` for the terminal one.
         model: Option<usize>,
     },
 
-    /// A solver cannot resume, because it does not have a solution.
+    /// A solver cannot resume, because it has no solution yet.
     #[error("resume: there is no solution to go on from; call solve first")]
     NothingToResume,
 
-    /// A dimension of one knot's action model differs from the expected one.
+    /// A dimension of one knot's action model differs from the dimension that the problem or the solver expects.
     #[error("knot {knot}: expected {name} = {expected}, found {found}")]
     Dimension {
         /// Index of the knot; N for the terminal one.
         knot: usize,
-        /// Name of the dimension: `nx`, `ndx`, `nu`, or the name of the bounds.
+        /// Name of the dimension: `nx`, `ndx`, `nu`, or the name of the bounds with a wrong length.
         name: &'static str,
         /// Dimension that the problem or the solver expects.
         expected: usize,
@@ -67,23 +67,23 @@ pub enum Error {
         found: usize,
     },
 
-    /// A vector or a horizon does not have the expected length.
+    /// A vector or a horizon has a wrong length.
     #[error("`{name}`: expected length {expected}, found {found}")]
     Length {
-        /// Name of the argument.
+        /// Name of the argument with the fault.
         name: &'static str,
         /// Expected length.
         expected: usize,
-        /// Given length.
+        /// Length of the given argument.
         found: usize,
     },
 
     /// An entry of the initial state or of the warm start is infinite or NaN.
     #[error("`{name}[{index}]` is {value}, which is not finite")]
     NotFinite {
-        /// Name of the argument.
+        /// Name of the argument with the fault.
         name: &'static str,
-        /// Index of the entry in the flat list of all knots.
+        /// Index of the entry in the flat list of all states or controls.
         index: usize,
         /// Value of the entry.
         value: f64,
@@ -92,7 +92,7 @@ pub enum Error {
     /// A state is invalid for the robot.
     #[error("`{name}`, knot {knot}: {what}")]
     State {
-        /// Name of the argument.
+        /// Name of the argument with the fault.
         name: &'static str,
         /// Index of the knot.
         knot: usize,
@@ -100,14 +100,14 @@ pub enum Error {
         what: String,
     },
 
-    /// A number exceeds its limit, which bounds the memory used.
+    /// A size exceeds its limit. The limits bound the memory use.
     #[error("{name}: {found} is more than the limit of {most}")]
     Size {
-        /// Name of the counted quantity.
+        /// Name of the limited size.
         name: &'static str,
-        /// Given number.
+        /// Size that was found.
         found: usize,
-        /// Largest allowed number.
+        /// Largest allowed size.
         most: usize,
     },
 
@@ -137,10 +137,10 @@ pub enum Error {
         upper: f64,
     },
 
-    /// A term of a robot's cost does not fit the robot.
+    /// A cost term does not fit the robot.
     #[error("cost `{name}`: {what}")]
     Cost {
-        /// Name of the term.
+        /// Name of the cost term.
         name: String,
         /// Description of the fault, including the invalid numbers.
         what: String,
@@ -157,7 +157,7 @@ pub enum Error {
         what: String,
     },
 
-    /// A friction or wrench cone is invalid.
+    /// A friction cone or a wrench cone is invalid.
     #[error("cone: {what}")]
     Cone {
         /// Description of the fault, including the invalid numbers.
@@ -173,7 +173,7 @@ pub enum Error {
         what: String,
     },
 
-    /// The actuation does not fit the robot, or the robot cannot be driven.
+    /// The actuation does not fit the robot or the knot, or the robot's forward dynamics have no solution.
     #[error("actuation: {what}")]
     Actuation {
         /// Description of the fault, including the invalid numbers.
@@ -187,7 +187,7 @@ pub enum Error {
         dt: f64,
     },
 
-    /// A knot does not have a duration that could be set: an impact, or an action that is not integrated over time.
+    /// The duration of a knot cannot be set, because the knot is an impact or an action without integration over time.
     #[error("knot {knot}: its action has no duration")]
     NoDuration {
         /// Index of the knot.
@@ -206,12 +206,12 @@ pub enum Error {
     },
 }
 
-/// Returns the end of an error message that names the knot; empty without a knot.
+/// Returns the text that names the knot in an error message; empty without a knot.
 fn at(knot: Option<usize>) -> String {
     knot.map_or_else(String::new, |t| format!(" of knot {t}"))
 }
 
-/// Returns the name of the faulty model in the arguments of [`Problem::new`](crate::Problem::new).
+/// Returns the name of the faulty model, as an expression of the arguments of [`Problem::new`](crate::Problem::new).
 fn model_name(model: Option<usize>) -> String {
     model.map_or_else(|| "terminal".to_owned(), |index| format!("models[{index}]"))
 }
@@ -239,8 +239,8 @@ impl Error {
     }
 }
 
-/// Panics, also in release builds, with the argument's name if its length is wrong. A wrong length is a fault of the
-/// calling program.
+/// Panics with the argument's name if its length is wrong, in debug and release builds. A wrong length is a fault of
+/// the calling program.
 #[track_caller]
 pub(crate) fn assert_length(name: &str, found: usize, expected: usize) {
     assert!(found == expected, "`{name}` has length {found}, expected {expected}");

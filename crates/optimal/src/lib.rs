@@ -1,4 +1,5 @@
-//! Optimal control over a horizon: find the controls that minimise a sum of costs along a trajectory.
+//! Solution of optimal control problems over a horizon: computes the controls that minimise a sum of costs along a
+//! trajectory.
 //!
 //! ```text
 //! minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1
@@ -6,37 +7,38 @@
 //!
 //! # Overview
 //! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. A [`GroupModel`] computes several
-//!   knots, or step lengths, in one call.
+//!   knots, or several step lengths of one knot, in one call.
 //! - A [`Problem`] is a horizon of action models.
-//! - Around a trajectory, the problem is approximated as linear-quadratic in the changes δx, δu; each knot is then an
+//! - The problem around a trajectory is approximated as linear-quadratic in the changes δx, δu. Each knot is then an
 //!   [`LqKnot`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
 //!   value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
-//! - [`AugmentedLagrangian`] repeats such solves until general constraints hold: the constraints of [`Constrained`]
-//!   actions and a robot's [`Limit`](robot::Limit)s.
+//! - [`AugmentedLagrangian`] repeats solves by [`Fddp`] until general constraints hold: the constraints of
+//!   [`Constrained`] actions and a robot's [`Limit`](robot::Limit)s.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
-//! - [`AutoDiff`] turns dynamics and a cost that are written for any scalar into an action with exact derivatives by
-//!   dual numbers. [`AutoDiffConstraint`] does the same for a path constraint, [`robot::OwnResidual::autodiff`] for a
-//!   robot's residual.
+//! - [`AutoDiff`] turns dynamics and a cost that are generic over the scalar type into an action with exact derivatives
+//!   by dual numbers. [`AutoDiffConstraint`] does the same for a path constraint, [`robot::OwnResidual::autodiff`] for
+//!   a robot's residual.
 //! - [`NumDiff`] differentiates any action by finite differences: a reference for tests of hand-written derivatives.
 //!
 //! Only the module [`robot`] depends on robots. In all other modules a state is a list of nx numbers, and a change of a
-//! state has ndx numbers. An action may define how a change is added to a state, ⊕
+//! state is a list of ndx numbers. An action may define how a change is added to a state, ⊕
 //! ([`integrate`](ActionModel::integrate)), and how two states are subtracted, ⊖
 //! ([`difference`](ActionModel::difference)).
 //!
 //! # Conventions
-//! - Trajectories are flat: x₀ … x_N one after the other, then u₀ … u_{N−1}, each with as many numbers (nu) as its knot
-//!   has controls.
+//! - Trajectories are flat: the states x₀ … x_N one after the other, and the controls u₀ … u_{N−1}. A control has nu
+//!   numbers; nu may differ from knot to knot.
 //! - Derivatives are taken in the tangent space: A = ∂φ/∂x is ndx × ndx, whatever nx is.
 //! - The gap at a knot is f = φ(x, u) ⊖ x⁺; at the start x̂₀ ⊖ x₀. A warm start may have gaps.
-//! - The feedback is u = ū + α k + K (x ⊖ x̄). Here x̄, ū is the trajectory, α the step length, k the feed-forward and
-//!   K the gains. In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and Crocoddyl's `SolverFDDP` produce
-//!   the same iterates.
+//! - The feedback is u = ū + α k + K (x ⊖ x̄), where x̄, ū is the trajectory, α the step length, k the feed-forward
+//!   term and K the gain. In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and Crocoddyl's `SolverFDDP`
+//!   produce the same iterates.
 //! - Problems, solvers and solutions are `Send` and `Sync`. A problem is copied by [`Problem::try_clone`].
-//! - A wrong shape inside a program panics at the caller's line, with the argument's name. A wrong problem, warm start
-//!   or setting is an [`Error`] before a solve begins. The outcome of a solve is its [`Status`].
+//! - A wrong shape in the arguments of a call is a fault of the program: it panics at the caller's line, with the
+//!   argument's name. A wrong problem, warm start or setting is an [`Error`] before a solve begins. The outcome of a
+//!   solve is its [`Status`].
 //!
 //! # Example
 //! A pendulum swings up, from hanging (θ = 0) to upright (θ = π).

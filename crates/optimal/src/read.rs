@@ -1,5 +1,5 @@
-//! Matrices in files, as nalgebra writes them with serde: the entries column after column, then the numbers of rows and
-//! columns. The number of entries must equal rows × columns.
+//! Reading of matrices from files. The format is the one that nalgebra writes with serde: the entries column after
+//! column, then the numbers of rows and columns. The number of entries must equal rows × columns.
 
 use crate::lq::LqKnot;
 use nalgebra::DMatrix;

@@ -1,4 +1,4 @@
-//! Clock of a solve: the clock of the system. In a browser Rust has no clock, so the host provides one.
+//! Clock of a solve: the clock of the system. In a browser, where Rust has no clock, the host program provides one.
 
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 mod host;

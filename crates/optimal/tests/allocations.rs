@@ -1,4 +1,4 @@
-//! A solve does not allocate, once the solver and its trace exist.
+//! Allocations of a solve: none, once the solver and its trace exist.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]
@@ -22,7 +22,7 @@ fn a_sweep_allocates_nothing() {
     assert_eq!(allocations(|| sweep.run(&lq_knots, 1e-9).unwrap()), 0);
 }
 
-/// The test runs on one thread, because rayon itself allocates when threads share work.
+/// Counts the allocations of solves on one thread. (With several threads, rayon itself allocates.)
 #[test]
 fn a_sweep_in_segments_allocates_nothing() {
     let mut random = random();
@@ -46,7 +46,7 @@ fn a_solve_allocates_nothing() {
         let xs = straight(problem.x0(), problem.x0(), 50);
         let mut solver = Fddp::new(&problem);
         let mut iterations = 0;
-        // The first solve reserves the trace and the step lengths: two allocations.
+        // the first solve makes two allocations: the trace and the step lengths
         let first = allocations(|| {
             solver.solve_with(&mut problem, &xs, &[0.0; 50], |_: &Iteration| iterations += 1).unwrap();
         });
@@ -134,12 +134,12 @@ fn a_robots_solve_allocates_nothing() {
     }
 }
 
-/// A gait contains every kind of knot and residual: stance, an impact, and flight by Runge–Kutta.
+/// Counts the allocations of a gait with every kind of knot and residual: stance, an impact, and flight by Runge–Kutta.
 #[test]
 fn a_gait_allocates_nothing() {
     let model = std::sync::Arc::new(robots::quadruped());
     let mut q = neutral(&model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     let x0 = [q, vec![0.0; 18]].concat();
     let foot = |name: &str| ContactConstraint::point(model.frame(name).unwrap());
     let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, ContactConstraint { kd: 20.0, ..foot(name) }));
@@ -195,7 +195,7 @@ fn a_gait_allocates_nothing() {
     });
     assert_eq!(second, 0);
     assert!(solver.solution().trace.iter().any(|i| i.accepted));
-    // with three threads, nothing is allocated after the copies for these threads exist
+    // with three threads, nothing is allocated once the copies for these threads exist
     solver.settings.threads = 3;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let count = pool.install(|| {
@@ -207,7 +207,7 @@ fn a_gait_allocates_nothing() {
     assert_eq!(count, 0);
 }
 
-/// Changing multipliers, bounds and penalties does not allocate.
+/// Checks that changes of multipliers, bounds and penalties do not allocate.
 #[test]
 fn a_constrained_solve_of_a_robot_allocates_nothing() {
     let arm = std::sync::Arc::new(robots::arm7());
@@ -243,12 +243,13 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
     }
 }
 
-/// At first the feet stand. Then their forces exceed the limits, and limits become active that were inactive before.
+/// Counts the allocations of solves in which limits become active. The robot first stands; then the forces of its feet
+/// exceed the limits.
 #[test]
 fn active_rows_allocate_nothing() {
     let model = std::sync::Arc::new(robots::quadruped());
     let mut q = neutral(&model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     let x0 = [q, vec![0.0; 18]].concat();
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
     let contacts = feet.map(|name| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap())));
@@ -280,7 +281,7 @@ fn active_rows_allocate_nothing() {
     assert_eq!(counts[0], counts[2], "{counts:?}");
 }
 
-/// Height of the tool above a slope.
+/// Residual: the height of the tool above a slope.
 struct Height(usize);
 
 impl GenericResidual for Height {
@@ -293,7 +294,7 @@ impl GenericResidual for Height {
     }
 }
 
-/// User-defined residuals allocate nothing, and neither does a change of their target.
+/// Checks that user-defined residuals and changes of their targets do not allocate.
 #[test]
 fn own_residuals_and_changed_targets_allocate_nothing() {
     let arm = std::sync::Arc::new(robots::arm7());

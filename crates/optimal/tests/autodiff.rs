@@ -1,4 +1,4 @@
-//! Actions that are written for any scalar: exact derivatives of both orders, also on manifolds.
+//! Actions that are generic over the scalar type: exact first and second derivatives, also on manifolds.
 #![allow(non_snake_case)]
 
 use condyle_dynamics::{Data, Model, aba, difference, integrate, neutral, robots};
@@ -14,13 +14,13 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance between two exact methods, both of which factorise M.
+/// Tolerance of a comparison of two exact methods, each of which factorises M.
 const EXACT: f64 = 1e-9;
-/// Tolerance of central differences, first and second ones, for functions with values of one to a hundred.
+/// Tolerance of first and second central differences, for functions with values of one to a hundred.
 const DIFFERENCES: f64 = 1e-4;
 const DT: f64 = 0.05;
 
-/// Robot with semi-implicit Euler steps and the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
+/// Generic action of a robot with semi-implicit Euler steps and the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
 #[derive(Clone)]
 struct Steps {
     model: Arc<Model>,
@@ -154,7 +154,7 @@ fn an_action_of_any_scalar_is_solved() {
     assert_eq!(solution.status, Status::Converged);
 }
 
-/// Height of a point on a unit circle, x = (cos φ, sin φ), and a function of φ and u.
+/// Path constraint on a unit circle, x = (cos φ, sin φ): the height of the point, and a function of φ and u.
 #[derive(Clone)]
 struct OnCircle;
 
@@ -175,8 +175,8 @@ impl GenericConstraint for OnCircle {
     }
 }
 
-/// The derivatives are ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ), along the circle. Old
-/// entries of the matrices are overwritten.
+/// Checks the derivatives along the circle: ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ). Old
+/// entries of the matrices must be overwritten.
 #[test]
 fn constraints_of_any_scalar_are_differentiated_along_the_manifold() {
     let (x, u) = ([0.8, 0.6], [3.0]);

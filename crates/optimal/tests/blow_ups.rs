@@ -1,13 +1,13 @@
-//! Solves that diverge return their best iterate, and a resumed solve starts there.
-#![allow(non_snake_case)] // K
+//! Diverging solves, which return their best iterate. A resumed solve starts from that iterate.
+#![allow(non_snake_case)] // names follow the literature: K
 
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle_optimal::{AugmentedLagrangian, Fddp, Problem, Status, Sweep};
 use std::sync::Arc;
 
-/// Creates the problem of an arm that reaches for a point in 50 knots. The efforts are limited only by a tiny weight
-/// and by distant bounds.
+/// Creates the problem of an arm that reaches for a point in 50 knots. Only a tiny weight and distant bounds limit the
+/// efforts.
 fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Problem, Vec<f64>) {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
@@ -23,9 +23,9 @@ fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Prob
     (problem, x0.repeat(51))
 }
 
-/// Returns time steps, weights of efforts and weights of the point. Which of these problems diverge depends on the last
-/// digit of sums, and thus on the processor's vector instructions. There are enough problems for some to diverge on
-/// each processor.
+/// Returns time steps, weights of efforts and weights of the point. The last digit of sums decides which of these
+/// problems diverge, and this digit depends on the processor's SIMD level. There are enough problems for some to
+/// diverge on each processor.
 fn reckless() -> impl Iterator<Item = (f64, f64, f64)> {
     const EFFORTS: [f64; 7] = [1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2];
     let weights = |dt| EFFORTS.into_iter().flat_map(move |effort| [1e2, 1e3, 1e4].map(|point| (dt, effort, point)));
@@ -35,9 +35,9 @@ fn reckless() -> impl Iterator<Item = (f64, f64, f64)> {
 /// Number of diverging solves that are checked.
 const ENOUGH: usize = 4;
 
-/// Crocoddyl's rules may accept a step to an iterate that costs 1e16 times as much, at which no direction can be
-/// computed. The trace records this step. The solution is the iterate before this step, and the next solve begins
-/// there.
+/// Checks solves in which Crocoddyl's rules accept a step to an iterate that costs 1e16 times as much. No search
+/// direction can be computed at this iterate. The trace records the step, the solution is the iterate before the step,
+/// and a resumed solve begins at the solution.
 #[test]
 fn a_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
@@ -60,13 +60,13 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
             continue;
         };
         if trace[before - 1].cost > 1e5 {
-            continue; // skipped, because it diverges in several steps
+            continue; // skips a solve that diverges in several steps
         }
         blown_up += 1;
         let last = trace.last().unwrap();
         assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
-        // the solution is the iterate before the divergence: its cost and its gap are in consecutive records of the
-        // trace
+        // the solution is the iterate before the divergence; one record of the trace has its cost, the next record its
+        // gap
         assert!(solution.cost < 1e5, "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
         let (mut lq_knots, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
@@ -74,7 +74,7 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         assert!((numbers.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
         assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
         assert!(solution.k.iter().any(|k| k.amax() > 0.0));
-        // a resumed solve begins at the solution and does not end worse
+        // a resumed solve begins at the solution, and its result is not worse
         assert!(next.gap <= solution.gap && next.cost.is_finite(), "{} {}", next.gap, next.cost);
         assert!(next.trace.first().is_some_and(|first| first.gap == solution.gap));
         let (other, again, _) = run(2);
@@ -84,8 +84,9 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
     assert_eq!(blown_up, ENOUGH);
 }
 
-/// With bounds on the controls, where steps are quadratic programs, the solve also accepts an iterate that costs more
-/// than a hundred times as much. No direction can be found there, so the solve restores an earlier iterate.
+/// Checks diverging solves with bounds on the controls, whose steps are quadratic programs. Such a solve accepts an
+/// iterate that costs more than a hundred times as much. No search direction exists there, so the solve restores an
+/// earlier iterate.
 #[test]
 fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
@@ -103,7 +104,7 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
         blown_up += 1;
         assert!(last.accepted, "{last:?}");
         let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
-        // after a failure at its first step, the solve restores the warm start, whose gap is not yet closed
+        // if the first step fails, the solve restores the warm start, whose gap is not yet closed
         let is_guess = solution.xs == xs;
         assert!(solution.cost < last.cost && (solution.gap < most || is_guess), "{} {}", solution.cost, solution.gap);
         assert!(solution.us.iter().all(|u| u.abs() <= 1e6));
@@ -117,7 +118,7 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
     assert_eq!(blown_up, ENOUGH);
 }
 
-/// If a solve restores an iterate, the feedback of its solution comes from a sweep at that iterate.
+/// Checks that the feedback of a solution comes from a sweep at the restored iterate.
 #[test]
 fn the_feedback_is_that_of_the_iterate() {
     let mut blown_up = reckless().filter_map(|(dt, effort, point)| {
@@ -143,7 +144,7 @@ fn the_feedback_is_that_of_the_iterate() {
     }
 }
 
-/// A diverging solve within the augmented Lagrangian also returns its best iterate, with measured residuals.
+/// Checks that a diverging solve by the augmented Lagrangian also returns its best iterate, with measured residuals.
 #[test]
 fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
     let mut blown_up = reckless().filter_map(|(dt, effort, point)| {

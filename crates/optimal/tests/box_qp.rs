@@ -1,5 +1,5 @@
-//! Quadratic programs with bounds. The module is compiled into this test by itself, without the rest of the library.
-#![allow(non_snake_case)] // the names of the literature
+//! Quadratic programs with bounds. This test compiles the library's module directly, without the rest of the library.
+#![allow(non_snake_case)] // names follow the literature
 
 #[allow(dead_code)] // only the sweep uses all items of the module
 #[path = "../src/lq/box_qp.rs"]
@@ -8,7 +8,7 @@ mod box_qp;
 use box_qp::BoxQp;
 use nalgebra::DMatrix;
 
-/// Tolerance of the conditions of optimality. Entries have size one, and the last Newton step is exact for its free
+/// Tolerance of the optimality conditions. Entries have size one, and the last Newton step is exact for its free
 /// variables.
 const KKT: f64 = 1e-10;
 
@@ -18,7 +18,8 @@ fn solve(H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64]) -> Result<Bo
     Ok(qp)
 }
 
-/// The gradient is zero for free variables, and points out of the box for the other variables.
+/// Checks the optimality conditions: the gradient is zero for free variables, and its negative points outside the
+/// bounds for all other variables.
 #[test]
 fn solutions_satisfy_the_conditions_of_optimality() {
     for size in 1..13 {
@@ -33,7 +34,7 @@ fn solutions_satisfy_the_conditions_of_optimality() {
             let qp = solve(&H, &q, &lower, &upper).unwrap();
             for i in 0..size {
                 let gradient = q[i] + (0..size).map(|j| H[(i, j)] * qp.x[j]).sum::<f64>();
-                // an optimal x is the projection of x − ∇ into the box
+                // an optimal x equals x − ∇ projected on the bounds
                 let error = (qp.x[i] - (qp.x[i] - gradient).min(upper[i]).max(lower[i])).abs();
                 assert!(error < KKT, "size {size}, case {case}, variable {i}: {error:e}");
                 assert!(lower[i] <= qp.x[i] && qp.x[i] <= upper[i]);

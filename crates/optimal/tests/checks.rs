@@ -1,5 +1,5 @@
-//! Invalid arguments are reported by name, with their numbers, by the function that receives them. They never cause a
-//! NaN, a wrong result or an abort later.
+//! Each function reports invalid arguments with their names and the invalid numbers. Invalid arguments never cause a
+//! NaN, a wrong result or a later abort.
 
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Error as ModelError, Force, Mat3, Motion, Se3, Vec3, neutral, robots,
@@ -19,7 +19,7 @@ fn half_turned() -> Mat3<f64> {
     Mat3 { x: Vec3::new(0.5, 0.0, 0.0), ..Mat3::identity() }
 }
 
-/// Returns the error text for a cost term of a standing quadruped.
+/// Returns the error text for an invalid cost term of a standing quadruped.
 fn said(residual: Residual, activation: Activation) -> String {
     let quadruped = Arc::new(robots::quadruped());
     let foot = Contact::new("foot", ContactConstraint::rigid(quadruped.frame("LF_foot").unwrap()));
@@ -46,7 +46,7 @@ fn rotations_that_are_none_are_refused() {
     reference[6] = 0.5;
     let message = "cost `c`: its reference: joint `root_joint`: its rotation, q[3..7], has the length 0.5, expected 1";
     assert_eq!(said(Residual::State { reference }, plain), message);
-    // the target of a contact must be valid, both when it is created and when it is changed
+    // the target force of a contact must be valid, when the residual is created and when the target is changed
     let quadruped = robots::quadruped();
     let foot = ContactConstraint::point(quadruped.frame("LF_foot").unwrap());
     let bad = |change: fn(&mut ContactConstraint)| {
@@ -133,7 +133,7 @@ fn states_are_states() {
     assert_eq!(error.to_string(), format!("`xs`, knot 2: {what}"));
     bad[3..7].fill(0.0);
     assert!(problem.set_x0(&bad).is_err());
-    // 0.707 is accepted as an approximation of √½
+    // a quaternion with 0.707 in place of √½ is accepted
     bad[3..7].copy_from_slice(&[0.707, 0.0, 0.0, 0.707]);
     assert_eq!(problem.set_x0(&bad), Ok(()));
 }
@@ -186,7 +186,7 @@ fn settings_that_make_no_sense_are_refused() {
     assert_eq!(error.to_string(), "setting `max_solves` is 0, but it must be at least 1");
 }
 
-/// Action with any number of states and controls that computes nothing.
+/// Action that computes nothing, with any number of states and controls.
 struct Huge {
     nx: usize,
     nu: usize,
@@ -227,7 +227,7 @@ fn sizes_beyond_memory_are_refused_before_it_is_asked_for() {
     assert_eq!(knot.set_limits(1_000_000_000, vec![]), Err(far));
 }
 
-/// Reads a problem from a file that `change` has modified.
+/// Reads a problem from a file whose content `change` has modified.
 fn file(change: impl FnOnce(&mut Value)) -> Result<(), String> {
     let arm = robots::arm7();
     let effort = Cost::new("effort", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);

@@ -1,6 +1,6 @@
-//! Constrained problems: comparison with IPOPT's optima, the conditions of optimality, and infeasible problems.
+//! Constrained problems: comparison with IPOPT's optima, optimality conditions, and infeasible problems.
 
-#![allow(non_snake_case)] // Q
+#![allow(non_snake_case)] // names follow the literature: Q
 
 mod common;
 
@@ -12,13 +12,13 @@ use condyle_optimal::{
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-/// Tolerances of comparisons with IPOPT. Both solvers stop at residuals of 1e-7 or less. Near an optimum, costs change
-/// less than the residuals; states and controls change as much.
+/// Tolerance of costs in comparisons with IPOPT. Both solvers stop at residuals of 1e-7 or less. Near an optimum, costs
+/// change less than the residuals, but states and controls change as much as the residuals.
 const COST: f64 = 1e-6;
 const TRAJECTORY: f64 = 1e-4;
 
-/// Constraint lower ≤ C (x, u) + distance ≤ upper. With `disc`, its first row is replaced by the squared distance from
-/// a point.
+/// Constraint lower ≤ C (x, u) + distance ≤ upper. If `disc` is set, the first row is the squared distance from a point
+/// instead.
 struct Rows {
     c: DMatrix<f64>,
     lower: Vec<f64>,
@@ -72,7 +72,7 @@ fn reference(name: &str) -> Value {
     data[name].clone()
 }
 
-/// Solves a problem, and compares the solution with IPOPT's.
+/// Solves a problem and compares the solution with IPOPT's solution.
 fn compare(reference: &Value, running: Constrained, terminal: Constrained) {
     let (x0, horizon) = (numbers(&reference["x0"]), reference["horizon"].as_u64().unwrap() as usize);
     let mut problem = Problem::new(x0.clone(), vec![Box::new(running)], vec![0; horizon], Box::new(terminal)).unwrap();
@@ -104,8 +104,8 @@ fn compare(reference: &Value, running: Constrained, terminal: Constrained) {
     }
 }
 
-/// The state moves around a disc and comes to rest at the origin. This problem has a nonconvex inequality on the state,
-/// bounds, and terminal equalities.
+/// Compares a unicycle's optimum with IPOPT's: the unicycle moves around a disc and comes to rest at the origin. The
+/// problem has a nonconvex inequality on the state, bounds, and terminal equalities.
 #[test]
 fn parking_is_ipopts() {
     let reference = reference("park");
@@ -123,7 +123,7 @@ fn parking_is_ipopts() {
     compare(&reference, running, terminal);
 }
 
-/// A falling pole is caught on a short track with little force.
+/// Compares a cart-pole's optimum with IPOPT's: a falling pole is caught on a short track with a small force.
 #[test]
 fn catching_a_pole_is_ipopts() {
     let rows = Rows::new(&[(&[1.0, 0.0, 0.0, 0.0, 0.0], -0.42, 0.3), (&[0.0, 0.0, 0.0, 0.0, 1.0], -11.0, 8.0)]);
@@ -135,7 +135,7 @@ fn catching_a_pole_is_ipopts() {
     compare(&reference("catch"), running, Constrained::new(Box::new(last), Box::new(Rows::new(&end))));
 }
 
-/// The optimum of a linear-quadratic problem with terminal equalities is the solution of one linear system.
+/// Compares the optimum of a linear-quadratic problem with terminal equalities with the solution of one linear system.
 #[test]
 fn equalities_of_a_linear_problem_are_a_linear_system() {
     let mut random = random();
@@ -154,7 +154,7 @@ fn equalities_of_a_linear_problem_are_a_linear_system() {
     let solution = solver.solve(&mut problem, &vec![0.0; n * (horizon + 1)], &vec![0.0; m * horizon]).unwrap();
     assert_eq!(solution.status, Status::Converged);
 
-    // unknowns: u₀, x₁, u₁, …, x_N, then the multipliers of the dynamics, then y
+    // unknowns of the system: u₀, x₁, u₁, …, x_N, then the multipliers of the dynamics, then y
     let (block, primal) = (n + m, (n + m) * horizon);
     let size = primal + n * horizon + 2;
     let (mut kkt, mut rhs) = (DMatrix::zeros(size, size), DVector::zeros(size));
@@ -194,7 +194,7 @@ fn equalities_of_a_linear_problem_are_a_linear_system() {
     }
 }
 
-/// The derivatives of the augmented Lagrangian's terms are correct, both within and outside a constraint's bounds.
+/// Checks the derivatives of the augmented Lagrangian's terms, within and outside a constraint's bounds.
 #[test]
 fn derivatives_are_those_of_the_terms() {
     let rows = || {
@@ -212,7 +212,7 @@ fn derivatives_are_those_of_the_terms() {
     }
 }
 
-/// Constraint that returns NaN once the state has moved.
+/// Constraint whose value is NaN if the state differs from the initial state.
 struct Broken;
 
 impl PathConstraint for Broken {
@@ -278,8 +278,8 @@ fn what_cannot_be_met_is_said() {
     assert_eq!(error, "knot 10: constraint 0 must be at least 2 and at most 1");
 }
 
-/// An inner solve that stops early at the largest penalty does not prove that constraints are violated, so it keeps its
-/// status.
+/// Checks that an inner solve that stops early at the largest penalty keeps its status, because it does not prove that
+/// constraints are violated.
 #[test]
 fn a_solve_that_stops_early_claims_nothing() {
     let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -1.0, 1.0)]);
@@ -297,8 +297,8 @@ fn a_solve_that_stops_early_claims_nothing() {
     assert!(!matches!(status, Status::Infeasible | Status::ConstraintsViolated), "{status:?}");
 }
 
-/// At a knot without controls, a violated constraint on the initial state proves infeasibility. At a knot with controls
-/// it does not, because a user-defined constraint may depend on the controls.
+/// Checks when a violated constraint on the initial state proves infeasibility: at a knot without controls. At a knot
+/// with controls there is no proof, because a user-defined constraint may depend on the controls.
 #[test]
 fn what_is_infeasible_is_proved() {
     let solve = |nu: usize| {
@@ -319,7 +319,7 @@ fn what_is_infeasible_is_proved() {
     let worst = outcome.worst.unwrap();
     assert_eq!((worst.knot, worst.row, worst.amount), (0, 0, 0.25));
     assert_eq!(worst.to_string(), "knot 0: constraint 0 is 2.500e-1 beyond its bound");
-    // the other constraint holds, and the penalty stays below 1e8
+    // the other constraint is satisfied, and the penalty stays below 1e8
     assert!((solution.x(10)[0] - 0.5).abs() < 1e-6 && outcome.penalty < 1e8, "{}", outcome.penalty);
     let (solution, outcome) = solve(2);
     assert!(!matches!(solution.status, Status::Infeasible | Status::Converged), "{:?}", solution.status);

@@ -1,4 +1,5 @@
-//! All iterates equal Crocoddyl's. `data/make_crocoddyl.py` wrote the reference numbers, with Crocoddyl 3.2.1.
+//! Comparison of all iterates with Crocoddyl's. `data/make_crocoddyl.py` wrote the reference numbers, with Crocoddyl
+//! 3.2.1.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,12 +8,12 @@ use common::{limited_cartpole, limited_unicycle, straight};
 use condyle_optimal::{DdpMethod, Fddp, Problem, Status};
 use serde_json::Value;
 
-/// Relative tolerance of costs. Two implementations with different rounding differ by about the condition number of the
-/// problem times 1e-16. Crocoddyl with a warm start perturbed by 1e-12 reproduces its own costs to 1e-11.
+/// Relative tolerance of costs. Two implementations with different rounding differ by about 1e-16 times the condition
+/// number of the problem. With a warm start perturbed by 1e-12, Crocoddyl reproduces its own costs to 1e-11.
 const COST: f64 = 1e-9;
 
-/// Relative tolerance of states, of gains, and of differences of nearly equal numbers. The optimum determines them less
-/// accurately than its cost.
+/// Relative tolerance of states, of gains, and of differences of nearly equal numbers. These quantities are less well
+/// determined near the optimum than the cost.
 const DETAIL: f64 = 1e-6;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -31,7 +32,8 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
 /// Function that creates a problem from x̂₀, horizon, number of lanes and bounds on the controls.
 type Build = fn(&[f64], usize, usize, Option<[Vec<f64>; 2]>) -> Problem;
 
-/// Solves the problem `name` with line searches of `lanes` step lengths at a time, and compares all results.
+/// Solves the problem `name` and compares all results. Each line search evaluates up to `lanes` step lengths in one
+/// group.
 fn compare(name: &str, build: Build, lanes: usize) {
     let data: Value = serde_json::from_str(include_str!("data/crocoddyl.json")).unwrap();
     let reference = &data["problems"][name];
@@ -42,7 +44,7 @@ fn compare(name: &str, build: Build, lanes: usize) {
     let us = vec![0.0; problem.control_range(horizon).end];
 
     let mut solver = Fddp::new(&problem);
-    solver.settings.project_warm_start = false; // Crocoddyl keeps a warm start outside the bounds
+    solver.settings.project_warm_start = false; // Crocoddyl does not move a warm start into the bounds
     solver.settings.method = if reference["method"] == "ddp" { DdpMethod::Ddp } else { DdpMethod::Fddp };
     solver.settings.max_iterations = reference["max_iterations"].as_u64().unwrap() as usize;
     solver.settings.regularisation_start = reference["regularisation"].as_f64().unwrap();
@@ -71,7 +73,7 @@ fn compare(name: &str, build: Build, lanes: usize) {
     let (u0, x_last) = (numbers(&reference["u0"]), numbers(&reference["x_last"]));
     assert!(solution.u(0).iter().zip(&u0).all(|(a, b)| close(*a, *b, DETAIL)), "{name}: {:?} {u0:?}", solution.u(0));
     assert!(solution.x(horizon).iter().zip(&x_last).all(|(a, b)| close(*a, *b, DETAIL)), "{name}");
-    // Crocoddyl's gains are row-major and have the opposite sign; the gains here are column-major.
+    // Crocoddyl's gains are row-major and have the opposite sign; the gains of Condyle are column-major
     let K0 = numbers(&reference["K0"]);
     assert!(
         solution.K[0].transpose().iter().zip(&K0).all(|(a, b)| close(*a, -b, DETAIL)),
@@ -109,7 +111,8 @@ fn cartpole_with_gaps() {
     }
 }
 
-/// A warm start far from any solution leads to short steps, and to a regularisation that rises and falls.
+/// Compares a solve from a warm start far from any solution, with short steps and a regularisation that rises and
+/// falls.
 #[test]
 fn cartpole_spinning() {
     for lanes in [1, 8] {

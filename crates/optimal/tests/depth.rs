@@ -7,13 +7,13 @@ use nalgebra::DMatrix;
 use std::backtrace::Backtrace;
 use std::sync::Mutex;
 
-/// Maximum number of nested calls, so that a reader can follow them.
+/// Maximum number of nested calls. The limit keeps the call chain readable.
 const MOST: usize = 10;
 
-/// Names of the nested calls that led to the last evaluation.
+/// Names of the nested calls, from the solve to the last evaluation of the dynamics.
 static CALLS: Mutex<String> = Mutex::new(String::new());
 
-/// Dynamics with the accelerations q̈ = u, and a cost.
+/// Dynamics with the accelerations q̈ = u and a cost, which record the call stack.
 struct Probe {
     controls: usize,
     zero: DMatrix<f64>,

@@ -1,6 +1,6 @@
-//! Robots with limits: comparisons with closed forms, with IPOPT's optimum, and with other formulations; friction cones
-//! hold.
-#![allow(non_snake_case)] // G
+//! Robots with limits: comparisons with closed forms, with IPOPT's optimum, and with other formulations. Also checks
+//! friction cones.
+#![allow(non_snake_case)] // names follow the literature: G
 
 #[path = "limits/starts.rs"]
 mod starts;
@@ -21,11 +21,11 @@ use serde_json::Value;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Tolerances: both solvers stop at residuals of 1e-7 or less. The cost is flat there; states and controls follow the
-/// residuals.
+/// Tolerance of costs in the comparison with IPOPT. Both solvers stop at residuals of 1e-7 or less. Near the optimum,
+/// costs change less than the residuals, but states and controls change as much.
 const COST: f64 = 1e-6;
 const TRAJECTORY: f64 = 1e-4;
-/// Tolerances of the constraints and of the gradient at the end of a solve.
+/// Tolerance of the constraints at the end of a solve; the next constant is the tolerance of the gradient.
 const PRIMAL: f64 = 1e-7;
 const DUAL: f64 = 1e-6;
 
@@ -44,7 +44,7 @@ fn solver(problem: &Problem) -> AugmentedLagrangian {
     solver
 }
 
-/// Solves, and asserts that the residuals are below the tolerances.
+/// Solves a problem, and asserts that the residuals are below the tolerances.
 fn solve(problem: &mut Problem, xs: &[f64], us: &[f64]) -> AugmentedLagrangian {
     let mut solver = solver(problem);
     let status = solver.solve(problem, xs, us).unwrap().status;
@@ -63,12 +63,13 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
 }
 
-/// Largest effort of the arm (N m); holding the initial posture takes 29.6 at the second joint.
+/// Maximum effort of the arm's joints (N m). To hold the initial posture, the second joint needs 29.6 N m.
 const WEAK: f64 = 30.0;
 const ARM: [f64; 14] = [0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
-/// A cart on rails goes to a point and stops there, G u = d, at the cost ½ Δt ‖u‖². The solution is u = Gᵀ(G Gᵀ)⁻¹ d,
-/// with the multipliers −Δt (G Gᵀ)⁻¹ d. An additional bound on u is satisfied, too.
+/// Compares the motion of a cart on rails with its closed form. The cart moves to a point and stops there, G u = d, at
+/// the cost ½ Δt ‖u‖². The solution is u = Gᵀ(G Gᵀ)⁻¹ d, with the multipliers −Δt (G Gᵀ)⁻¹ d. An additional bound on u
+/// is satisfied too.
 #[test]
 fn a_cart_is_a_closed_form() {
     let mut builder = ModelBuilder::new("cart");
@@ -87,7 +88,7 @@ fn a_cart_is_a_closed_form() {
         let solver = solve(&mut problem, &[0.0; 22], &[0.0; 10]);
         (solver.solution().us.clone(), solver.outcome().multipliers.clone())
     };
-    // v_N = Σ u Δt / m,  x_N = Σ (N − t) u Δt² / m
+    // final velocity and position: v_N = Σ u Δt / m, x_N = Σ (N − t) u Δt² / m
     let G = DMatrix::from_fn(2, horizon, |i, t| {
         let a = dt / mass;
         if i == 0 { a * dt * (horizon - t) as f64 } else { a }
@@ -109,8 +110,8 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().flat_map(of).collect()
 }
 
-/// The arm comes to rest with its tool at a point, with active bounds on efforts and speeds. The controls are efforts,
-/// then accelerations.
+/// Compares the optimum of an arm with IPOPT's. The arm comes to rest with its tool at a point, with active bounds on
+/// efforts and speeds. The controls are efforts in one problem, and accelerations in the other.
 #[test]
 fn reaching_is_ipopts() {
     let data: Value = serde_json::from_str(include_str!("data/ipopt.json")).unwrap();
@@ -158,14 +159,14 @@ fn reaching_is_ipopts() {
         let tool =
             forward_kinematics(&arm, &mut Data::new(&arm), &solution.x(horizon)[..7]).frame(arm.frame("tool").unwrap());
         assert!(largest_difference(&tool.translation.to_array(), &target) < 2.0 * PRIMAL);
-        // 7 efforts and 14 states per knot, 3 + 14 at the terminal knot; some of them are active
+        // each knot limits 7 efforts and 14 states, the terminal knot 3 + 14 entries; some of the limits are active
         assert!(outcome.multipliers[..horizon].iter().all(|y| y.len() == 21));
         assert_eq!(outcome.multipliers[horizon].len(), 17);
         assert!(outcome.multipliers.iter().flatten().filter(|y| **y != 0.0).count() > 20);
     }
 }
 
-/// Constraint |u| ≤ bound, as a user writes it.
+/// User-defined constraint |u| ≤ bound.
 struct Weak {
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -188,8 +189,8 @@ impl PathConstraint for Weak {
     }
 }
 
-/// The same bounds give the same optimum as a robot's limit, as a user's constraint, half and half, and with other
-/// settings.
+/// Checks that the same bounds give the same optimum as a robot's limit, as a user-defined constraint, as a mixture of
+/// both, and with other settings.
 #[test]
 fn limits_and_constraints_find_one_optimum() {
     let arm = Arc::new(robots::arm7());
@@ -243,7 +244,7 @@ fn limits_and_constraints_find_one_optimum() {
         assert!((theirs.cost - outcome.cost).abs() < COST * outcome.cost, "way {k}");
         assert!(largest_difference(&other, &us) < 10.0 * TRAJECTORY, "way {k}");
         for (y, found) in outcome.multipliers[..horizon].iter().zip(&theirs.multipliers) {
-            // the rows of a robot's limits come first, then the rows of a constraint around it
+            // the rows of a robot's limits come first, then the rows of the constraint that wraps the robot's action
             let found: Vec<_> = match found.len() {
                 7 => found.clone(),
                 _ => [&found[..2], &found[9..]].concat(),
@@ -251,17 +252,18 @@ fn limits_and_constraints_find_one_optimum() {
             assert!(largest_difference(y, &found) < 1e-3, "way {k}");
         }
     }
-    // copies for threads have the multipliers of their models
+    // the copies for threads have the same multipliers as their models
     let (threaded, theirs) = run(Box::new(limited(0..7)), &|solver| solver.inner.threads = 2);
     assert_eq!((threaded, theirs), (us, outcome));
 }
 
-/// A quadruped shifts its trunk so fast that it would slip: the cone of each foot holds, and is active.
+/// Checks the friction cones of a quadruped that moves its trunk so fast that it would slip. The cone of each foot is
+/// satisfied, and is active.
 #[test]
 fn a_stance_does_not_slip() {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     let x0 = [q, vec![0.0; 18]].concat();
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
     let reference = ReferenceFrame::LocalWorldAligned;
@@ -282,7 +284,7 @@ fn a_stance_does_not_slip() {
         let residual = Residual::FrictionCone { contact: foot.into(), cone: cone.clone() };
         Limit::new(foot, residual, lower.clone(), upper.clone())
     };
-    // largest excess of a force beyond its cone along a trajectory, and the number of rows at their bounds
+    // returns the largest excess of a force beyond its cone along a trajectory, and the number of rows at their bounds
     let slip = |xs: &[f64], us: &[f64]| {
         let (mut data, mut set) = (Data::new(&model), ConstraintSet::new(&model, &held).unwrap());
         let (mut worst, mut active) = (f64::NEG_INFINITY, 0);
@@ -319,7 +321,7 @@ fn a_stance_does_not_slip() {
     assert!(bound.cost > free.cost, "what is bound costs more");
 }
 
-/// With another integrator, limits hold at the knots.
+/// Checks that limits are satisfied at the knots with another integrator.
 #[test]
 fn limits_hold_with_runge_kutta() {
     let arm = Arc::new(robots::arm7());
@@ -339,7 +341,8 @@ fn limits_hold_with_runge_kutta() {
     assert!(speeds.iter().all(|v| *v < 0.3 + PRIMAL) && speeds.iter().any(|v| (v - 0.3).abs() < 1e-6), "{speeds:?}");
 }
 
-/// For FDDP alone, a limit is the barrier 10 · ½ (excess)², the same as a cost with that weight per Δt.
+/// Checks the value of a limit in a solve by FDDP alone: the barrier 10 · ½ (excess)². A cost with this weight per Δt
+/// gives the same value.
 #[test]
 fn alone_a_limit_is_a_barrier() {
     let arm: Arc<Model> = Arc::new(robots::arm7());
@@ -355,7 +358,7 @@ fn alone_a_limit_is_a_barrier() {
     let [one, other] = [by_cost, by_limit].map(|knot| {
         let end = FreeDynamics::terminal(arm.clone(), costs()).unwrap();
         let mut problem = Problem::new(ARM.to_vec(), vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
-        // after a constrained solve, the problem's multipliers are reset
+        // after a constrained solve, the problem's multipliers are zero again
         AugmentedLagrangian::new(&problem).solve(&mut problem, &ARM.repeat(11), &[0.0; 70]).unwrap();
         Fddp::new(&problem).solve(&mut problem, &ARM.repeat(11), &[0.0; 70]).unwrap().clone()
     });
@@ -363,7 +366,8 @@ fn alone_a_limit_is_a_barrier() {
     assert!((one.cost - other.cost).abs() < 1e-9 * one.cost && largest_difference(&one.us, &other.us) < 1e-6);
 }
 
-/// Height of a foot, and its product with a control; the derivatives come from the Jacobian or are missing.
+/// User-defined residual: the height of a foot, and the product of this height with a control. The Jacobian is
+/// optional.
 struct Step {
     model: Arc<Model>,
     frame: usize,
@@ -399,7 +403,7 @@ impl PathConstraint for Step {
     }
 }
 
-/// For constraints without derivatives, differences in the tangent space are used.
+/// Checks constraints without derivatives, for which the solver takes differences in the tangent space.
 #[test]
 fn constraints_need_no_derivatives() {
     let model = Arc::new(robots::quadruped());
@@ -423,7 +427,8 @@ fn constraints_need_no_derivatives() {
     assert!((written.Q - other.Q).amax() < 1e-7 && (written.S - other.S).amax() < 1e-7);
 }
 
-/// A receding horizon that keeps its multipliers finds the same solution as one without them, in fewer iterations.
+/// Checks a receding horizon that keeps its multipliers. It finds the same solution as a horizon without them, in fewer
+/// iterations.
 #[test]
 fn a_receding_horizon_keeps_its_multipliers() {
     let (arm, horizon) = (Arc::new(robots::arm7()), 12);
@@ -463,7 +468,7 @@ fn a_receding_horizon_keeps_its_multipliers() {
     }
     println!("{} iterations with multipliers, {} without, {active} controls at a limit", iterations[0], iterations[1]);
     assert!(active > 0 && 3 * iterations[0] < 2 * iterations[1]);
-    // once more from the solution: no work is left
+    // a solve that starts from the solution has nothing to improve
     let (us, multipliers) = (solver.solution().us.clone(), solver.outcome().multipliers.clone());
     let again = solver.resume(&mut problem).unwrap();
     assert!(again.status == Status::Converged && largest_difference(&again.us, &us) < TRAJECTORY);
@@ -471,7 +476,7 @@ fn a_receding_horizon_keeps_its_multipliers() {
     assert_eq!(solver.outcome().solves, 1);
     let worst = multipliers.iter().zip(&solver.outcome().multipliers).map(|(a, b)| largest_difference(a, b));
     assert!(worst.fold(0.0, f64::max) < 1e-3);
-    // the time limit applies to all solves together, and the remaining violation is measured
+    // the time limit applies to all inner solves together, and the remaining violation is measured
     solver.inner.time_budget = Some(Duration::ZERO);
     problem.set_x0(&ARM).unwrap();
     let late = solver.resume(&mut problem).unwrap();

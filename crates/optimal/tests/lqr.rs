@@ -1,4 +1,4 @@
-//! Linear-quadratic problems: the sweep solves them exactly, and FDDP solves them in one iteration.
+//! Linear-quadratic problems, which the sweep solves exactly and FDDP solves in one iteration.
 #![allow(non_snake_case)]
 
 mod common;
@@ -10,16 +10,17 @@ use condyle_optimal::{
 };
 use nalgebra::{DMatrix, DVector};
 
-/// Tolerance of random problems with entries of size one, whose value functions grow to about 1e3 over the horizon.
+/// Tolerance for random problems with entries of size one. Their value functions grow to about 1e3 over the horizon.
 const RESIDUAL: f64 = 1e-9;
 
-/// Tolerance of a sum of a few dozen products, added in another order.
+/// Tolerance for a sum of a few dozen products that is added in another order.
 const ROUNDING: f64 = 1e-13;
 
-/// Tolerance of second differences: with steps of 1e-4 they are accurate to about 1e-7.
+/// Tolerance of second differences, which are accurate to about 1e-7 with steps of 1e-4.
 const DIFFERENCES: f64 = 1e-6;
 
-/// The solution of a random LQ problem, from gains and value functions, satisfies the Karush–Kuhn–Tucker conditions.
+/// Checks the Karush–Kuhn–Tucker conditions of a random LQ problem. The solution follows from the gains and value
+/// functions.
 #[test]
 fn kkt_residual_vanishes() {
     let mut random = random();
@@ -44,7 +45,7 @@ fn kkt_residual_vanishes() {
         for t in 0..horizon {
             let (knot, x, u, next) = (&lq_knots[t], &xs[t], &us[t], multiplier(t + 1));
             let scale = 1.0 + next.amax();
-            // conditions: Q δx + S δu + q + Aᵀλ⁺ = λ,   Sᵀδx + R δu + r + Bᵀλ⁺ = 0
+            // the Karush–Kuhn–Tucker conditions are Q δx + S δu + q + Aᵀλ⁺ = λ, Sᵀδx + R δu + r + Bᵀλ⁺ = 0
             let state = &knot.Q * x + &knot.S * u + &knot.q + knot.A.transpose() * &next - multiplier(t);
             let control = knot.S.transpose() * x + &knot.R * u + &knot.r + knot.B.transpose() * &next;
             assert!(state.amax() < RESIDUAL * scale, "ndx {ndx}, knot {t}: {:e}", state.amax());
@@ -55,7 +56,7 @@ fn kkt_residual_vanishes() {
     }
 }
 
-/// With the regularisation ϱ: Quu = R + BᵀVB + ϱ I, K = −Quu⁻¹(Sᵀ + BᵀVA), V = Q + AᵀVA − KᵀQuu K + ϱ I.
+/// Checks a sweep with the regularisation ϱ: Quu = R + BᵀVB + ϱ I, K = −Quu⁻¹(Sᵀ + BᵀVA), V = Q + AᵀVA − KᵀQuu K + ϱ I.
 #[test]
 fn regularised_step_is_the_textbook_one() {
     let (mut random, regularisation) = (random(), 0.3);
@@ -82,7 +83,7 @@ fn regularised_step_is_the_textbook_one() {
     }
 }
 
-/// A sweep gives the same result whether the structure of A and B is known or not, at knots of all sizes.
+/// Checks that a sweep gives the same result with known and unknown structure of A and B, at knots of all sizes.
 #[test]
 fn the_form_of_euler_steps_changes_nothing() {
     let mut random = random();
@@ -146,7 +147,7 @@ fn sweep_names_the_knot_that_is_not_convex() {
     assert_eq!(sweep.run(&lq_knots, 1e5), Err(SweepError::NotFinite { knot: 3 }));
 }
 
-/// For a knot with constraint rows, a sweep and a solver return an error that names the knot.
+/// Checks that a sweep and a solver return an error for a knot with constraint rows, and that the error names the knot.
 #[test]
 fn constraint_rows_are_refused() {
     let mut random = random();
@@ -165,7 +166,7 @@ fn constraint_rows_are_refused() {
     }
 }
 
-/// Action whose derivatives have a constraint row.
+/// Action whose derivatives contain a constraint row.
 struct Limited;
 
 impl ActionModel for Limited {
@@ -188,7 +189,7 @@ impl ActionModel for Limited {
     }
 }
 
-/// When derivatives are computed again, their constraint rows replace the old rows.
+/// Checks that the constraint rows of new derivatives replace the old rows.
 #[test]
 fn an_action_writes_constraint_rows() {
     let end = Lqr::new(LqKnot::zeros(1, 0));
@@ -210,7 +211,7 @@ fn a_solver_refuses_constraint_rows() {
     let _ = Fddp::new(&problem).solve(&mut problem, &[0.5; 3], &[0.0; 2]);
 }
 
-/// Zeros before and after the entries of a row are not stored.
+/// Checks that zeros at both ends of a constraint row are not stored.
 #[test]
 fn constraint_rows_are_compact() {
     let mut rows = ConstraintRows::default();
@@ -231,7 +232,8 @@ fn constraint_rows_fit_their_knot() {
     Sweep::new(&knots);
 }
 
-/// One full step solves the problem from any start, with or without gaps; the second iteration only confirms this.
+/// Checks that one full step solves the problem from any start, with or without gaps. The second iteration only
+/// confirms convergence.
 #[test]
 fn fddp_solves_an_lqr_in_one_iteration() {
     let mut random = random();
@@ -248,7 +250,7 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     let us = random_matrix(&mut random, problem.control_range(horizon).end, 1);
 
     let mut solver = Fddp::new(&problem);
-    // The regularisation changes the first step by about the value of the regularisation.
+    // the regularisation changes the first step by about its own value
     solver.settings =
         Settings { tolerance: 1e-6, regularisation_start: 1e-15, regularisation_min: 1e-15, ..Settings::default() };
     let solution = solver.solve(&mut problem, xs.as_slice(), us.as_slice()).unwrap();
@@ -286,7 +288,7 @@ fn an_lqr_is_its_knot() {
     assert!((&written.q - &numeric.q).amax() < DIFFERENCES && (&written.r - &numeric.r).amax() < DIFFERENCES);
 }
 
-/// Where the optimal control is far beyond its bound, the control equals the bound.
+/// Checks that a control equals its bound if the optimum without bounds is far outside.
 #[test]
 fn bounds_of_a_node_are_those_of_its_action() {
     let (mut knot, mut end) = (LqKnot::zeros(1, 1), LqKnot::zeros(1, 0));

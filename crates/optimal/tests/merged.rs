@@ -1,5 +1,5 @@
-//! One action per knot: models of a robot that differ only in costs, references and weights are computed as one group,
-//! and the results are bit-identical.
+//! Problems with one action per knot. Models of a robot that differ only in costs, references and weights are computed
+//! as one group, and the results are bit-identical.
 
 use condyle_dynamics::{ContactConstraint, Model, Vec3, neutral, robots};
 use condyle_optimal::robot::{
@@ -12,7 +12,7 @@ const KNOTS: usize = 13;
 
 fn x0(model: &Model) -> Vec<f64> {
     let mut q = neutral(model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     [q, vec![0.0; 18]].concat()
 }
 
@@ -20,7 +20,8 @@ fn quadratic(name: &str, weight: f64, residual: Residual) -> Cost {
     Cost::new(name, weight, residual, Activation::Quadratic)
 }
 
-/// Returns the costs of knot t: references and weights differ, and every third knot has a cost for an additional foot.
+/// Returns the costs of knot t. References and weights differ between knots, and every third knot has a cost for an
+/// additional foot.
 fn costs(model: &Model, t: usize) -> Vec<Cost> {
     let time = t as f64;
     let com = Residual::CenterOfMass { target: Vec3::new(0.01 * time, 0.0, 0.35) };
@@ -47,8 +48,8 @@ fn contacts(model: &Model, names: &[&str]) -> Vec<Contact> {
     names.iter().map(|name| Contact::new(name, foot(name))).collect()
 }
 
-/// Creates six knots on two feet, an impact, and six knots on four feet: one action per knot if `apart`, else per
-/// phase.
+/// Creates six knots on two feet, an impact, and six knots on four feet. If `apart`, each knot has its own action;
+/// otherwise each phase has one action.
 fn gait(apart: bool, limited: bool) -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let x0 = x0(&model);
@@ -139,7 +140,7 @@ fn limits_of_each_knot_are_its_own() {
     assert!(one.1.iter().flatten().any(|y| *y != 0.0));
 }
 
-/// A change through one of the models affects only this model. The same holds in the copies of other threads.
+/// Checks that a change through one of the models affects only this model, also in the copies of other threads.
 #[test]
 fn a_model_that_was_merged_is_changed_alone() {
     let (mut apart, xs, us) = gait(true, false);
@@ -161,7 +162,7 @@ fn a_model_that_was_merged_is_changed_alone() {
     assert!(apart.model_mut::<ImpulseDynamics>(4).is_none() && apart.model_mut::<ContactDynamics>(13).is_none());
 }
 
-/// When a horizon moves, each knot keeps its model, and the last knot gets the specified model.
+/// Checks that each knot keeps its model when the horizon moves, and that the last knot gets the specified model.
 #[test]
 fn models_move_with_their_knots() {
     let model = Arc::new(robots::quadruped());
@@ -188,7 +189,8 @@ fn models_move_with_their_knots() {
     }
 }
 
-/// Models that differ in more than costs are not merged: the results are bit-identical to the single actions' results.
+/// Checks that models which differ in more than costs are not merged. The results are bit-identical to the results of
+/// the single actions.
 #[test]
 fn other_dynamics_stay_apart() {
     let model = Arc::new(robots::arm7());
@@ -249,7 +251,8 @@ fn without_a_solution_there_is_nothing_to_resume() {
     assert!(solver.resume(&mut problem).is_ok());
 }
 
-/// Statics and Newton steps give the same controls that hold a state still; the accelerations at that state vanish.
+/// Checks that statics and Newton steps give the same controls that hold a state still. The accelerations at that state
+/// vanish.
 #[test]
 fn what_holds_a_state_still_is_found() {
     let arm = Arc::new(robots::arm7());
@@ -265,8 +268,8 @@ fn what_holds_a_state_still_is_found() {
     assert!(seen[0].1.iter().all(|a| a.abs() < 1e-10) && seen[1].1 == held);
 }
 
-/// The first and second derivatives of the unicycle equal differences. `tests/peers/crocoddyl/test_actions.py` compares
-/// its iterations with Crocoddyl.
+/// Checks that the first and second derivatives of the unicycle equal differences.
+/// `tests/peers/crocoddyl/test_actions.py` compares the iterations with Crocoddyl.
 #[test]
 fn a_unicycle_has_the_derivatives_of_differences() {
     use condyle_optimal::{Hessian, NumDiff, Unicycle};
@@ -290,7 +293,7 @@ fn a_unicycle_has_the_derivatives_of_differences() {
     }
 }
 
-/// The forces at the feet bear the weight of a standing robot.
+/// Checks that the forces at the feet carry the weight of a standing robot.
 #[test]
 fn outputs_of_a_stance_bear_its_weight() {
     let (mut problem, xs, us) = gait(true, false);
@@ -303,8 +306,8 @@ fn outputs_of_a_stance_bear_its_weight() {
     });
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"].map(|foot| format!("force/{foot}"));
     assert_eq!(names[2..], feet);
-    // the axes of a foot turn with its leg, so only norms are compared; the forces sum to the weight, so the sum of
-    // their norms is at least the weight
+    // the axes of a foot turn with its leg, so only norms of forces are compared; the forces sum to the weight, so the
+    // sum of their norms is at least the weight
     assert!(norms >= 9.81 * model.total_mass() - 1e-6 && norms < 2.0 * 9.81 * model.total_mass(), "{norms}");
     let mut accelerations = vec![];
     problem.outputs(9, &xs[..37], &u, &mut |name, numbers| {

@@ -1,4 +1,4 @@
-//! Model predictive control: moving horizons, solves with little time, stored solutions.
+//! Model predictive control: moving horizons, solves with little time, and stored solutions.
 
 #[path = "mpc/budgets.rs"]
 mod budgets;
@@ -14,11 +14,12 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Tolerance of solves of the same problem from different warm starts. They differ by the regularisation, 1e-9 for
-/// entries of size one; this difference grows along the horizon.
+/// Tolerance of solves of the same problem from different warm starts. The solves differ by the regularisation, 1e-9
+/// for entries of size one. The difference grows along the horizon.
 const SAME: f64 = 1e-5;
 
-/// Creates linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin with any of the three models.
+/// Creates a problem with three linear-quadratic models, which have 3, 0 and 2 controls. The horizon may begin with any
+/// of them.
 fn linear(knot_models: &[usize], x0: &[f64]) -> Problem {
     let mut random = random();
     let models = [3, 0, 2].map(|nu| {
@@ -64,7 +65,8 @@ fn a_shifted_horizon_is_solved_like_a_new_one() {
     }
 }
 
-/// With one iteration per step, a pole that is pushed stays up. The solves allocate nothing (see `allocations.rs`).
+/// Checks that a pole which is pushed stays up with one iteration per step. The test in `allocations.rs` shows that
+/// such solves allocate nothing.
 #[test]
 fn a_closed_loop_stands_up_to_pushes() {
     let mut problem = cartpole(&[0.0, 0.2, 0.0, 0.0], 40, 1);
@@ -79,7 +81,7 @@ fn a_closed_loop_stands_up_to_pushes() {
         u[0] = solution.u(0)[0] + solution.K[0].row(0).iter().zip(&dx).map(|(k, dx)| k * dx).sum::<f64>();
         let mut next = [0.0; 4];
         plant.calc(0, &x, &u, &mut next);
-        next[3] += if step % 50 == 10 { 0.8 } else { 0.0 }; // a push at the pole
+        next[3] += if step % 50 == 10 { 0.8 } else { 0.0 }; // a push on the pole
         x.copy_from_slice(&next);
         problem.shift(0).unwrap();
         solver.shift(&mut problem).unwrap();
@@ -100,7 +102,7 @@ fn a_solve_without_time_returns_what_it_has() {
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
     assert_eq!((solution.status, &solution.xs, solution.trace.len()), (Status::TimeLimit, &xs, 0));
 
-    // The time that the observer takes also counts: the second iteration does not begin.
+    // the time in the observer counts too: the second iteration does not begin
     solver.settings.time_budget = Some(Duration::from_millis(200));
     let mut seen = 0;
     let pause = |_: &Iteration| {
@@ -111,7 +113,7 @@ fn a_solve_without_time_returns_what_it_has() {
     assert_eq!((solution.status, seen, solution.trace.len()), (Status::TimeLimit, 1, 1));
     assert_eq!(solution.cost, solution.trace[0].cost);
 
-    // Without any time, no gains are computed: they come from the previous solve, shifted by one knot.
+    // without any time, no gains are computed; the old gains are shifted by one knot
     problem.shift(0).unwrap();
     solver.shift(&mut problem).unwrap();
     solver.settings.time_budget = Some(Duration::ZERO);
@@ -120,7 +122,7 @@ fn a_solve_without_time_returns_what_it_has() {
         moved.status == Status::TimeLimit && moved.K[..49] == solution.K[1..] && moved.xs[..200] == solution.xs[4..]
     );
 
-    // With enough time, the solve is the same as without a budget.
+    // with enough time, the solve is the same as without a budget
     solver.settings.time_budget = Some(Duration::from_secs(100));
     let mut problem = cartpole(&HANGING, 50, 1);
     let limited = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
@@ -152,7 +154,7 @@ fn a_solution_survives_a_file() {
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
     let text = serde_json::to_string(solution).unwrap();
     let read: Solution = serde_json::from_str(&text).unwrap();
-    // serde_json reads a decimal number with an error of at most one in its last bit.
+    // serde_json reads a decimal number with an error of at most one in the last bit
     let close =
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs());
     assert!(close(&read.xs, &solution.xs) && close(&read.us, &solution.us) && close(read.x(50), solution.x(50)));
@@ -167,8 +169,8 @@ fn a_solution_survives_a_file() {
     assert!(settings.project_warm_start && settings.max_iterations == 7);
 }
 
-/// The lengths of the fields of a solution from a file must fit one horizon. Otherwise the solution is rejected before
-/// anything reads out of range.
+/// Checks that a solution from a file is rejected if the lengths of its fields do not fit one horizon. Without this
+/// check, later code would read out of range.
 #[test]
 fn a_solution_from_a_file_is_checked() {
     let mut problem = cartpole(&HANGING, 4, 1);
@@ -199,8 +201,8 @@ fn a_solution_from_a_file_is_checked() {
     assert!(refused("/shape/ndx", json!(3)).starts_with("knot 0: expected gains of 1 × 3"));
 }
 
-/// Costs and limits that belong to single knots move with the knots. The same holds in the copies of other threads. A
-/// new last knot has the model's common costs and limits, until it gets costs and limits for itself.
+/// Checks that costs and limits of single knots move with their knots, also in the copies of other threads. A new last
+/// knot has the model's common costs and limits, until separate costs and limits are set for it.
 #[test]
 fn costs_and_limits_of_a_knot_move_with_it() {
     const HORIZON: usize = 9;
@@ -211,7 +213,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         let effort = Residual::Control { reference: vec![0.0; 7] };
         vec![cost("effort", 1e-3, effort), cost("rest", 1e-1, Residual::State { reference: x0.clone() })]
     };
-    // the costs of a knot; `time` counts the knots from the beginning of the first horizon
+    // separate costs of a knot; `time` is the index of the knot in the first horizon
     let own = |time: usize| {
         let target = Vec3::new(0.4, 0.01 * time as f64, 0.5);
         let follow = cost("follow", 10.0 + time as f64, Residual::FrameTranslation { frame: "tool".into(), target });
@@ -222,7 +224,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         let effort = Residual::Control { reference: vec![0.0; 7] };
         if time % 3 == 1 { vec![Limit::new("weak", effort, vec![-weak; 7], vec![weak; 7])] } else { vec![] }
     };
-    // most knots have costs and limits for themselves, the others have the common ones
+    // most knots have separate costs and limits, the other knots have the common ones
     let problem = |start: usize| {
         let mut knot = FreeDynamics::running(arm.clone(), 0.05, common()).unwrap();
         for t in 0..HORIZON {
@@ -260,7 +262,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         }
         last.set_limits(HORIZON - 1, limits(now)).unwrap();
         assert_eq!(costs(&mut moving), costs(&mut fresh), "{start}");
-        // a solve on threads, whose copies have moved with the horizon, equals a solve on one thread
+        // a solve on several threads, whose copies have moved with the horizon, equals a solve on one thread
         let (xs, warm) = (solver.solution().xs.clone(), solver.solution().us.clone());
         let ours = solver.resume(&mut moving).unwrap();
         let mut other = Fddp::new(&fresh);
@@ -269,7 +271,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
     }
 }
 
-/// Copies for other threads are shifted, not created again, if nothing else has changed.
+/// Checks that copies for other threads are shifted, and not created again, if nothing else has changed.
 #[test]
 fn copies_move_along() {
     let (arm, x0) = (Arc::new(robots::arm7()), [vec![0.1; 7], vec![0.0; 7]].concat());

@@ -1,6 +1,7 @@
-//! A solve reports what is wrong, and its outcome does not depend on how knots and trials are grouped.
+//! Outcomes of solves: a solve reports what is wrong, and its result does not depend on how knots and trials are
+//! grouped.
 
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // names follow the literature
 
 mod common;
 
@@ -15,7 +16,8 @@ use condyle_optimal::{
 use core::ops::ControlFlow;
 use std::time::Duration;
 
-/// Accuracies of [`NumDiff`] for costs and states of size 100: first and second derivatives.
+/// Accuracy of [`NumDiff`]'s first derivatives for costs and states of size 100; the next constant is for second
+/// derivatives.
 const FIRST: f64 = 1e-6;
 const SECOND: f64 = 1e-3;
 
@@ -46,8 +48,8 @@ fn written_derivatives_agree_with_finite_differences() {
     compare_with_numdiff(Circle { nu: 1 }, &[0.6, 0.8], &[0.4]);
 }
 
-/// On a circle, the problem is linear in the angle. One full step solves it, even from a warm start with gaps that
-/// winds around the circle.
+/// Checks a solve with states on a circle, where the problem is linear in the angle. One full step solves the problem,
+/// even from a warm start that has gaps and winds around the circle.
 #[test]
 fn a_state_may_live_on_a_manifold() {
     let circle = |angle: f64| [angle.cos(), angle.sin()];
@@ -77,7 +79,7 @@ fn the_pendulum_on_a_cart_stands_up() {
     let xs = solution.xs.clone();
     let us = solution.us.clone();
     assert_eq!(problem.rollout(&us).unwrap(), xs);
-    // A solve that starts from the solution stays there.
+    // a solve that starts from the solution does not leave it
     let again = solver.solve(&mut problem, &xs, &us).unwrap();
     assert!(again.status == Status::Converged && again.trace.len() <= 2);
 }
@@ -153,7 +155,7 @@ fn a_problem_without_a_minimum_ends_at_the_largest_regularisation() {
     assert_eq!((solution.us.as_slice(), solution.trace.len()), (&[1.0; 3][..], 0));
 }
 
-/// Action that is finite only while |x| < `limit`; with `broken` its derivatives are NaN.
+/// Action whose values are finite only while |x| < `limit`. If `broken`, its derivatives are NaN.
 struct Bounded {
     nu: usize,
     lanes: usize,
@@ -212,7 +214,7 @@ fn what_is_not_finite_never_enters_a_solution() {
     assert_eq!(solve(9.0, true, 1, 0.0).status, Status::NotFinite); // the derivatives are not finite
     assert_eq!(solve(9.0, false, 1, 0.0).status, Status::Converged);
     for lanes in [1, 4] {
-        let cut = solve(2.0, false, lanes, 0.0); // a full step exceeds `limit`, a shorter one does not
+        let cut = solve(2.0, false, lanes, 0.0); // a full step exceeds `limit`, a shorter step does not
         assert!(cut.trace[0].step < 1.0 && cut.trace[0].accepted, "{:?}", cut.trace);
         assert!(cut.cost < 0.5 * 9.0 * 7.0);
     }
@@ -286,7 +288,7 @@ fn bounds_that_leave_no_control_are_refused_by_knot_and_number() {
     assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // equal bounds are valid
 }
 
-/// Infinite bounds change nothing; a bound on one side only can be active.
+/// Checks that infinite bounds do not change a solve, and that a bound on only one side can be active.
 #[test]
 fn a_bound_may_be_on_one_side() {
     let infinite = f64::INFINITY;
@@ -305,14 +307,14 @@ fn a_bound_may_be_on_one_side() {
     assert_eq!(bounded.status, Status::Converged);
     assert!(bounded.us.iter().all(|u| *u >= 0.8 * least) && bounded.us.contains(&(0.8 * least)));
     assert!(bounded.cost > free.cost);
-    // Where a control is at its bound, the feedback is zero.
+    // the feedback is zero for a control at its bound
     let t = bounded.us.iter().position(|u| *u == 0.8 * least).unwrap();
     assert!(bounded.K[t].amax() == 0.0);
 }
 
-/// Checks the multipliers of a bounded optimum independently of the solver. The gradient ∂J/∂u along the trajectory
-/// follows from the adjoint recursion λ = q + Aᵀλ⁺. It is zero for a free control, and pushes a control at its bound
-/// outwards.
+/// Checks the multipliers of a bounded optimum without the solver. The adjoint recursion λ = q + Aᵀλ⁺ gives the
+/// gradient ∂J/∂u along the trajectory. The gradient is zero for a free control. For a control at its bound, its
+/// negative points outside the bound.
 #[test]
 fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     let bounds = [vec![-8.0], vec![6.0]];
@@ -336,7 +338,7 @@ fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     assert!(at_bounds > 3, "{at_bounds}");
 }
 
-/// Action that records the number of trials that are evaluated together at the first knot.
+/// Action that records how many trials each call at the first knot evaluates.
 struct Noting {
     action: Cartpole,
     groups: Vec<usize>,
@@ -372,9 +374,9 @@ impl ActionModel for Noting {
     }
 }
 
-/// The first step length is tried alone. The second length is also tried alone if the last search did not need a
-/// shorter one. Then the next four are tried side by side, and then the others. The number of lanes limits the size of
-/// each group.
+/// Checks the sizes of the groups of trials. The first step length is tried alone. The second length is also tried
+/// alone if the last search accepted 1 or ½. Then the next four lengths form one group, and then the remaining lengths.
+/// The number of lanes limits the size of each group.
 #[test]
 fn a_refused_step_is_followed_by_the_others_at_once() {
     let alone = |lanes| if lanes == 1 { vec![1; 9] } else { vec![1, 4, 4] };
@@ -385,8 +387,8 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         let mut problem = Problem::new(HANGING.to_vec(), vec![Box::new(noting)], vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap();
-        // Each line search first tries a group of one step length. If that step is rejected, the search tries further
-        // groups until a step is accepted.
+        // each line search first tries one step length; if that step is rejected, it tries further groups until a step
+        // is accepted
         let (mut expected, mut last) = (vec![], 0.0);
         for iteration in &solution.trace {
             expected.push(1);
@@ -404,7 +406,7 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
     }
 }
 
-/// Slow action x⁺ = x + u, ℓ = ½ (x² + u²) + x⁴, with the given number of controls.
+/// Slow action with the given number of controls: x⁺ = x + u, ℓ = ½ (x² + u²) + x⁴.
 struct Slow(usize);
 
 impl ActionModel for Slow {
@@ -446,8 +448,8 @@ impl Observer for Impatient {
     }
 }
 
-/// An observer ends a solve after an iteration, or within a long one. `resume` continues from there, to the same
-/// solution.
+/// Checks that an observer can end a solve after an iteration or within a long one. `resume` then continues from the
+/// iterate and finds the same solution.
 #[test]
 fn observers_end_solves() {
     let mut problem = cartpole(&HANGING, 50, 1);
@@ -466,7 +468,7 @@ fn observers_end_solves() {
     let resumed = solver.resume(&mut problem).unwrap();
     assert!(resumed.status == Status::Converged && (resumed.cost - end.cost).abs() < 1e-6 * end.cost);
 
-    // with a slow model, the solve ends before its iteration does
+    // with a slow model, the observer ends the solve before an iteration has ended
     let mut problem =
         Problem::new(vec![1.0], vec![Box::new(NumDiff(Slow(1)))], vec![0; 5], Box::new(NumDiff(Slow(0)))).unwrap();
     let mut solver = Fddp::new(&problem);
@@ -476,7 +478,7 @@ fn observers_end_solves() {
         assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 0));
     }
 
-    // a solve by the augmented Lagrangian ends in the same way
+    // an observer ends a solve by the augmented Lagrangian in the same way
     let mut solver = AugmentedLagrangian::new(&problem);
     let observer = Impatient { questions: 9, iterations: 1 };
     let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
@@ -486,8 +488,8 @@ fn observers_end_solves() {
     assert_eq!(solution.status, Status::Interrupted);
 }
 
-/// Settings that determine the use of memory have maximum values. A setting that only ends the solve may have any
-/// value.
+/// Checks that settings which determine the use of memory have maximum values. A setting that only ends the solve may
+/// have any value.
 #[test]
 fn settings_that_count_are_limited() {
     let mut problem = cartpole(&HANGING, 5, 1);
@@ -504,7 +506,7 @@ fn settings_that_count_are_limited() {
     assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
 }
 
-/// If no number is finite, the residuals of the augmented Lagrangian are infinite, not NaN.
+/// Checks that the residuals of the augmented Lagrangian are infinite, not NaN, if cost and constraints are not finite.
 #[test]
 fn what_is_nowhere_finite_is_infinitely_far() {
     let model = |nu| Bounded { nu, lanes: 1, limit: 1.0, broken: false };

@@ -1,5 +1,5 @@
-//! Models and durations of single knots are replaced between solves. The results then equal the results of a new
-//! problem, and the next solve does not allocate.
+//! Replacement of models and durations of single knots between solves. The results equal the results of a new problem,
+//! and the next solve does not allocate.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]
@@ -16,11 +16,11 @@ const KNOTS: usize = 9;
 
 fn x0() -> Vec<f64> {
     let mut q = neutral(&robots::quadruped());
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     [q, vec![0.0; 18]].concat()
 }
 
-/// Returns the model of knot t, on the given `feet`; its target differs from knot to knot.
+/// Returns the model of knot t with contacts at the given `feet`. Its target differs from knot to knot.
 fn model(t: usize, feet: &[&str], dt: f64) -> Box<dyn ActionModel> {
     let robot = Arc::clone(ROBOT.get_or_init(|| Arc::new(robots::quadruped())));
     let contact = |name: &&str| {
@@ -74,8 +74,8 @@ fn a_replaced_knot_is_that_of_a_new_problem() {
         let (xs, us) = (x0().repeat(KNOTS + 1), changed.quasi_static(&x0().repeat(KNOTS + 1)).unwrap());
         let mut solver_of_changed = solver(&changed, threads);
         solver_of_changed.solve(&mut changed, &xs, &us).unwrap();
-        // Knot 3 gets four feet on the ground and another target, and is replaced twice. Knot 6 gets another target.
-        // Knot 7 gets another target and only two feet on the ground.
+        // knot 3 is replaced twice: it gets four feet on the ground and another target; knot 6 gets another target;
+        // knot 7 gets another target and only two feet on the ground
         for (t, target, feet) in [(3, 20, &ALL[..]), (6, 9, &ALL), (3, 5, &ALL), (7, 1, &TWO)] {
             changed.set_knot(t, model(target, feet, DT)).unwrap();
         }
@@ -107,7 +107,7 @@ fn a_duration_is_that_of_a_new_problem() {
     let mut fresh = problem(|t| model(t, feet(t), dt(t)));
     let expected = untimed(solver(&fresh, 1).solve(&mut fresh, &xs, &us).unwrap());
     assert!(untimed(solver(&changed, 1).solve(&mut changed, &xs, &us).unwrap()) == expected);
-    // when the horizon is shifted, durations move with their knots
+    // if the horizon is shifted, durations move with their knots
     changed.shift(8).unwrap();
     let mut fresh = problem(|t| if t < 8 { model(t + 1, feet(t + 1), dt(t + 1)) } else { model(8, &ALL, DT) });
     let us = fresh.quasi_static(&xs).unwrap();
@@ -131,7 +131,7 @@ fn the_next_solve_allocates_nothing() {
     }
 }
 
-/// Models can be added and dropped any number of times.
+/// Checks that models can be added and dropped any number of times.
 #[test]
 fn memory_stays_bounded() {
     let mut problem = problem(|t| model(t, feet(t), DT));

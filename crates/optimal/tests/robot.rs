@@ -1,5 +1,5 @@
-//! Free dynamics of robots and their costs: exact derivatives, references, limits.
-#![allow(non_snake_case)] // the names of the literature
+//! Robots without contacts and their costs: exact derivatives, references and limits.
+#![allow(non_snake_case)] // names follow the literature
 
 use condyle_dynamics::{
     Act, Data, FrameKind, Model, ModelBuilder, Se3, UrdfOptions, Vec3, WORLD, forward_kinematics, integrate, neutral,
@@ -12,10 +12,10 @@ use condyle_optimal::{ActionModel, Error, Fddp, Hessian, LqKnot, NumDiff, Proble
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance of central differences. They are accurate to about 1e-9 for a function with values and derivatives of
+/// Tolerance of central differences, which are accurate to about 1e-9 for a function with values and derivatives of
 /// order one.
 const DIFFERENCES: f64 = 1e-6;
-/// Tolerance between sums that are added in different orders, computed with a factorisation.
+/// Tolerance of two results of a factorisation whose sums were added in different orders.
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
@@ -23,7 +23,7 @@ fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
     (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
 }
 
-/// Returns a random state near the neutral state; no joint is near a singularity of its group.
+/// Returns a random state near the neutral state, where no joint is near a singularity.
 fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
@@ -36,7 +36,7 @@ fn last_frame(model: &Model) -> (usize, FrameName) {
     (frames.len() - 1, (&frames[frames.len() - 1]).into())
 }
 
-/// Returns every residual, each with every activation that fits it.
+/// Returns a cost for every pair of a residual and an activation that fits it.
 fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
     let nv = model.nv();
     let (number, frame) = last_frame(model);
@@ -98,7 +98,7 @@ fn derivatives_are_those_of_the_action() {
     }
 }
 
-/// The structure of A and B reported by an action is correct: a sweep without it gives the same result.
+/// Checks the structure of A and B that an action reports: a sweep that ignores the structure gives the same result.
 #[test]
 fn derivatives_have_the_form_of_euler_steps() {
     let mut rng = StdRng::seed_from_u64(8);
@@ -133,7 +133,7 @@ fn derivatives_have_the_form_of_euler_steps() {
     }
 }
 
-/// For a residual that is linear in x and u, the Gauss–Newton Hessian is the exact Hessian.
+/// Checks that the Gauss–Newton Hessian is exact for a residual that is linear in x and u.
 #[test]
 fn hessians_of_linear_residuals_are_exact() {
     let mut rng = StdRng::seed_from_u64(4);
@@ -175,8 +175,8 @@ fn a_cost_is_zero_at_its_reference() {
     assert_eq!(action.costs_mut().set_weight("rose", 3.0), Ok(false));
 }
 
-/// A residual of a frame stores the name of the frame. The action of each robot looks up the index of the frame with
-/// that name.
+/// Checks that a residual stores the name of its frame, and that the action of each robot looks up the index of this
+/// frame.
 #[test]
 fn frames_travel_by_name() {
     let arm = robots::arm7();
@@ -192,7 +192,7 @@ fn frames_travel_by_name() {
         let reach = Cost::new("reach", 1.0, Residual::FrameTranslation { frame, target }, Activation::Quadratic);
         let mut action = FreeDynamics::terminal(two.clone(), vec![reach.clone()]).unwrap();
         assert_eq!(action.calc(0, &x, &[], &mut x.clone()), 0.0);
-        // every function rejects another robot, which lacks the frame
+        // every function returns an error for another robot, which does not have the frame
         let quadruped = Arc::new(robots::quadruped());
         let unknown = |error: Error| assert!(error.to_string().contains("`reach`: unknown frame `tool`"), "{error}");
         unknown(FreeDynamics::terminal(quadruped.clone(), vec![reach.clone()]).map(|_| ()).unwrap_err());
@@ -200,14 +200,15 @@ fn frames_travel_by_name() {
         unknown(end.set_costs(1, vec![reach.clone()]).unwrap_err());
         let limit = Limit::equality("reach", reach.residual.clone());
         unknown(end.with_limits(vec![limit]).map(|_| ()).unwrap_err());
-        // a file with this cost can be read, but not be built for a robot without the frame
+        // a file with this cost can be read, but building the knot fails for a robot without the frame
         let knot = serde_json::to_string(&Knot::new(Dynamics::Terminal, vec![reach.clone()])).unwrap();
         let read: Knot = serde_json::from_str(&knot).unwrap();
         assert_eq!(read.costs, [reach]);
         assert!(read.build(&two).is_ok());
         unknown(read.build(&quadruped).map(|_| ()).unwrap_err());
     }
-    // among frames with the same name, the frame of the requested kind is chosen, or else the frame of a link
+    // among frames with the same name, the frame of the requested kind is chosen; without a request, the frame of a
+    // link
     let text = r#"<robot name="twice"><link name="base"/><link name="tip"/><joint name="tip" type="continuous">
         <parent link="base"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"#;
     let twice = Model::from_urdf_str(text, &UrdfOptions::default()).unwrap();
@@ -241,11 +242,11 @@ fn what_does_not_fit_is_refused_by_name() {
     assert_eq!(message(FreeDynamics::running(arm.clone(), 0.0, vec![])), "a knot of 0 s: its duration must be above 0");
 }
 
-/// Residual r = (v₁ u₁, sin q₂ + u₂² + t), for a robot whose position has `nq` entries.
+/// User-defined residual r = (v₁ u₁, sin q₂ + u₂² + t), for a robot whose position has `nq` entries.
 struct OwnFunction {
     nq: usize,
     nv: usize,
-    /// Indices of the coordinates and controls in the residual.
+    /// Indices of the coordinates and controls that the residual reads.
     place: [usize; 2],
 }
 
@@ -309,8 +310,8 @@ impl ResidualFunction for OwnCost {
     }
 }
 
-/// The knot contains the gradient and Hessian of a user-defined cost, times Δt and the weight. With the activation ½ r²
-/// instead of the sum, it contains the exact Hessian of ½ r².
+/// Checks the gradient and Hessian of a user-defined cost in a knot, multiplied by Δt and the weight. With the
+/// activation ½ r² instead of the sum, the knot contains the exact Hessian of ½ r².
 #[test]
 fn a_cost_of_ones_own_has_its_hessian() {
     let (arm, mut rng) = (Arc::new(robots::arm7()), StdRng::seed_from_u64(31));
@@ -345,7 +346,8 @@ fn a_cost_of_ones_own_has_its_hessian() {
     }
 }
 
-/// Iterates do not depend on the form of the knots. The optimum does not depend on whether the Hessian is exact.
+/// Checks that iterates do not depend on the form of the knots, and that the optimum is the same with an exact and an
+/// approximate Hessian.
 #[test]
 fn a_cost_of_ones_own_in_a_solve() {
     let arm = Arc::new(robots::arm7());
@@ -371,8 +373,8 @@ fn a_cost_of_ones_own_in_a_solve() {
     assert!((with.cost - gauss_newton.cost).abs() < 1e-7 * (1.0 + with.cost.abs()), "one optimum");
 }
 
-/// The derivatives of a user-defined residual equal differences, and the solver's iterates do not depend on the form of
-/// its knots.
+/// Checks that the derivatives of a user-defined residual equal differences, and that the solver's iterates do not
+/// depend on the form of the knots.
 #[test]
 fn a_residual_of_ones_own_is_one_among_others() {
     use condyle_dynamics::ContactConstraint;

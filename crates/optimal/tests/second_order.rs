@@ -1,4 +1,4 @@
-//! Full DDP: the sweep includes the curvature of the dynamics.
+//! Full DDP, in which the sweep includes the curvature of the dynamics.
 #![allow(non_snake_case)]
 
 mod common;
@@ -18,18 +18,19 @@ use std::sync::Arc;
 /// Tolerance of second central differences, for functions with values of one to ten.
 const DIFFERENCES: f64 = 1e-5;
 
-/// Step of first central differences, and their tolerance; these differences are accurate to about 1e-8.
+/// Step of first central differences; the next constant is their tolerance. These differences are accurate to about
+/// 1e-8.
 const STEP: f64 = 6e-6;
 const SLOPES: f64 = 1e-7;
-/// Tolerance of the same differences for a robot. Rounding errors grow with the condition number of the robot's inertia
-/// matrix, and truncation errors with the second powers of sines.
+/// Tolerance of second central differences for a robot. Their rounding errors grow with the condition number of the
+/// robot's inertia matrix, and their truncation errors with the squares of sines.
 const VALUES: f64 = 1e-4;
-/// Tolerance of symmetry: both triangles are sums of the same results of a factorisation, in different orders.
+/// Tolerance of symmetry. Both triangles are sums of the same results of a factorisation, added in different orders.
 const SYMMETRY: f64 = 1e-12;
 /// Relative accuracy of the arm's inverse inertia matrix, whose condition number is 1e4.
 const ROUNDING: f64 = 1e-12;
 
-/// Function ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: the cost of a knot plus a cost of its next state.
+/// Action whose cost is ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: the cost of a knot plus a cost of its next state.
 struct Chained<A>(A);
 
 impl<A: ActionModel> ActionModel for Chained<A> {
@@ -45,8 +46,8 @@ impl<A: ActionModel> ActionModel for Chained<A> {
     }
 }
 
-/// With the curvature of the dynamics, the quadratic model of a horizon of one knot is exact: it is the quadratic model
-/// of ℓ(x, u) + V(φ(x, u)).
+/// Checks the quadratic model of a horizon of one knot. With the curvature of the dynamics, it equals the quadratic
+/// model of ℓ(x, u) + V(φ(x, u)).
 #[test]
 fn the_quadratic_model_is_exact() {
     let (x, u) = ([0.3, 0.7, -0.4, 1.3], [2.0]);
@@ -72,13 +73,13 @@ fn the_quadratic_model_is_exact() {
     assert!((&knot.Quu - &exact.R).amax() < DIFFERENCES, "{} {}", knot.Quu, exact.R);
     assert!((&knot.K - &K).amax() < DIFFERENCES * 10.0, "{} {K}", knot.K);
     assert!((&knot.Vxx - &Vxx).amax() < DIFFERENCES * 10.0, "{} {Vxx}", knot.Vxx);
-    // Without the curvature, the quadratic model is not exact.
+    // without the curvature, the quadratic model differs
     sweep.run(&lq_knots, 0.0).unwrap();
     assert!((&sweep.feedback()[0].Vxx - &Vxx).amax() > 100.0 * DIFFERENCES);
 }
 
-/// Near the optimum, the error after a second-order step is about the square of the error before it. After a
-/// Gauss–Newton step it is a fraction of the error before it.
+/// Checks the rate of convergence near the optimum. The error after a second-order step is about the square of the
+/// error before the step. The error after a Gauss–Newton step is a fraction of the error before the step.
 #[test]
 fn convergence_is_quadratic() {
     let solve = |second_order: bool| {
@@ -86,8 +87,8 @@ fn convergence_is_quadratic() {
         let end = common::Cartpole { nu: 0, lanes: 1, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
         let mut problem = Problem::new(HANGING.to_vec(), models, vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
-        // Both methods start near the optimum, where a Gauss–Newton solve ended, so that both converge to the same
-        // optimum.
+        // both methods start where a Gauss–Newton solve ended, near the optimum, so that both converge to the same
+        // optimum
         (solver.settings.tolerance, solver.settings.max_iterations) = (1e-4, 300);
         let near = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap().clone();
         assert_eq!(near.status, Status::Converged);
@@ -101,7 +102,7 @@ fn convergence_is_quadratic() {
     assert!(newton.0 <= 4 && gauss_newton.0 >= 10, "{newton:?} {gauss_newton:?}");
 }
 
-/// Creates a model with every kind of joint whose positions form a group, and a knee.
+/// Creates a model with a knee and with each type of joint whose positions are not a vector space.
 fn groups() -> Model {
     let limb = Inertia::from_com(1.3, Vec3::new(0.1, -0.05, -0.3), Sym3::diagonal(0.07));
     let at = |x: f64| Se3 { translation: Vec3::new(x, 0.2, -0.4), ..Se3::identity() };
@@ -129,7 +130,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
         assert!(action.dynamics_hessian(0, &x, u, lambda, &mut ours));
         let largest = 1.0 + ours.xx.amax().max(ours.xu.amax()).max(ours.uu.amax());
 
-        // with ψ(z) = λᵀ(φ(x ⊕ δx, u + δu) ⊖ φ(x, u)):   ∂ψ/∂x = E(δx)ᵀ Aᵀ L(φ(…) ⊖ φ)ᵀ λ,   ∂ψ/∂u = Bᵀ Lᵀ λ
+        // with ψ(z) = λᵀ(φ(x ⊕ δx, u + δu) ⊖ φ(x, u)): ∂ψ/∂x = E(δx)ᵀ Aᵀ L(φ(…) ⊖ φ)ᵀ λ, ∂ψ/∂u = Bᵀ Lᵀ λ
         let (mut centre, mut next, mut moved) = (x.clone(), x.clone(), x.clone());
         action.calc(0, &x, u, &mut centre);
         let mut change = vec![0.0; ndx];
@@ -156,7 +157,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             let above = gradient(&z);
             z[j] = -STEP;
             let below = gradient(&z);
-            // Both gradients are differences of numbers with rounding errors in a few bits.
+            // both gradients are differences of results with rounding errors in their last bits
             let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
             let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
             let (ours_x, ours_u) = match j < ndx {
@@ -167,7 +168,8 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
         }
 
-        // For joints whose positions form a group, ψ itself is also differenced, which needs no Jacobians of the group.
+        // if some positions are not a vector space, also compares with differences of ψ itself, which need no Jacobians
+        // of ⊕
         if model.nq() > nv {
             let mut numeric = Hessian::zeros(ndx, nu);
             NumDiff(action.clone()).dynamics_hessian(0, &x, u, lambda, &mut numeric);
@@ -180,7 +182,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
     }
 }
 
-/// The second derivatives of a robot's dynamics equal differences of its first derivatives.
+/// Checks that the second derivatives of a robot's dynamics equal differences of its first derivatives.
 #[test]
 fn robots_give_theirs_exactly() {
     let arm = Arc::new(robots::arm7());
@@ -195,7 +197,8 @@ fn robots_give_theirs_exactly() {
     }
 }
 
-/// Creates a knot or the terminal action of a body with four rotors, which push and twist it.
+/// Creates a knot, or the terminal action, of a body with four rotors. Each rotor exerts a force and a moment on the
+/// body.
 fn quadrotor(running: bool) -> FreeDynamics {
     let frame = Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.02));
     let mut robot = ModelBuilder::new("quadrotor");
@@ -224,7 +227,8 @@ fn quadrotor(running: bool) -> FreeDynamics {
         .unwrap()
 }
 
-/// Action with exact Hessians: the Hessian of the cost by differences, the Hessian of the dynamics from the robot.
+/// Action with exact Hessians. The Hessian of the cost is computed by differences, the Hessian of the dynamics by the
+/// robot.
 struct ExactCosts(NumDiff<FreeDynamics>);
 
 impl ActionModel for ExactCosts {
@@ -254,7 +258,8 @@ impl ActionModel for ExactCosts {
     }
 }
 
-/// A tumbling quadrotor comes to rest. Its thrust turns with the body, and its rotations do not commute.
+/// Checks a solve in which a tumbling quadrotor comes to rest. The thrust turns with the body, and rotations do not
+/// commute.
 #[test]
 fn convergence_is_quadratic_on_a_group() {
     const KNOTS: usize = 30;
@@ -271,8 +276,8 @@ fn convergence_is_quadratic_on_a_group() {
         };
         let mut problem = Problem::new(x0.to_vec(), vec![model(true)], vec![0; KNOTS], model(false)).unwrap();
         let mut solver = Fddp::new(&problem);
-        // Both methods start near the optimum, where a Gauss–Newton solve ended, so that both converge to the same
-        // optimum.
+        // both methods start where a Gauss–Newton solve ended, near the optimum, so that both converge to the same
+        // optimum
         (solver.settings.tolerance, solver.settings.max_iterations) = (1e-2, 300);
         let near = solver.solve(&mut problem, &x0.repeat(KNOTS + 1), &[9.81 / 4.0; 4 * KNOTS]).unwrap().clone();
         assert_eq!(near.status, Status::Converged);
@@ -286,13 +291,13 @@ fn convergence_is_quadratic_on_a_group() {
         let ((newton, few), (gauss_newton, many)) = (solve(exact, true), solve(exact, false));
         assert!((newton - gauss_newton).abs() < 1e-8);
         assert!(2 * few.len() <= many.len(), "{few:?} {many:?}");
-        // With all Hessians exact, the remaining improvement falls quadratically: it is a multiple of the square of the
-        // previous remaining improvement.
+        // with exact Hessians, convergence is quadratic: each expected decrease is a multiple of the square of the one
+        // before
         assert!(!exact || few.windows(2).all(|stops| stops[1] < 10.0 * stops[0] * stops[0]), "{few:?}");
     }
 }
 
-/// Steps on a circle are linear in the angle, so there is no curvature.
+/// Checks that steps on a circle have no curvature, because they are linear in the angle.
 #[test]
 fn numbers_on_a_manifold() {
     let mut hessian = Hessian::zeros(1, 1);

@@ -1,4 +1,4 @@
-//! A sweep in several segments at the same time gives the same result as a sweep in one segment.
+//! Sweeps in several segments at the same time, which give the same result as a sweep in one segment.
 #![allow(non_snake_case)]
 
 mod common;
@@ -12,11 +12,10 @@ use rand::RngExt;
 use std::sync::Arc;
 
 /// Tolerance relative to the largest entry. As in the other tests of the sweep, random problems with entries of size
-/// one have value functions of about 1e3. The value functions of robots' problems have a condition number of 1e6 or
-/// more.
+/// one have value functions of about 1e3. The value functions of robot problems have a condition number of 1e6 or more.
 const SAME: f64 = 1e-9;
 
-/// Tolerance of the cost of an iterate. An error of the step has only a small effect on this cost.
+/// Tolerance of the cost of an iterate, which is insensitive to errors of the step.
 const COST: f64 = 1e-9;
 
 fn largest(x: &[f64]) -> f64 {
@@ -32,7 +31,7 @@ fn assert_same(found: &[KnotFeedback], expected: &[KnotFeedback], case: &str) {
             .chain([&knot.Vx, &knot.k, &knot.Qu].map(|vector| vector.as_slice().to_vec()))
             .collect::<Vec<_>>()
     };
-    // Vectors vanish where the trajectory is optimal, so errors are relative to the largest entry of the whole horizon.
+    // vectors vanish at an optimal trajectory, so errors are relative to the largest entry of the whole horizon
     let mut scales = [0.0_f64; 6];
     for knot in expected {
         for (scale, field) in scales.iter_mut().zip(fields(knot)) {
@@ -49,7 +48,8 @@ fn assert_same(found: &[KnotFeedback], expected: &[KnotFeedback], case: &str) {
     }
 }
 
-/// Returns the feedback of a sweep in one segment, and of a sweep in several segments; both sweeps must succeed.
+/// Returns the feedback of a sweep in one segment, and the feedback of a sweep in several segments. Both sweeps must
+/// succeed.
 fn both(lq_knots: &[LqKnot], segments: usize, regularisation: f64) -> (Vec<KnotFeedback>, Vec<KnotFeedback>) {
     let mut sweep = Sweep::new(lq_knots);
     sweep.run(lq_knots, regularisation).unwrap();
@@ -60,7 +60,8 @@ fn both(lq_knots: &[LqKnot], segments: usize, regularisation: f64) -> (Vec<KnotF
     (as_one, sweep.feedback().to_vec())
 }
 
-/// Returns knots of all kinds: dense or Euler steps, with or without blocks, and with different numbers of controls.
+/// Returns problems with all kinds of knots: dense or Euler steps, with or without blocks, and with different numbers
+/// of controls.
 fn problems() -> Vec<Vec<LqKnot>> {
     let (mut random, root) = (random(), 0..6);
     let root = std::slice::from_ref(&root);
@@ -96,7 +97,7 @@ fn segments_change_nothing_but_rounding() {
             for regularisation in [0.0, 1e-3] {
                 let (as_one, knots) = both(&lq_knots, segments, regularisation);
                 assert_same(&knots, &as_one, &format!("ndx {ndx}, horizon {horizon}, {segments} segments"));
-                assert!(knots != as_one, "ndx {ndx}: not in segments"); // different sums are rounded differently
+                assert!(knots != as_one, "ndx {ndx}: not in segments"); // sums in segments are rounded differently
             }
         }
     }
@@ -116,15 +117,15 @@ fn a_horizon_too_short_for_two_segments_is_swept_as_one() {
     assert_eq!(knots, as_one);
 }
 
-/// A sweep in segments finds the minimum of the whole problem. One Karush–Kuhn–Tucker system of all states and controls
-/// gives the same minimum.
+/// Checks that a sweep in segments finds the minimum of the whole problem. One Karush–Kuhn–Tucker system in all states
+/// and controls gives the reference.
 #[test]
 fn segments_solve_the_whole_problem() {
     let mut random = random();
     for lq_knots in problems().into_iter().take(3) {
         let (n, horizon) = (lq_knots[0].ndx(), lq_knots.len() - 1);
         let x0: DVector<f64> = random_matrix(&mut random, n, 1).column(0).into_owned();
-        // The order of unknowns is x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
+        // the unknowns are x₁, …, then u₀, …, then the multipliers of xₜ₊₁ = A x + B u + f
         let mut offsets = vec![horizon * n];
         for knot in &lq_knots[..horizon] {
             offsets.push(offsets[offsets.len() - 1] + knot.nu());
@@ -193,7 +194,7 @@ fn any_number_of_threads_finds_the_same_bits() {
     }
 }
 
-/// A fault at any knot stops a sweep in segments with the same error as a sweep in one segment.
+/// Checks that a fault at any knot stops a sweep in segments with the same error as a sweep in one segment.
 #[test]
 fn failures_are_those_of_a_sweep_as_one() {
     let mut random = random();
@@ -223,7 +224,8 @@ fn failures_are_those_of_a_sweep_as_one() {
     }
 }
 
-/// In these problems a segment alone has no minimum, its value function is not convex, or controls are bounded.
+/// Checks problems that a sweep in segments does not support: a segment alone has no minimum, its value function is not
+/// convex, or controls are bounded.
 #[test]
 fn what_segments_cannot_do_is_swept_as_one() {
     let mut random = random();
@@ -247,7 +249,8 @@ fn what_segments_cannot_do_is_swept_as_one() {
     }
 }
 
-/// If controls cost 1e-12 of the states' cost, a link loses digits; the sweep nevertheless gives the accurate result.
+/// Checks a problem in which controls cost 1e-12 of the states' cost. A link then loses digits, but the sweep still
+/// gives the accurate result.
 #[test]
 fn cheap_controls_lose_no_digits() {
     let mut random = random();
@@ -263,7 +266,7 @@ fn cheap_controls_lose_no_digits() {
     }
 }
 
-/// If some states do not affect the cost, the value function is singular.
+/// Checks a problem in which some states do not affect the cost, so that the value function is singular.
 #[test]
 fn states_may_cost_nothing() {
     let mut random = random();
@@ -287,12 +290,12 @@ fn no_segment_at_all_is_refused() {
     Sweep::new(&[LqKnot::zeros(2, 0)]).set_segments(0);
 }
 
-/// Creates the problem of a quadruped that shifts its weight on four feet and then reaches with one foot. The warm
-/// start has gaps.
+/// Creates the problem of a quadruped that moves its trunk over four feet and then reaches with one foot. Also returns
+/// a warm start with gaps.
 fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     let x0 = [q, vec![0.0; 18]].concat();
     let foot = |name: &str| {
         Contact::new(name, ContactConstraint { kd: 20.0, ..ContactConstraint::point(model.frame(name).unwrap()) })
@@ -346,14 +349,14 @@ fn a_robots_solve_makes_the_same_iterates() {
             assert!((a.cost - b.cost).abs() < COST * b.cost.abs(), "{a:?} {b:?}");
         }
         assert!(solution.xs != expected.xs, "not in segments");
-        // solve again with the same number of segments, and then with one segment
+        // solves again with the same number of segments, and then with one segment
         let again = solver.solve(&mut problem, &xs, &us).unwrap().xs.clone();
         assert_eq!(again, solver.solve(&mut problem, &xs, &us).unwrap().xs);
         solver.settings.segments = 1;
         assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap().xs, expected.xs);
     }
 
-    // compare each knot of sweeps at the last derivatives, too
+    // also compares the sweeps at the last derivatives, knot by knot
     let mut lq_knots = problem.lq_knots();
     problem.calc_diff(&expected.xs, &expected.us, &mut lq_knots);
     let mut random = random();

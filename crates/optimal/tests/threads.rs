@@ -1,4 +1,4 @@
-//! Several threads give the same result as one thread, to the last bit.
+//! Solves on several threads, which give the same result as on one thread, to the last bit.
 #![allow(non_snake_case)]
 
 mod common;
@@ -15,18 +15,18 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Creates a gait of a quadruped with every kind of knot: stance, an impact, an impact by differences that cannot be
-/// copied, and flight by Runge–Kutta and by Euler. The lengths of its runs of knots are not multiples of the number of
-/// lanes.
+/// Creates a gait of a quadruped with every kind of knot: stance, an impact, an impact with finite differences, and
+/// flight by Runge–Kutta and by Euler. The impact with finite differences cannot be copied. The lengths of the runs of
+/// knots are not multiples of the number of lanes.
 fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     gait_of(|impact| Box::new(NumDiff(impact)))
 }
 
-/// Creates the gait of [`gait`]; `impact_again` creates the impacts of the second kind.
+/// Creates the gait of [`gait`]. The function `impact_again` creates the impacts of the second kind.
 fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
-    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
+    (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
     let x0 = [q, vec![0.0; 18]].concat();
     let foot = |name: &str| ContactConstraint::point(model.frame(name).unwrap());
     let contacts = ["LF_foot", "RH_foot"].map(|name| Contact::new(name, ContactConstraint { kd: 20.0, ..foot(name) }));
@@ -86,8 +86,9 @@ fn any_number_of_threads_finds_the_same_bits() {
     assert!(solve(&mut problem, &xs, &us, 1) == expected);
 }
 
-/// After a step shorter than 1, the next step length is tried concurrently with the first, by copies of the models. All
-/// models can be copied here. In one case the first length is good, in the other case it is not.
+/// Checks the concurrent trial of two step lengths. After a step shorter than 1, copies of the models evaluate the next
+/// step length concurrently with the first. All models can be copied here. The first length is accepted in one case,
+/// and rejected in the other.
 #[test]
 fn trials_beside_each_other_find_the_same_bits() {
     let (mut problem, xs, us) = gait_of(|impact| Box::new(impact));
@@ -108,8 +109,8 @@ fn trials_beside_each_other_find_the_same_bits() {
     assert!(solve(2) == expected, "the global pool");
 }
 
-/// A solver can switch to another problem of the same dimensions, even from one without a robot to one with knots in
-/// inverse-dynamics form.
+/// Checks that a solver can switch to another problem of the same dimensions, even from a problem without a robot to a
+/// problem with knots in inverse-dynamics form.
 #[test]
 fn a_solver_turns_to_another_problem() {
     let (arm, x0) = (Arc::new(robots::arm7()), [0.1; 14]);
@@ -134,7 +135,7 @@ fn a_solver_turns_to_another_problem() {
     assert!(solve(Some(&other), 1) == expected && solve(Some(&other), 2) == expected);
 }
 
-/// When a model has changed, it is copied again.
+/// Checks that a changed model is copied again.
 #[test]
 fn copies_follow_their_models() {
     let (mut problem, xs, us) = gait();
@@ -152,7 +153,7 @@ fn copies_follow_their_models() {
     assert!(after.cost != before.cost);
 }
 
-/// Models with different numbers of controls serve a moving horizon.
+/// Checks a moving horizon whose models have different numbers of controls.
 #[test]
 fn a_horizon_may_move() {
     let mut random = random();
@@ -173,7 +174,7 @@ fn a_horizon_may_move() {
     }
 }
 
-/// If the first sweep fails, it is repeated with more regularisation.
+/// Checks that a failed first sweep is repeated with a larger regularisation.
 #[test]
 fn a_sweep_that_fails_is_repeated() {
     let mut random = random();
@@ -196,21 +197,21 @@ fn a_sweep_that_fails_is_repeated() {
     assert!(solve(2) == expected && solve(4) == expected);
 }
 
-/// If there is no time for any phase, the solve ends after the first iteration, which always runs, on any number of
-/// threads.
+/// Checks a solve without time for any phase, on any number of threads. It ends after the first iteration, which always
+/// runs.
 #[test]
 fn a_budget_holds_on_several_threads() {
     let (mut problem, xs, us) = gait();
     let mut solver = Fddp::new(&problem);
     (solver.settings.threads, solver.settings.max_iterations) = (3, 2);
-    let free = solver.solve(&mut problem, &xs, &us).unwrap().clone(); // from here on, phases have durations
+    let free = solver.solve(&mut problem, &xs, &us).unwrap().clone(); // phases have durations after this solve
     solver.settings.time_budget = Some(Duration::from_nanos(1));
     let solution = solver.solve(&mut problem, &xs, &us).unwrap();
     assert!(solution.status == Status::TimeLimit && solution.trace == free.trace[..1]);
     assert!(solution.timings.overrun > Duration::ZERO);
 }
 
-/// Unicycle whose derivatives panic at one knot, on whichever thread computes them.
+/// Unicycle whose derivatives panic at one knot, on any thread that computes them.
 struct Fragile(Unicycle, usize);
 
 impl ActionModel for Fragile {
@@ -232,7 +233,7 @@ impl ActionModel for Fragile {
     }
 }
 
-/// A panic on one thread ends the solve, and no thread waits for ever.
+/// Checks that a panic on one thread ends the solve, and that no thread waits for ever.
 #[test]
 fn a_panic_reaches_the_caller() {
     for fragile in [0, 17, 39] {

@@ -1,20 +1,21 @@
-//! Quadratic programs with bounds, solved by projected Newton steps.
-#![allow(non_snake_case)] // the names of the literature
+//! Solution of quadratic programs with bounds, by projected Newton steps.
+#![allow(non_snake_case)] // names follow the literature
 
 use condyle_linalg::{SLACK, dot, eliminate, solve_right};
 use nalgebra::DMatrix;
 
-/// Maximum number of Newton steps by Crocoddyl's rule, and then by the careful rule.
+/// Maximum number of Newton steps with Crocoddyl's rule. If they do not converge, the same number of steps follows with
+/// the careful rule.
 const STEPS: usize = 100;
 
-/// Largest gradient entry of the free variables at which the iteration has converged.
+/// Convergence tolerance: largest gradient entry of the free variables at a solution.
 const GRADIENT: f64 = 1e-5;
 
 /// Fraction of the decrease that the slope predicts. A step is accepted if the objective falls by more than this
-/// fraction.
+/// fraction of the predicted decrease.
 const ACCEPT: f64 = 0.1;
 
-/// Number of step lengths that a line search tries: 2⁻ⁿ for n = 0, 1, ….
+/// Number of step lengths that a line search tries: 1, ½, …, 2⁻⁹.
 const STEP_LENGTHS: i32 = 10;
 
 /// Workspace for a quadratic program with bounds,
@@ -24,21 +25,22 @@ const STEP_LENGTHS: i32 = 10;
 /// ```
 ///
 /// by the method of Tassa, Mansard, Todorov (ICRA 2014, section III), with the rules and constants of Crocoddyl's box
-/// solvers. A variable is clamped if it lies on a bound and the gradient pushes it outwards. The other variables are
-/// free and make a Newton step, which is clamped at the bounds.
-/// In Crocoddyl's rule for accepting a step, the slope of the free variables has the wrong sign, so a step may raise
-/// the objective. The iteration usually converges nevertheless, to the same set of clamped variables. Where it cycles
+/// solvers. A variable is clamped if it lies on a bound and the negative gradient points outside that bound. The other
+/// variables are free: they make a Newton step, whose result is moved into the bounds.
+///
+/// Crocoddyl's rule for accepting a step uses the slope of the free variables with the wrong sign, so a step may raise
+/// the objective. The iteration usually still converges, to the same set of clamped variables. If the iteration cycles
 /// (18 of the 600 problems of `tests/box_qp.rs`), the rule of the paper is used.
-/// problems of the test below), the rule of the paper is used.
 #[derive(Debug, Clone)]
 pub(crate) struct BoxQp {
     pub(crate) x: Vec<f64>,
-    /// Indices of the variables that the last Newton step moved, in ascending order.
+    /// Indices of the variables that were free in the last Newton step, in ascending order.
     pub(crate) free: Vec<usize>,
     gradient: Vec<f64>,
     step: Vec<f64>,
     trial: Vec<f64>,
-    /// Matrix [H_ff; g_fᵀ] of the free variables f with gradient g; elimination replaces H_ff by its factor.
+    /// Matrix [H_ff; g_fᵀ] of the free variables f with gradient g; the elimination replaces H_ff by its Cholesky
+    /// factor.
     H: Vec<f64>,
     upper: Vec<f64>,
 }
@@ -57,7 +59,7 @@ impl BoxQp {
         }
     }
 
-    /// Solves the program from `start`, which is first moved into the bounds. The results are `x` and `free`.
+    /// Solves the program from `start`, which is first moved into the bounds. Writes the results to `x` and `free`.
     ///
     /// # Errors
     /// Index of a variable and its pivot, if the block of H for the free variables is not positive definite.
@@ -74,7 +76,7 @@ impl BoxQp {
             self.x[i] = start.min(upper[i]).max(lower[i]);
         }
         for n in 0..2 * STEPS {
-            // g = q + H x
+            // gradient g = q + H x of the objective
             self.gradient[..m].copy_from_slice(q);
             for j in 0..m {
                 for i in 0..m {
@@ -118,8 +120,8 @@ impl BoxQp {
         Ok(())
     }
 
-    /// Takes the longest accepted step length, if one exists. `careful` selects the rule by which steps are accepted:
-    /// the rule of the paper, or else Crocoddyl's.
+    /// Takes a step of the longest length that is accepted, if one is. If `careful`, the rule of the paper accepts
+    /// steps; otherwise Crocoddyl's rule does.
     fn line_search(&mut self, H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64], careful: bool) {
         let m = q.len();
         if !careful {
@@ -143,7 +145,7 @@ impl BoxQp {
     }
 }
 
-/// Returns ½ xᵀ H x + qᵀ x.
+/// Returns the objective ½ xᵀ H x + qᵀ x.
 fn objective(H: &DMatrix<f64>, q: &[f64], x: &[f64]) -> f64 {
     let curvature: f64 = H.column_iter().zip(x).map(|(column, xj)| xj * dot(column.as_slice(), x)).sum();
     0.5 * curvature + dot(q, x)

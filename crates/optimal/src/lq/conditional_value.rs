@@ -1,5 +1,5 @@
-//! Conditional value functions: the lowest cost of a segment of a horizon. They are functions of the state at the start
-//! of the segment, and of a multiplier for the state after its end.
+//! Conditional value functions. Such a function is the lowest cost of a segment of a horizon, as a function of the
+//! state at the start of the segment and of a multiplier for the state after its end.
 //!
 //! Let x be the state at the first knot of a segment and z the state after its last knot. The lowest cost of the
 //! segment plus λᵀz, with a multiplier λ as a parameter, is quadratic in x and λ:
@@ -8,8 +8,9 @@
 //! V(x, λ) = ½ xᵀPx + pᵀx + λᵀ(Θ x + θ) − ½ λᵀC λ + const
 //! ```
 //!
-//! The recursion starts after the segment with P = 0, p = 0, Θ = 1, θ = 0, C = 0. The elimination of a Riccati step
-//! then computes V knot by knot, if rows for λ are appended below H (notation as in [`Sweep`](crate::Sweep)):
+//! The recursion starts after the last knot of the segment with P = 0, p = 0, Θ = 1, θ = 0, C = 0. Rows for λ are
+//! appended below the quadratic form H of a Riccati step (notation as in [`Sweep`](crate::Sweep)). The elimination in
+//! the step then computes V knot by knot:
 //!
 //! ```text
 //! ⎡ H       ⎤      ⎡ L  ·   ⎤      Y = Θ⁺B L⁻ᵀ,   Θ = Θ⁺A − Y Xᵀ
@@ -17,18 +18,19 @@
 //! ⎣ Θ⁺[B A] ⎦      ⎣ Y  Θ   ⎦      C = C⁺ + Y Yᵀ
 //! ```
 //!
-//! The optimal z is ∂V/∂λ = Θ x + θ − C λ. If the cost after the segment is ½ zᵀP₁z + p₁ᵀz, the multiplier is λ = P₁z +
-//! p₁. Eliminate z and λ, with P₁ = L Lᵀ and M = 1 + LᵀC L. The value function at the start of the segment then has
+//! The optimal z is ∂V/∂λ = Θ x + θ − C λ. Let the cost after the segment be ½ zᵀP₁z + p₁ᵀz; the multiplier is then λ =
+//! P₁z + p₁. Eliminating z and λ, with P₁ = L Lᵀ and M = 1 + LᵀC L, gives the value function at the start of the
+//! segment:
 //!
 //! ```text
 //! P₀ = P + (ΘᵀL) M⁻¹ (ΘᵀL)ᵀ,      p₀ = p + Θᵀp₁ + (ΘᵀL) M⁻¹ Lᵀ(θ − C p₁)
 //! ```
 //!
 //! Särkkä and García-Fernández, "Temporal parallelization of dynamic programming and linear quadratic control" (IEEE
-//! TAC, 2023), call V a conditional value function, with x and z as variables. Jallet, Dantec, Arlaud, Mansard,
+//! TAC, 2023), introduce conditional value functions, with x and z as variables. Jallet, Dantec, Arlaud, Mansard,
 //! Carpentier, "Parallel and proximal constrained linear-quadratic methods for real-time nonlinear MPC" (RSS 2024), use
-//! x and λ.
-#![allow(non_snake_case)] // the names of the literature
+//! x and λ as variables, as here.
+#![allow(non_snake_case)] // names follow the literature
 
 use super::knot::LqKnot;
 use super::step::Step;
@@ -37,7 +39,7 @@ use condyle_linalg::{
     product_of_upper_lower, product_with_upper, transpose,
 };
 
-/// Value function ½ xᵀP x + pᵀx. P is symmetric, with both triangles filled, and has padding rows.
+/// Value function V(x) = ½ xᵀP x + pᵀx. P is symmetric, with both triangles filled and with padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Value {
     pub(crate) P: Vec<f64>,
@@ -45,7 +47,7 @@ pub(crate) struct Value {
 }
 
 impl Value {
-    /// Creates the value function that is zero for all states, for n states.
+    /// Creates the value function of n states that is zero everywhere.
     pub(crate) fn zeros(n: usize) -> Self {
         Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
     }
@@ -56,26 +58,26 @@ impl Value {
     }
 }
 
-/// Terms Θ, θ and C of a conditional value function, which depend on the multiplier. P and p are in the [`Step`] of the
-/// segment. Matrices have padding rows.
+/// Terms Θ, θ and C of a conditional value function, which depend on the multiplier. The terms P and p are stored in
+/// the [`Step`] of the segment. Matrices have padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentValue {
-    /// Matrix Θ.
+    /// Matrix Θ of the term λᵀΘ x, n × n.
     Theta: Vec<f64>,
-    /// Vector θ.
+    /// Vector θ of the term λᵀθ, n entries.
     theta: Vec<f64>,
-    /// Lower triangle of C.
+    /// Lower triangle of the matrix C of the term −½ λᵀC λ.
     C: Vec<f64>,
 }
 
 impl SegmentValue {
-    /// Creates Θ, θ and C of zeros, for n states.
+    /// Creates matrices Θ and C and a vector θ of zeros, for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         let square = || vec![0.0; (n + SLACK) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
     }
 
-    /// Computes P, p, Θ, θ and C of a segment from its knots; returns whether all Quu were positive definite.
+    /// Computes P, p, Θ, θ and C of a segment from its knots. Returns whether Quu was positive definite at all knots.
     pub(crate) fn run(&mut self, step: &mut Step, knots: &[LqKnot], regularisation: f64) -> bool {
         let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
         let work = &mut step.work;
@@ -88,7 +90,7 @@ impl SegmentValue {
         knots.iter().rev().all(|knot| self.step(step, knot, regularisation))
     }
 
-    /// Makes the step of one knot; returns whether Quu was positive definite.
+    /// Makes the recursion step of one knot. Returns whether Quu was positive definite.
     fn step(&mut self, step: &mut Step, knot: &LqKnot, regularisation: f64) -> bool {
         let (n, m) = (knot.ndx(), knot.nu());
         let (ldt, last) = (n + SLACK, m + n);
@@ -105,7 +107,7 @@ impl SegmentValue {
         for j in 0..n {
             work.P[j * ldt + j] += regularisation;
         }
-        // copy Θ, and rotate its columns back to the order of the state; then update θ and C by Y
+        // copy Θ, with its columns rotated back to the order of the state; then update θ and C with Y
         let (below, split) = (&work.H[last + 1..], n - turn);
         copy_matrix(&mut Theta[turn * ldt..], ldt, View::new(&below[m * ld..], ld), [n, split]);
         if turn > 0 {
@@ -121,8 +123,8 @@ impl SegmentValue {
     }
 }
 
-/// Computation of the value function at the start of a segment from the value function at its end, with scratch.
-/// Matrices have padding rows, and the stride n + 1 + SLACK.
+/// Computation of the value function at the start of a segment from the value function at the end of the segment, with
+/// scratch. Matrices have padding rows and the stride n + 1 + SLACK.
 #[derive(Debug, Clone)]
 pub(crate) struct Link {
     /// Matrix C, with both triangles filled.
@@ -132,7 +134,7 @@ pub(crate) struct Link {
     upper: Vec<f64>,
     /// Product C L.
     CL: Vec<f64>,
-    /// Matrix (C L)ᵀ, and later [Θ, θ − C p₁]ᵀ.
+    /// Matrix (C L)ᵀ, overwritten by [Θ, θ − C p₁]ᵀ.
     rows: Vec<f64>,
     /// Matrix [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride 2n + 1 + SLACK.
     H: Vec<f64>,
@@ -145,9 +147,9 @@ impl Link {
         Self { C: square(), L: square(), upper: square(), CL: square(), rows: square(), H }
     }
 
-    /// Computes the factor L of P₁ = L Lᵀ, and Lᵀ; returns whether the factorisation exists. If some states cost
-    /// nothing, P₁ may be singular, and rounding decides whether a pivot is positive. A second try therefore adds n
-    /// rounding errors of the largest entry to the diagonal.
+    /// Computes the factor L of P₁ = L Lᵀ, and Lᵀ. Returns whether the factorisation exists. P₁ may be singular if some
+    /// states have no cost; rounding then decides whether a pivot is positive. A second try therefore adds n rounding
+    /// errors of the largest entry to the diagonal.
     fn factorise(&mut self, P: &[f64], n: usize) -> bool {
         let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
         let mut largest = 0.0_f64;
@@ -170,8 +172,8 @@ impl Link {
         false
     }
 
-    /// Computes the value function `start` at the start of a segment from the value function `end` at its end. P and p
-    /// of the segment are in `step`. Returns whether `end` is convex.
+    /// Computes the value function `start` at the start of a segment from the value function `end` at the end of the
+    /// segment. P and p of the conditional value function are in `step`. Returns whether `end` is convex.
     pub(crate) fn run(&mut self, step: &Step, segment: &SegmentValue, end: &Value, start: &mut Value) -> bool {
         let (n, work) = (end.p.len(), &step.work);
         let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
@@ -181,7 +183,7 @@ impl Link {
         let Self { C, upper, CL, rows, H, .. } = self;
         let upper = View::new(upper, ld);
 
-        // M = 1 + Lᵀ(C L)
+        // computes M = 1 + Lᵀ(C L)
         copy_symmetric(C, ld, View::new(&segment.C, ldp), n);
         product_with_upper(CL, ld, [n, n], View::new(C, ld), upper);
         transpose(rows, ld, View::new(CL, ld), [n, n]);
@@ -190,14 +192,14 @@ impl Link {
             H[j * ldh + j] += 1.0;
         }
 
-        // [Θ, θ − C p₁]ᵀL
+        // computes [Θ, θ − C p₁]ᵀL
         transpose(rows, ld, View::new(&segment.Theta, ldp), [n, n]);
         for k in 0..n {
             rows[k * ld + n] = segment.theta[k] - dot(&C[k * ld..][..n], &end.p);
         }
         product_with_upper(&mut H[n..], ldh, [n + 1, n], View::new(rows, ld), upper);
 
-        // −P and −(p + Θᵀp₁): the signs are reversed, because the elimination subtracts the terms that are added to P
+        // −P and −(p + Θᵀp₁): both have reversed signs, because the elimination subtracts what the equations add to P
         // and p
         for j in 0..n {
             let (H, P) = (&mut H[(n + j) * ldh + n..][..n + 1], &work.P[j * ldp..][..n]);

@@ -1,5 +1,5 @@
-//! Results of a sweep at one knot, and computation of gains if the sweep eliminated other unknowns than the controls.
-#![allow(non_snake_case)] // the names of the literature: K, Vxx, and Y, U
+//! Result of a sweep at one knot, and the computation of gains if the eliminated unknowns are not the controls.
+#![allow(non_snake_case)] // names follow the literature: K, Vxx, and Y, U
 
 use super::knot::LqKnot;
 use condyle_linalg::{SLACK, View, add_product_vector, copy_matrix, eliminate_rows, transpose};
@@ -9,22 +9,22 @@ use nalgebra::{DMatrix, DVector};
 /// const of the rest of the horizon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnotFeedback {
-    /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
+    /// Feedback gain K = −Quu⁻¹ Qux, nu × ndx; its row is zero for a control at its bound.
     pub K: DMatrix<f64>,
-    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
+    /// Feed-forward term k = −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
     pub k: DVector<f64>,
     /// Gradient of the value function at δx = 0, ndx.
     pub Vx: DVector<f64>,
     /// Hessian of the value function, with the regularisation on its diagonal; ndx × ndx, symmetric.
     pub Vxx: DMatrix<f64>,
-    /// r + Bᵀ(Vx⁺ + Vxx⁺ f), nu; zero for a control at its bound.
+    /// Gradient r + Bᵀ(Vx⁺ + Vxx⁺ f) with respect to δu, nu; zero for a control at its bound.
     pub Qu: DVector<f64>,
-    /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
+    /// Hessian R + BᵀVxx⁺B with respect to δu, with the regularisation on its diagonal; nu × nu, symmetric.
     pub Quu: DMatrix<f64>,
-    /// Expected change of the cost by a full step, [Quᵀk, kᵀQuu k]: the first-order term, and twice the second-order
-    /// term.
+    /// Expected change of the cost by a full step, [Quᵀk, kᵀQuu k]: the first entry is the first-order term, the second
+    /// entry is twice the second-order term.
     pub expected: [f64; 2],
-    /// Whether K, Qu and Quu store the factors from which [`Gains::finish`] computes K and k.
+    /// Whether K, Qu and Quu store factors instead of results. [`Gains::finish`] computes K and k from these factors.
     pub(super) gains_deferred: bool,
 }
 
@@ -44,17 +44,18 @@ impl KnotFeedback {
     }
 }
 
-/// Computation of gains, with scratch. It starts from [L; X; yᵀ], the eliminated columns of the unknowns w, and from
-/// the rows U of the controls δu = U (w, δx):
+/// Computation of gains, with scratch. Its inputs are the matrix [L; X; yᵀ], which is the result of eliminating the
+/// unknowns w, and the matrix U of the controls δu = U (w, δx):
 ///
 /// ```text
 /// Y = U_w L⁻ᵀ,     K = U_x − Y Xᵀ,     k = −Y y
 /// ```
 ///
-/// No other knot needs the gains, so a sweep on several threads leaves them to idle threads.
+/// The steps of other knots do not need the gains. A sweep on several threads therefore defers the gains, and idle
+/// threads compute them.
 #[derive(Debug, Clone)]
 pub(crate) struct Gains {
-    /// Matrix U with columns for (w, δv, δq), and later [Y K]; with padding rows.
+    /// Matrix U with columns for (w, δv, δq), overwritten by [Y K]; with padding rows.
     rows: Vec<f64>,
     /// Matrix [L; X; yᵀ] of a knot whose gains were deferred, with padding rows.
     left: Vec<f64>,
@@ -68,12 +69,12 @@ impl Gains {
         Self { rows: vec![0.0; (m + SLACK) * (m + n)], left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
     }
 
-    /// Allocates the scratch of [`new`](Self::new), and storage for deferred gains.
+    /// Allocates the scratch of [`new`](Self::new), and the matrix for deferred gains.
     pub(super) fn to_finish(n: usize, m: usize) -> Self {
         Self { left: vec![0.0; (m + n + 1 + SLACK) * m], ..Self::new(n, m) }
     }
 
-    /// Writes the gains of a knot, from [L; X; yᵀ].
+    /// Computes the gains of a knot from [L; X; yᵀ], and writes them to the feedback.
     pub(super) fn write(&mut self, left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
         let (n, m, efforts) = (knot.ndx(), knot.nu(), &knot.inverse_dynamics.efforts.numbers);
         let (Self { rows, y, .. }, ld, all) = (self, m + SLACK, m + n);
@@ -82,7 +83,7 @@ impl Gains {
         take_gains(View::new(rows, ld), left.at(all, 0), knot, feedback, y);
     }
 
-    /// Stores [L; X; yᵀ] in the feedback, for [`finish`](Self::finish).
+    /// Stores [L; X; yᵀ] in the feedback, from which [`finish`](Self::finish) computes the gains later.
     pub(super) fn defer(left: View<'_>, knot: &LqKnot, feedback: &mut KnotFeedback) {
         let (n, m) = (knot.ndx(), knot.nu());
         copy_matrix(feedback.Quu.as_mut_slice(), m, left, [m, m]);
@@ -107,8 +108,8 @@ impl Gains {
     }
 }
 
-/// Computes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from yᵀ and from the rows [Y K], with columns for (w, δv, δq).
-/// The length of `scratch` is twice the number of controls, plus padding.
+/// Writes K, k = −Y y and Quᵀk = −yᵀy = −kᵀQuu k to the feedback, from the vector yᵀ and the matrix [Y K] with columns
+/// for (w, δv, δq). The length of `scratch` is twice the number of controls, plus padding.
 pub(super) fn take_gains(
     rows: View<'_>,
     yt: View<'_>,

@@ -1,5 +1,5 @@
 //! Knots of a linear-quadratic problem.
-#![allow(non_snake_case)] // the names of the literature: A, B, Q, …
+#![allow(non_snake_case)] // names follow the literature: A, B, Q, …
 
 use super::rows::ConstraintRows;
 use super::structure::{DynamicsStructure, EulerBlock, InverseDynamicsForm, LARGEST_BLOCK};
@@ -7,46 +7,47 @@ use crate::error::assert_length;
 use core::fmt;
 use nalgebra::{DMatrix, DVector};
 
-/// Absolute value beyond which a number has diverged; the sweep or trial is then abandoned.
+/// Absolute value above which a number has diverged. The sweep or trial is then abandoned.
 pub(crate) const DIVERGED: f64 = 1e30;
 
-/// Knot of a linear-quadratic problem in the changes δx (ndx), δu (nu):
+/// Knot of a linear-quadratic problem. The variables are the changes δx (ndx) of the state and δu (nu) of the controls:
 ///
 /// ```text
 /// minimise   Σₜ ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu    subject to   δx⁺ = A δx + B δu + f
 /// ```
 ///
-/// with lower ≤ δu ≤ upper, and with the constraints `rows`. Q and R are symmetric, with both triangles filled. At the
-/// terminal knot (nu = 0) only Q, q and `rows` are read.
+/// with lower ≤ δu ≤ upper, and with the constraints in `rows`. Q and R are symmetric, with both triangles filled. At
+/// the terminal knot (nu = 0) only Q, q and `rows` are read.
 #[derive(Clone, PartialEq)]
 pub struct LqKnot {
-    /// ∂x⁺/∂x, ndx × ndx.
+    /// Jacobian ∂x⁺/∂x of the dynamics, ndx × ndx.
     pub A: DMatrix<f64>,
-    /// ∂x⁺/∂u, ndx × nu.
+    /// Jacobian ∂x⁺/∂u of the dynamics, ndx × nu.
     pub B: DMatrix<f64>,
-    /// Gap: the predicted next state ⊖ the next state of the trajectory, ndx. Written by the solver.
+    /// Gap, ndx: the predicted next state minus (⊖) the next state of the trajectory. Written by the solver.
     pub f: DVector<f64>,
-    /// ∂²ℓ/∂x², ndx × ndx.
+    /// Hessian ∂²ℓ/∂x² of the cost, ndx × ndx.
     pub Q: DMatrix<f64>,
-    /// ∂²ℓ/∂x∂u, ndx × nu.
+    /// Hessian ∂²ℓ/∂x∂u of the cost, ndx × nu.
     pub S: DMatrix<f64>,
-    /// ∂²ℓ/∂u², nu × nu.
+    /// Hessian ∂²ℓ/∂u² of the cost, nu × nu.
     pub R: DMatrix<f64>,
-    /// ∂ℓ/∂x, ndx.
+    /// Gradient ∂ℓ/∂x of the cost, ndx.
     pub q: DVector<f64>,
-    /// ∂ℓ/∂u, nu.
+    /// Gradient ∂ℓ/∂u of the cost, nu.
     pub r: DVector<f64>,
     /// Lower bound of δu, nu; −∞ for none. Written by the solver.
     pub lower: DVector<f64>,
     /// Upper bound of δu, nu; ∞ for none. Written by the solver.
     pub upper: DVector<f64>,
-    /// General constraints on δx and δu; empty unless the action writes them. A [`Sweep`](crate::Sweep) returns
-    /// [`SweepError::ConstraintRows`](crate::SweepError::ConstraintRows) for a knot with rows, and a solver panics:
-    /// neither ignores them.
+    /// General constraints on δx and δu; empty unless the action writes them. A [`Sweep`](crate::Sweep) does not ignore
+    /// them: it returns [`SweepError::ConstraintRows`](crate::SweepError::ConstraintRows) for a knot with rows. A
+    /// solver panics.
     pub rows: ConstraintRows,
-    /// Structure of A and B, as far as it is known.
+    /// Structure of A and B, if the action has set it.
     pub structure: DynamicsStructure,
-    /// Equations of inverse dynamics, which replace A, B, S, R and part of Q if solver and action support them.
+    /// Equations of inverse dynamics. They replace A, B, S, R and part of Q if both the solver and the action support
+    /// this.
     pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
@@ -63,7 +64,7 @@ impl fmt::Debug for LqKnot {
 }
 
 impl LqKnot {
-    /// Maximum number of states, and of controls: it bounds the size of a knot's matrices.
+    /// Maximum number of states, and of controls. It limits the size of a knot's matrices.
     pub const MOST_SIZE: usize = 4096;
 
     /// Creates a knot of zeros with ndx states and nu controls without bounds.
@@ -138,16 +139,16 @@ fn assert_shape(name: &str, matrix: &DMatrix<f64>, shape: (usize, usize)) {
 /// [`dynamics_hessian`](crate::ActionModel::dynamics_hessian).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hessian {
-    /// ∂²ψ/∂x², ndx × ndx, symmetric.
+    /// Second derivatives ∂²ψ/∂x², ndx × ndx, symmetric.
     pub xx: DMatrix<f64>,
-    /// ∂²ψ/∂x∂u, ndx × nu.
+    /// Second derivatives ∂²ψ/∂x∂u, ndx × nu.
     pub xu: DMatrix<f64>,
-    /// ∂²ψ/∂u², nu × nu, symmetric.
+    /// Second derivatives ∂²ψ/∂u², nu × nu, symmetric.
     pub uu: DMatrix<f64>,
 }
 
 impl Hessian {
-    /// Creates zeros for ndx states and nu controls.
+    /// Creates a Hessian of zeros for ndx states and nu controls.
     #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }

@@ -1,4 +1,4 @@
-//! Linear-quadratic problem, the only form in which a solver sees a horizon, and the sweep that solves this problem.
+//! Linear-quadratic problem of a horizon, and the sweep that solves it.
 
 mod box_qp;
 mod conditional_value;

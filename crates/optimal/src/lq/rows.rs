@@ -1,5 +1,5 @@
 //! Constraint rows of a linear-quadratic knot.
-#![allow(non_snake_case)] // C and D
+#![allow(non_snake_case)] // names follow the literature: C, D
 
 use nalgebra::DMatrix;
 
@@ -9,8 +9,9 @@ use nalgebra::DMatrix;
 /// lower ≤ C δx + D δu + c ≤ upper
 /// ```
 ///
-/// A row with equal bounds is an equation. Each row stores one run of consecutive columns of [C D]; its other entries
-/// are zero. A bound on one coordinate therefore takes one number. No memory is allocated before the first row.
+/// A row with equal bounds is an equality. For each row, only one run of consecutive columns of [C D] is stored; the
+/// entries outside the run are zero. A bound on one coordinate therefore stores a single entry. No memory is allocated
+/// before the first row.
 ///
 /// # Examples
 /// ```
@@ -33,10 +34,10 @@ pub struct ConstraintRows {
     numbers: Vec<f64>,
 }
 
-/// Row as it is stored.
+/// Row in its stored form: the position of its entries, its value and its bounds.
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
-    /// First column of the run, and the end of the run in `numbers`.
+    /// First column of the run in [C D]; the next field is the end of the run in `numbers`.
     first: usize,
     end: usize,
     c: f64,
@@ -44,14 +45,14 @@ struct Row {
     upper: f64,
 }
 
-/// Row of [`ConstraintRows`].
+/// Row of [`ConstraintRows`]: lower ≤ entries · (δx, δu) + c ≤ upper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstraintRow<'a> {
     /// First column of the run in [C D]: an index of δx, or ndx plus an index of δu.
     pub first: usize,
     /// Entries of the run.
     pub entries: &'a [f64],
-    /// Value at δx = 0, δu = 0.
+    /// Value of the constraint at δx = 0, δu = 0.
     pub c: f64,
     /// Lower bound; −∞ for none.
     pub lower: f64,
@@ -70,14 +71,14 @@ impl ConstraintRows {
         self.rows.is_empty()
     }
 
-    /// Removes all rows, and keeps the memory.
+    /// Removes all rows; the memory is kept.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.numbers.clear();
     }
 
-    /// Appends a row. Zeros at the beginning and the end of its run are not stored. Allocates if there were never as
-    /// many rows and numbers.
+    /// Appends a row. Zeros at the beginning and the end of the row's run are not stored. Allocates if the rows exceed
+    /// the memory of earlier rows.
     pub fn push(&mut self, row: ConstraintRow<'_>) {
         let ConstraintRow { first, entries, c, lower, upper } = row;
         let start = entries.iter().position(|x| *x != 0.0).unwrap_or(0);
@@ -98,7 +99,7 @@ impl ConstraintRows {
     /// Returns C (rows × ndx) and D (rows × nu) as full matrices. Allocates.
     ///
     /// # Panics
-    /// If a row does not end within ndx + nu columns.
+    /// If a row extends beyond ndx + nu columns.
     #[track_caller]
     pub fn dense(&self, ndx: usize, nu: usize) -> [DMatrix<f64>; 2] {
         self.assert_columns(ndx + nu);
@@ -111,7 +112,7 @@ impl ConstraintRows {
         [C, D]
     }
 
-    /// Panics if a row ends after the given number of columns.
+    /// Panics if a row extends beyond the given number of columns.
     #[track_caller]
     pub(super) fn assert_columns(&self, columns: usize) {
         for (i, row) in self.iter().enumerate() {

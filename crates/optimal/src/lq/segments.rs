@@ -1,23 +1,24 @@
 //! Backward sweep in several segments of the horizon at the same time.
 //!
-//! To process S segments at a time, the horizon of N knots is cut into S + 1 segments. A step of a conditional value
-//! function ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep. The
-//! last segment is therefore one and a half times as long as the others. The time, counted in steps of a sweep, is
+//! To process S segments at the same time, the horizon of N knots is cut into S + 1 segments. A step of a conditional
+//! value function ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep.
+//! The last segment, which needs only a sweep, is therefore 1½ times as long as the others. The times below are counted
+//! in steps of a sweep:
 //! ```text
-//! segment            0      1 … S − 1     S
-//! at the same time          conditional   sweep         1½ N / (S + 1½)
-//! one by one                link          link          1.3 to 1.9 each, from S to 2: what comes after S − 1, …, 0
-//! at the same time   sweep  sweep                       N / (S + 1½)
+//! segment          0      1 … S − 1         S       time
+//! in parallel             conditional V     sweep   1½ N / (S + 1½)
+//! in sequence             link                      1.3 to 1.9 for each link, from segment S − 1 to segment 1
+//! in parallel      sweep  sweep                     N / (S + 1½)
 //! ```
-//!
-//! The cuts and the operations depend on S, not on the number of threads that share the segments. The results are
+//! The cuts and the operations depend on S, but not on the number of threads that process the segments. The results are
 //! therefore the same to the last bit for any number of threads.
 //!
-//! A link loses digits if C and the value function are large, which happens where controls cost next to nothing. At the
-//! end, two value functions at each cut are therefore compared: the one from which a segment was swept, and the one
-//! that the sweep of the next segment computed. If they differ by more than rounding, or if anything failed before, the
-//! whole horizon is swept again as one segment.
-#![allow(non_snake_case)] // the names of the literature
+//! A link computes the value function at a cut from the value function at the next cut. It loses digits if C and the
+//! value function are large, which happens if controls cost almost nothing. After the sweep, two value functions are
+//! therefore compared at each cut: the result of the link, and the result of the sweep of the segment after the cut. If
+//! they differ by more than rounding errors, or if any step failed before, the whole horizon is swept again as one
+//! segment.
+#![allow(non_snake_case)] // names follow the literature
 
 use super::conditional_value::{Link, SegmentValue, Value};
 use super::feedback::KnotFeedback;
@@ -27,9 +28,9 @@ use super::step::{Step, SweepError, SweepOptions};
 use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
-/// Largest accepted difference of two value functions at a cut: the one from which a segment was swept, and the one
-/// that the sweep of the next segment computed. The difference is relative to the largest entry. Chosen as the accuracy
-/// of a sweep; for robots the differences are a thousandth of it.
+/// Largest accepted difference of two value functions at a cut, relative to the largest entry. The sweep of the segment
+/// before the cut started from the first; the sweep of the segment after the cut computed the second. The bound is the
+/// accuracy of a sweep. For robots, the differences are a thousandth of the bound.
 const CONSISTENT: f64 = 1e-9;
 
 /// Segments of a horizon.
@@ -43,22 +44,22 @@ pub(crate) struct Segments {
 /// Segment, with its workspace.
 #[derive(Debug, Clone)]
 struct Segment {
-    /// Knots of the segment.
+    /// Index range of the segment's knots.
     knots: Range<usize>,
     step: Step,
     /// Terms Θ, θ and C of the conditional value function; P and p are in `step`.
     value: SegmentValue,
     /// Value function at the knot after the segment.
     end: Value,
-    /// Outcome of the sweep.
+    /// Outcome of the sweep of this segment.
     result: Result<(), SweepError>,
-    /// Whether the conditional value function was computed.
+    /// Whether the conditional value function of this segment was computed.
     good: bool,
 }
 
 impl Segments {
-    /// Creates the segments for processing `at_once` of them at a time, in a horizon of `horizon` knots with the sizes
-    /// `sizes`. Returns `None` if `at_once` is one, or if the horizon is too short for two segments.
+    /// Creates the segments of a horizon of `horizon` knots with the sizes `sizes`; `at_once` segments are processed at
+    /// the same time. Returns `None` if `at_once` is one, or if the horizon is too short for two segments.
     pub(super) fn new(at_once: usize, horizon: usize, sizes: Sizes) -> Option<Self> {
         let at_once = at_once.min(horizon.saturating_sub(2));
         if at_once < 2 {
@@ -76,13 +77,14 @@ impl Segments {
         Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(sizes.n) })
     }
 
-    /// Returns whether a segment may contain a knot. A knot with bounded controls is excluded, since its value function
-    /// is not quadratic in a multiplier. A knot with constraint rows is left to the sweep in one segment.
+    /// Returns whether a sweep in segments supports a knot. Knots with bounded controls are not supported, because
+    /// their value function is not quadratic in a multiplier. Knots with constraint rows are not supported; the sweep
+    /// in one segment reports them.
     fn serve(knot: &LqKnot) -> bool {
         !knot.is_bounded() && knot.rows.is_empty()
     }
 
-    /// Sweeps the horizon in segments; returns `None` if it must be swept as one segment.
+    /// Sweeps the horizon in segments. Returns `None` if the horizon must be swept as one segment.
     pub(crate) fn run(
         &mut self,
         knots: &[LqKnot],
@@ -113,7 +115,7 @@ impl Segments {
         self.all.windows(2).all(consistent).then_some(Ok(()))
     }
 
-    /// Computes the value function at the end of each segment except the last; returns whether this succeeded.
+    /// Computes the value function at the end of each segment except the last one. Returns whether this succeeded.
     fn link(&mut self) -> bool {
         let Self { all, link } = self;
         let last = all.len() - 1;
@@ -132,7 +134,7 @@ impl Segments {
 }
 
 impl Value {
-    /// Returns whether P, p equal Vxx, Vx up to rounding; false for NaN.
+    /// Returns whether P, p equal Vxx, Vx within the tolerance; false for NaN.
     fn is_near(&self, Vxx: &[f64], Vx: &[f64]) -> bool {
         let n = Vx.len();
         let near = |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= CONSISTENT * scale);
@@ -142,33 +144,33 @@ impl Value {
     }
 }
 
-/// Pass over the segments.
+/// Pass over the segments of a horizon.
 #[derive(Clone, Copy)]
 enum Pass {
-    /// Sweep of the last segment, and conditional value function of the others.
+    /// First pass: a sweep of the last segment, and conditional value functions of the other segments.
     Begin,
-    /// Sweep, from the value function at the end of the segment.
+    /// Second pass: a sweep of each segment, from the value function at its end.
     Finish,
 }
 
-/// Pass with its inputs, carried out for each segment of a slice.
+/// Pass and its inputs, which are the same for all segments.
 #[derive(Clone, Copy)]
 struct SegmentTask<'a> {
     pass: Pass,
     /// Knots of the whole horizon.
     knots: &'a [LqKnot],
     regularisation: f64,
-    /// Whether threads share the segments.
+    /// Whether several threads process the segments.
     parallel: bool,
 }
 
 impl SegmentTask<'_> {
-    /// Does the task for each of `segments`; `feedback` contains the feedback of all knots.
+    /// Carries out the pass for each of `segments`; `feedback` contains the feedback of all knots.
     fn over(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         self.run(segments, &mut feedback[segments[0].knots.start..]);
     }
 
-    /// Does the task for consecutive segments; `feedback` begins at the first knot of the first segment.
+    /// Carries out the pass for consecutive segments; `feedback` begins at the first knot of the first segment.
     fn run(self, segments: &mut [Segment], feedback: &mut [KnotFeedback]) {
         if let [segment] = segments {
             return self.run_one(segment, feedback);
@@ -183,7 +185,7 @@ impl SegmentTask<'_> {
         }
     }
 
-    /// Does the task for one segment; `feedback` begins at the first knot of the segment.
+    /// Carries out the pass for one segment; `feedback` begins at the first knot of the segment.
     fn run_one(self, segment: &mut Segment, feedback: &mut [KnotFeedback]) {
         let Self { pass, knots, regularisation, .. } = self;
         let Segment { knots: range, step, value, end, result, good } = segment;

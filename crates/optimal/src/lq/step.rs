@@ -1,5 +1,5 @@
 //! Steps of the Riccati recursion.
-#![allow(non_snake_case)] // the names of the literature: H, L, X, Vxx
+#![allow(non_snake_case)] // names follow the literature: H, L, X, Vxx
 
 use super::feedback::KnotFeedback;
 use super::forms::{Curvature, CurvatureFn, Forms, Sizes};
@@ -10,24 +10,24 @@ use super::workspace::Workspace;
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// Quu has a pivot that is not positive: the problem is not convex in the control at that knot. More regularisation
-    /// helps.
+    /// The matrix Quu has a pivot that is not positive: the problem is not convex in the control at that knot. A larger
+    /// regularisation helps.
     #[error("knot {knot}: Quu is not positive definite (pivot {row} is {pivot:e})")]
     NotPositive {
         /// Index of the knot.
         knot: usize,
-        /// Row of the pivot.
+        /// Index of the pivot's row in Quu.
         row: usize,
         /// Value of the pivot.
         pivot: f64,
     },
-    /// The value function is infinite, NaN, or larger than 1e30.
+    /// The value function has an entry that is infinite, NaN, or larger than 1e30.
     #[error("knot {knot}: the value function is not finite")]
     NotFinite {
         /// Index of the knot.
         knot: usize,
     },
-    /// The knot has [constraint rows](crate::LqKnot::rows), which the sweep does not treat.
+    /// The knot has [constraint rows](crate::LqKnot::rows), which a sweep does not support.
     #[error("knot {knot}: the sweep does not treat constraint rows")]
     ConstraintRows {
         /// Index of the knot.
@@ -35,37 +35,38 @@ pub enum SweepError {
     },
 }
 
-/// Options of a sweep, which hold for all of its knots.
+/// Options of a sweep, the same for all knots.
 pub(super) struct SweepOptions<'a> {
-    /// Number that is added to the diagonals of Quu and Vxx.
+    /// Regularisation, which is added to the diagonals of Quu and Vxx.
     pub(super) regularisation: f64,
-    /// Whether gains are deferred, if a form supports it: see [`Gains`](super::feedback::Gains).
+    /// Whether a form may defer the computation of gains: see [`Gains`](super::feedback::Gains).
     pub(super) defers_gains: bool,
-    /// Function that computes the curvature of the dynamics; `None` if they count as linear.
+    /// Function that computes the curvature of the dynamics; `None` if the dynamics count as linear.
     pub(super) curvature: Option<&'a mut CurvatureFn<'a>>,
 }
 
 impl SweepOptions<'_> {
-    /// Returns the options for linear dynamics, with gains that are not deferred.
+    /// Returns the options of a sweep without curvature of the dynamics and without deferred gains.
     pub(super) fn linear(regularisation: f64) -> Self {
         Self { regularisation, defers_gains: false, curvature: None }
     }
 }
 
-/// Step of the recursion, with its workspace.
+/// Step of the Riccati recursion, with its workspace.
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
     pub(super) work: Workspace,
     /// Whether Vxx is written to the feedback.
     pub(super) keep: bool,
     forms: Forms,
-    /// Curvature of the dynamics, one entry for each number of controls that occurs at knots with curvature.
+    /// Storage for the curvature of the dynamics: one Hessian for each number of controls that occurs at knots with
+    /// curvature.
     hessians: Vec<Hessian>,
 }
 
 impl Step {
-    /// Allocates the workspace for knots of the given sizes, with `below` additional rows in H. The dynamics may be
-    /// curved at knots whose number of controls is in `curved`.
+    /// Allocates the workspace for knots of the given sizes, with `below` additional rows in H. `curved` lists the
+    /// numbers of controls of the knots whose dynamics may have curvature.
     pub(super) fn new(sizes: Sizes, below: usize, mut curved: Vec<usize>) -> Self {
         curved.sort_unstable();
         curved.dedup();
@@ -92,7 +93,8 @@ impl Step {
         self.back(first, &knots[..last], feedback, options)
     }
 
-    /// Makes the steps at `knots`, which begin with knot `first`, from P and p of the knot after the last of them.
+    /// Makes the steps at `knots`, which begin with knot `first`, starting from P and p of the knot that follows
+    /// `knots`.
     pub(super) fn back(
         &mut self,
         first: usize,
@@ -108,7 +110,7 @@ impl Step {
         Ok(())
     }
 
-    /// Makes one step: P, p of knot t + 1 become P, p of knot t, and the gains of knot t are written.
+    /// Makes one step: replaces P, p of knot t + 1 by P, p of knot t, and writes the gains of knot t.
     fn step(
         &mut self,
         t: usize,
@@ -132,8 +134,8 @@ impl Step {
         Ok(())
     }
 
-    /// Writes H of a knot, and below H the product of Θ and the map to δx⁺. Returns the workspace that contains H, and
-    /// the rotation of the states in H.
+    /// Writes H of a knot, and to the rows below H the product of Θ and the map to δx⁺. Returns the workspace that
+    /// contains H, and the rotation of the states in H.
     pub(super) fn write_with_rows_below(
         &mut self,
         knot: &LqKnot,
@@ -148,7 +150,7 @@ impl Step {
         (work, form.turn(knot.ndx()))
     }
 
-    /// Adds ϱ 1 to Vxx, and writes Vx and Vxx to the feedback of knot t.
+    /// Adds the regularisation ϱ 1 to Vxx, and writes Vx and Vxx to the feedback of knot t.
     fn finish(&mut self, t: usize, feedback: &mut KnotFeedback, regularisation: f64) -> Result<(), SweepError> {
         match self.work.finish_value(feedback, regularisation, self.keep) {
             true => Ok(()),
@@ -157,7 +159,7 @@ impl Step {
     }
 }
 
-/// Returns an error if knot t has constraint rows, which the recursion does not treat.
+/// Returns an error if knot t has constraint rows, which the recursion does not support.
 fn check_rows(t: usize, knot: &LqKnot) -> Result<(), SweepError> {
     if knot.rows.is_empty() { Ok(()) } else { Err(SweepError::ConstraintRows { knot: t }) }
 }

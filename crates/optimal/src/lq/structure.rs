@@ -1,29 +1,30 @@
-//! Structure of a knot's dynamics, which a sweep may exploit: blocks of A and B, or equations that replace A and B.
-#![allow(non_snake_case)] // A, B, T, E
+//! Structure of a knot's dynamics that makes a sweep faster: blocks of A and B, or equations that replace A and B.
+#![allow(non_snake_case)] // names follow the literature: A, B, T, E
 
 use condyle_linalg::{SLACK, SparseRows};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Maximum number of rows of a block, needed by a free joint.
+/// Maximum number of rows of a block: six, as for a free joint.
 pub(crate) const LARGEST_BLOCK: usize = 6;
 
 /// Structure of the matrices A and B of an [`LqKnot`](crate::LqKnot).
 ///
-/// The structure is unknown unless the action sets it, each time that it differentiates. Let x = (q, v), with nv
-/// numbers each for a change of q and of v. The next state follows by semi-implicit Euler from an acceleration a(x, u):
+/// The structure is unknown unless the action sets it, each time that the action computes derivatives. Let x = (q, v);
+/// a change of q and a change of v have nv entries each. The next state follows from an acceleration a(x, u) by a
+/// semi-implicit Euler step:
 ///
 /// ```text
 /// v⁺ = v + a Δt,   q⁺ = q ⊕ v⁺ Δt:      A = ⎡ T 0 ⎤ + ⎡ Δt E ⎤ A_v,   B = ⎡ Δt E ⎤ B_v
 ///                                           ⎣ 0 0 ⎦   ⎣   1  ⎦           ⎣   1  ⎦
 /// ```
 ///
-/// where A_v, B_v are the last nv rows of A and B. T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ at δ = v⁺ Δt are the identity,
-/// except for one block per joint whose configurations are not a vector space. A sweep that knows the structure
-/// multiplies only by A_v and B_v, with half the operations.
+/// where A_v, B_v are the last nv rows of A and B. The matrices T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ are taken at δ = v⁺
+/// Δt. They are the identity, except for one block per joint whose configurations are not a vector space. If the
+/// structure is known, a sweep multiplies only by A_v and B_v, with half the operations.
 ///
-/// A and B must nevertheless contain all of their entries. The structure is a promise about A and B, which is not
-/// checked.
+/// The action must still write all entries of A and B. A sweep does not check whether A and B have the structure that
+/// the action has set.
 ///
 /// # Examples
 /// ```
@@ -37,31 +38,31 @@ pub(crate) const LARGEST_BLOCK: usize = 6;
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DynamicsStructure {
-    /// Δt, if the structure is known.
+    /// Time step Δt (s), if the structure is known.
     dt: Option<f64>,
     blocks: Vec<EulerBlock>,
     /// Whether the knot is given as equations of inverse dynamics instead of A and B.
     inverse_dynamics: bool,
 }
 
-/// Blocks of T and E of one joint; see [`DynamicsStructure`].
+/// Blocks of T and E for one joint; see [`DynamicsStructure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EulerBlock {
-    /// First row and column of the block.
+    /// Index of the first row and column of the block.
     pub(crate) start: usize,
-    /// ∂(q ⊕ δ)/∂q.
+    /// Block of T = ∂(q ⊕ δ)/∂q.
     pub T: DMatrix<f64>,
-    /// ∂(q ⊕ δ)/∂δ.
+    /// Block of E = ∂(q ⊕ δ)/∂δ.
     pub E: DMatrix<f64>,
 }
 
 impl DynamicsStructure {
-    /// Sets the structure to unknown. Keeps the memory of blocks.
+    /// Sets the structure to unknown. The memory of the blocks is kept.
     pub fn set_dense(&mut self) {
         (self.dt, self.inverse_dynamics) = (None, false);
     }
 
-    /// Marks the knot as given by equations of inverse dynamics, until the structure is unknown again.
+    /// Marks the knot as given by equations of inverse dynamics, until [`set_dense`](Self::set_dense) is called.
     pub(crate) fn set_inverse_dynamics(&mut self) {
         self.inverse_dynamics = true;
     }
@@ -71,9 +72,9 @@ impl DynamicsStructure {
         self.inverse_dynamics
     }
 
-    /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for one block
-    /// over each of `ranges`, at most six rows and columns each. Returns the blocks, which the caller must write.
-    /// Allocates the blocks at the first call.
+    /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for blocks:
+    /// each of `ranges` gives the rows and columns of one block, at most six. Returns the blocks; the caller must write
+    /// them. Allocates the blocks at the first call.
     pub fn set_euler(&mut self, dt: f64, ranges: &[Range<usize>]) -> &mut [EulerBlock] {
         self.dt = Some(dt);
         let fits = |(block, range): (&EulerBlock, &Range<usize>)| block.range() == *range;
@@ -87,35 +88,36 @@ impl DynamicsStructure {
         &mut self.blocks
     }
 
-    /// Returns Δt and the blocks, if the structure is semi-implicit Euler.
+    /// Returns Δt and the blocks; `None` if the structure is not semi-implicit Euler.
     pub(crate) fn euler(&self) -> Option<(f64, &[EulerBlock])> {
         Some((self.dt?, &self.blocks))
     }
 }
 
 impl EulerBlock {
-    /// Returns the rows and columns of the block.
+    /// Returns the range of the rows and columns of the block.
     pub(crate) fn range(&self) -> Range<usize> {
         self.start..self.start + self.T.nrows()
     }
 }
 
-/// Equations of inverse dynamics at a knot, as rows with columns for (w, δv, δq); see
-/// [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the block of `Q` for δq are taken from the knot;
-/// its `A`, `B`, `S` and `R` are not used.
+/// Equations of inverse dynamics at a knot. Their rows have columns for (w, δv, δq); see
+/// [`InverseDynamics`](super::forms::InverseDynamics). The form also reads `r`, `q` and the block of `Q` for δq from
+/// the knot; it does not read the knot's `A`, `B`, `S` and `R`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
-    /// Distance between consecutive rows, the same for all rows.
+    /// Stride: distance between consecutive rows in the buffers of all matrices.
     pub(crate) stride: usize,
-    /// Runs of consecutive coordinates that are unknowns: [first coordinate, first unknown, number of coordinates].
+    /// Runs of consecutive coordinates whose accelerations are unknowns: [first coordinate, first unknown, number of
+    /// coordinates].
     pub(crate) own: Vec<[usize; 3]>,
-    /// Coordinates that are not unknowns, in ascending order.
+    /// Coordinates whose accelerations are not unknowns, in ascending order.
     pub(crate) dependent: Vec<usize>,
-    /// Matrix U of δu = U (w, δv, δq). Its masks are not written, because not every form reads masks.
+    /// Matrix U of δu = U (w, δv, δq). Its zero masks are not written, because not every form reads them.
     pub(crate) efforts: SparseRows,
-    /// Matrix D, with one row for each dependent coordinate.
+    /// Matrix D of the equations for dependent coordinates, one row for each.
     pub(crate) steps: SparseRows,
-    /// Matrix G: the gradients of residuals that depend on more than δq.
+    /// Matrix G: its rows are the gradients of residuals that depend on more than δq.
     pub(crate) costs: SparseRows,
     /// First and second derivative of the cost, a′ and a″, with respect to each residual of `costs`.
     pub(crate) slopes: Vec<[f64; 2]>,
@@ -124,8 +126,8 @@ pub(crate) struct InverseDynamicsForm {
 }
 
 impl InverseDynamicsForm {
-    /// Allocates the form for a knot of nv coordinates and nu controls, with a maximum number of dependent coordinates
-    /// and of rows of costs.
+    /// Allocates the form for a knot of nv coordinates and nu controls. `dependent` and `costs` are the maximum numbers
+    /// of dependent coordinates and of residual rows.
     pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
         self.stride = nu + 2 * nv + SLACK;
         self.own.reserve(nv);
@@ -137,7 +139,7 @@ impl InverseDynamicsForm {
         }
     }
 
-    /// Moves U and D out, into the returned form, while G is being written.
+    /// Moves U and D to the returned value, so that they can be read while G is written.
     pub(crate) fn lend(&mut self) -> Self {
         let stride = self.stride;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
@@ -152,7 +154,7 @@ impl InverseDynamicsForm {
         *self = Self { costs, slopes, diagonal, ..lent };
     }
 
-    /// Copies G.
+    /// Copies G, and the derivatives of the cost with respect to its residuals.
     pub(crate) fn set_costs(&mut self, rows: &[f64], slopes: &[[f64; 2]]) {
         self.costs.resize(slopes.len(), self.stride);
         for (to, from) in self.costs.numbers.chunks_exact_mut(self.stride).zip(rows.chunks_exact(self.stride)) {

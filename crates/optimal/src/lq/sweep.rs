@@ -1,5 +1,5 @@
 //! Backward sweep that solves a linear-quadratic problem.
-#![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
+#![allow(non_snake_case)] // names follow the literature: A, B, Q, …, K, Vxx
 
 use super::feedback::{Gains, KnotFeedback};
 use super::forms::Sizes;
@@ -11,8 +11,8 @@ use condyle_dynamics::level::level;
 
 /// Backward Riccati sweep, with its workspace.
 ///
-/// With the gap as a constant third coordinate, the step of one knot eliminates δu from a quadratic form. Let F = [B A
-/// f], and let P, p be the value function of the next knot. Then
+/// The step of one knot eliminates δu from a quadratic form, in which the constant 1 is a third coordinate after δu and
+/// δx. Let F = [B A f], and let P, p be the value function of the next knot. Then
 ///
 /// ```text
 /// W = (P F)ᵀ,   last row += pᵀ                          P f + p is the gradient at the predicted state
@@ -24,27 +24,27 @@ use condyle_dynamics::level::level;
 /// [K k]ᵀ = −[X; yᵀ] L⁻¹
 /// ```
 ///
-/// A regularisation ϱ ≥ 0 is added to the diagonals of Quu (before it is factorised) and of Vxx (before the previous
-/// knot uses it), as in Crocoddyl.
+/// A regularisation ϱ ≥ 0 is added to the diagonals of Quu (before its factorisation) and of Vxx (before the step of
+/// the previous knot uses Vxx), as in Crocoddyl.
 ///
-/// A knot whose A and B have the structure of semi-implicit Euler ([`DynamicsStructure`](crate::DynamicsStructure))
-/// takes half the operations. With N = (Δt EᵀP₁₁ + P₂₁) T, Π = Δt²EᵀP₁₁E + Δt (EᵀP₁₂ + P₂₁E) + P₂₂, and A_v = [F_q
-/// F_v], B_v = G,
+/// A step takes half the operations if A and B have the structure of semi-implicit Euler
+/// ([`DynamicsStructure`](crate::DynamicsStructure)). With N = (Δt EᵀP₁₁ + P₂₁) T, Π = Δt²EᵀP₁₁E + Δt (EᵀP₁₂ + P₂₁E) +
+/// P₂₂, and A_v = [F_q F_v], B_v = G,
 ///
 /// ```text
 /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   H += W [G F_v F_q],   H_qq += F_qᵀN + TᵀP₁₁T
 /// ```
 ///
-/// When [`Fddp`](crate::Fddp) sweeps a robot's knots, they are given without A and B, as equations of inverse dynamics.
+/// [`Fddp`](crate::Fddp) passes a robot's knots to the sweep as equations of inverse dynamics, without A and B.
 /// Accelerations and contact forces are then eliminated instead of the controls, with the same results. See
 /// [`Settings::inverse_dynamics_form`](crate::Settings::inverse_dynamics_form).
 ///
 /// If δu is bounded, k solves the quadratic program of its knot by projected Newton steps (Tassa, Mansard, Todorov,
-/// ICRA 2014), and only the controls that are not at a bound are eliminated. The steps start from minus the k of the
-/// last run, as in Crocoddyl; the start only matters if two sets of active bounds are equally good.
+/// ICRA 2014). Only the controls that are not at a bound are eliminated. The Newton steps start from −k of the last
+/// run, as in Crocoddyl. The start changes the result only if two sets of active bounds are equally good.
 ///
-/// The cost of a dense knot is about 2 n²(n + m) + n (n + m)² + m n (n + m)
-/// operations for n = ndx, m = nu. Allocates nothing after [`new`](Self::new).
+/// A dense knot takes about 2 n²(n + m) + n (n + m)² + m n (n + m) operations, with n = ndx and m = nu. Nothing is
+/// allocated after [`new`](Self::new).
 ///
 /// # Examples
 /// ```
@@ -64,23 +64,24 @@ use condyle_dynamics::level::level;
 pub struct Sweep {
     feedback: Vec<KnotFeedback>,
     step: Step,
-    /// Requested number of segments, and the workspaces of the segments if the number is above one.
+    /// Requested number of segments; the next field contains the workspaces of the segments if this number is above
+    /// one.
     at_once: usize,
     segments: Option<Segments>,
-    /// Scratch for deferred gains, one for each thread: see [`follow`](Self::follow).
+    /// Scratch for deferred gains, one element for each thread: see [`follow`](Self::follow).
     gains: Vec<Gains>,
     sizes: Sizes,
 }
 
 impl Sweep {
-    /// Allocates a workspace for problems with the dimensions of `knots`, whose last is the terminal one.
+    /// Allocates a workspace for problems with the dimensions of `knots`, the last of which is the terminal knot.
     ///
     /// # Panics
-    /// If `knots` is empty, the shapes of a knot do not fit each other, ndx differs from knot to knot, or the terminal
-    /// knot has controls.
+    /// If `knots` is empty, the shapes of a knot do not fit each other, ndx differs between knots, or the terminal knot
+    /// has controls.
     #[track_caller]
     pub fn new(knots: &[LqKnot]) -> Self {
-        level(); // selected now, because reading CONDYLE_LEVEL allocates
+        level(); // selects the SIMD level now, because reading CONDYLE_LEVEL allocates
         assert!(!knots.is_empty(), "`knots` is empty, expected at least the terminal knot");
         let terminal = &knots[knots.len() - 1];
         let n = terminal.ndx();
@@ -95,24 +96,24 @@ impl Sweep {
     }
 
     /// Sets the number of segments of the horizon that [`run`](Self::run) processes at the same time. `run` uses the
-    /// threads of the rayon pool in which it is called, or else of the global pool. The number of segments changes the
-    /// result only by rounding; the number of threads does not change it at all. With 1 segment, the default, `run`
-    /// stays on the caller's thread.
+    /// threads of the rayon pool from which it is called, or else of the global pool. The number of segments changes
+    /// the result only by rounding errors; the number of threads does not change the result at all. With 1 segment, the
+    /// default, `run` uses only the caller's thread.
     ///
     /// S segments on S cores take at least as long as 2½ N / (S + 1½) + 1.8 (S − 1) steps of a sweep; one segment takes
-    /// N steps. Beyond S = √N this time no longer falls. The following upper limits of the speed-up come from measured
-    /// times of the steps (`benches/riccati.rs`), for N = 100 and (ndx, nu) = (76, 32) / (36, 12) / (14, 7). They are
-    /// 1.4 / 1.4 / 1.4 with S = 2, 1.9 / 2.0 / 2.0 with S = 4 and 2.5 / 2.6 / 2.8 with S = 8. They exclude the time in
-    /// which threads synchronise. Measured on two cores, a solve with S = 2 was 1.25 times as fast as with S = 1 for a
-    /// humanoid (5.3 ms per sweep). It was as fast for a quadruped (0.9 ms), and slower for an arm (0.14 ms). On one
-    /// core, S segments take 1.3 to 3 times as long as one.
+    /// N steps. For S above √N, more segments do not lower this time. The following upper limits of the speed-up follow
+    /// from measured times of the steps (`benches/riccati.rs`), for N = 100 and (ndx, nu) = (76, 32) / (36, 12) / (14,
+    /// 7). They are 1.4 / 1.4 / 1.4 with S = 2, 1.9 / 2.0 / 2.0 with S = 4 and 2.5 / 2.6 / 2.8 with S = 8. They exclude
+    /// the time in which threads synchronise. On two cores, a solve for a humanoid (5.3 ms per sweep) was measured 1.25
+    /// times as fast with S = 2 as with S = 1. A solve for a quadruped (0.9 ms) was equally fast, and a solve for an
+    /// arm (0.14 ms) was slower. On one core, S segments take 1.3 to 3 times as long as one.
     ///
-    /// A sweep with bounds on controls or with curvature of the dynamics nevertheless uses one segment. If segments
-    /// lose too many digits, or a segment by itself has no minimum, the sweep is repeated in one segment. To avoid this
-    /// repetition, R must be positive definite by itself.
+    /// A sweep with bounds on controls or with curvature of the dynamics always uses one segment. If segments lose too
+    /// many digits, or the cost of a segment alone has no minimum, the sweep is repeated in one segment. A positive
+    /// definite R avoids this repetition.
     ///
-    /// Sources: Särkkä and García-Fernández, 2023; Jallet, Dantec, Arlaud, Mansard, Carpentier, RSS 2024. Allocates if
-    /// the number of segments has changed. `run` does not allocate, except by rayon itself.
+    /// Sources: Särkkä and García-Fernández, 2023; Jallet, Dantec, Arlaud, Mansard, Carpentier, RSS 2024. This method
+    /// allocates if the number of segments has changed. `run` does not allocate, except by rayon itself.
     ///
     /// # Panics
     /// If `segments` is 0.
@@ -125,14 +126,14 @@ impl Sweep {
         }
     }
 
-    /// Resets the sweep, so that the next run starts as if it were the first.
+    /// Sets the feed-forward k of all knots to zero. The Newton steps of the next run start from −k.
     pub(crate) fn forget(&mut self) {
         for feedback in &mut self.feedback {
             feedback.k.fill(0.0);
         }
     }
 
-    /// Sets whether the next runs write Vxx to the knots.
+    /// Sets whether the next runs write Vxx to the feedback.
     pub(crate) fn keep_values(&mut self, keep: bool) {
         self.step.keep = keep;
     }
@@ -147,8 +148,8 @@ impl Sweep {
     ///
     /// # Errors
     /// [`SweepError`] if a Quu is not positive definite, the value function is not finite, or a knot has constraint
-    /// rows. The knots before the failing one then keep their old values; with several segments, some of them may have
-    /// new values.
+    /// rows. The results of the knots before the failing knot then keep their old values. With several segments, some
+    /// of these results may be new.
     ///
     /// # Panics
     /// If the shapes of `knots` differ from the shapes given to [`new`](Self::new).
@@ -163,14 +164,14 @@ impl Sweep {
     }
 
     /// Sweeps as [`run`](Self::run) does, for dynamics with curvature. At each knot `curvature(t, λ, hessian)` is
-    /// called for the second derivatives of λᵀ φₜ, where λ = Vx⁺ + Vxx⁺ f is the gradient of the value function at the
-    /// predicted state. `curvature` returns whether it wrote the derivatives.
+    /// called; it computes the second derivatives of λᵀ φₜ. The vector λ = Vx⁺ + Vxx⁺ f is the gradient of the value
+    /// function at the predicted state. `curvature` returns whether it wrote the derivatives.
     ///
     /// # Errors
-    /// As [`run`](Self::run).
+    /// The same errors as [`run`](Self::run).
     ///
     /// # Panics
-    /// As [`run`](Self::run).
+    /// The same panics as [`run`](Self::run).
     #[track_caller]
     pub fn run_with(
         &mut self,
@@ -183,13 +184,14 @@ impl Sweep {
         self.step.run(0, knots, &mut self.feedback, &mut options)
     }
 
-    /// Returns whether the sweep can process knots before all knots are computed; a sweep in several segments cannot.
+    /// Returns whether the sweep can process the last knots before the first ones are computed. A sweep in several
+    /// segments cannot.
     pub(crate) fn is_sequential(&self) -> bool {
         self.segments.is_none()
     }
 
-    /// Begins a sweep that receives the knots while they are computed, and defers their gains. Returns the sweep, the
-    /// feedback that it writes, and scratch for `threads` threads that compute deferred gains.
+    /// Begins a sweep that receives groups of knots as soon as they are computed, and that defers the gains. Returns
+    /// the sweep, the feedback that it writes, and scratch for `threads` threads that compute deferred gains.
     pub(crate) fn follow(&mut self, threads: usize) -> (FollowingSweep<'_>, &mut [KnotFeedback], &mut [Gains]) {
         let Self { feedback, step, gains, sizes, .. } = self;
         gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.deferred_controls()));
@@ -208,15 +210,16 @@ impl Sweep {
 /// Sweep that receives the knots in groups, from the last to the first.
 pub(crate) struct FollowingSweep<'a> {
     step: &'a mut Step,
-    /// Whether the next group ends with the terminal knot.
+    /// Whether the next group is the last group of the horizon, which ends with the terminal knot.
     is_at_end: bool,
 }
 
 impl FollowingSweep<'_> {
-    /// Sweeps the next group of knots, whose first is knot `first`. The first group ends with the terminal knot.
+    /// Sweeps the next group of knots, which begins with knot `first`. The group of the first call ends with the
+    /// terminal knot.
     ///
     /// # Errors
-    /// As [`Sweep::run`]. The sweep is then over.
+    /// The same errors as [`Sweep::run`]. After an error the sweep must not continue.
     pub(crate) fn run(
         &mut self,
         first: usize,

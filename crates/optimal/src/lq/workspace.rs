@@ -1,26 +1,27 @@
-//! Workspace of a step of the sweep.
-#![allow(non_snake_case)] // the names of the literature: P, F, W, H
+//! Workspace of one step of the Riccati sweep.
+#![allow(non_snake_case)] // names follow the literature: P, F, W, H
 
 use super::feedback::KnotFeedback;
 use super::knot::{DIVERGED, LqKnot};
 use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric_turned, copy_with_squares};
 
-/// Value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step computes from it. Matrices
-/// are column-major with padding rows. P has the stride n + SLACK; the others have the stride [`stride`](Self::stride).
+/// Workspace: the value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step computes from
+/// it. Matrices are column-major with padding rows. P has the stride n + SLACK; the others have the stride
+/// [`stride`](Self::stride).
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
-    /// Hessian Vxx⁺ of the value function, symmetric and full.
+    /// Hessian Vxx⁺ of the value function, symmetric, with both triangles filled.
     pub(crate) P: Vec<f64>,
-    /// Gradient Vx⁺ of the value function, and later Vx⁺ + Vxx⁺ f.
+    /// Gradient Vx⁺ of the value function, overwritten by the gradient Vx⁺ + Vxx⁺ f at the predicted state.
     pub(crate) p: Vec<f64>,
-    /// Matrix [B A]ᵀ, or the transpose of the last rows of [B A], in the order of the columns of H.
+    /// Matrix [B A]ᵀ, or the transpose of the last rows of [B A]. Its rows are in the order of the columns of H.
     pub(crate) F: Vec<f64>,
-    /// Product of P with [B A], transposed, and similar products.
+    /// Transpose of the product of P with [B A], and of similar products.
     pub(crate) W: Vec<f64>,
-    /// Lower triangle of the quadratic form [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ]. Additional rows below it are used by a segment,
-    /// or hold the map from the unknowns and δx to the controls.
+    /// Lower triangle of the quadratic form [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ]. Further rows below it are used by a segment of
+    /// the horizon, or contain the map from the unknowns and δx to the controls.
     pub(crate) H: Vec<f64>,
-    /// Number of rows below the quadratic form.
+    /// Number of rows below the quadratic form in H.
     below: usize,
 }
 
@@ -38,7 +39,7 @@ impl Workspace {
         }
     }
 
-    /// Returns the stride of F, W and H at a knot with m controls: m + n + 1 rows, the rows below, and padding.
+    /// Returns the stride of F, W and H at a knot with m controls: m + n + 1 rows, plus the rows below and padding.
     pub(crate) fn stride(&self, m: usize) -> usize {
         m + self.p.len() + 1 + self.below + SLACK
     }
@@ -50,21 +51,21 @@ impl Workspace {
         copy_matrix(&mut self.P, n + SLACK, View::new(knot.Q.as_slice(), n), [n, n]);
     }
 
-    /// Adds P f to p, which becomes the gradient at the predicted state.
+    /// Adds P f to p; the result is the gradient at the predicted state.
     pub(crate) fn move_by(&mut self, f: &[f64]) {
         if f.iter().any(|f| *f != 0.0) {
             add_scaled_product(&mut self.p, 1.0, View::new(&self.P, f.len() + SLACK), f);
         }
     }
 
-    /// Sets P = Vxx and p = Vx from H, with stride `ld`. The first `eliminated` columns of H are eliminated, and the
-    /// states of H are rotated by `turn`.
+    /// Copies the value function from H (stride `ld`) to P = Vxx and p = Vx. The first `eliminated` columns of H are
+    /// eliminated, and the states of H are rotated by `turn`.
     pub(crate) fn take_value(&mut self, ld: usize, eliminated: usize, turn: usize) {
         let Self { P, p, H, .. } = self;
         let n = p.len();
         let states = &H[eliminated * (ld + 1)..];
         copy_symmetric_turned(P, n + SLACK, View::new(states, ld), n, turn);
-        let (after, before) = p.split_at_mut(turn); // states in H after and before the wrap-around
+        let (after, before) = p.split_at_mut(turn); // states of H after and before the wrap-around
         let mut at = n;
         for part in [before, after] {
             for p in part {
@@ -74,8 +75,8 @@ impl Workspace {
         }
     }
 
-    /// Adds ϱ 1 to P. Writes p to the feedback, and P if `keep` is set. Returns whether P and p are finite and have not
-    /// diverged.
+    /// Adds the regularisation ϱ 1 to P. Writes p to the feedback, and P if `keep` is set. Returns whether P and p are
+    /// finite and have not diverged.
     pub(crate) fn finish_value(&mut self, feedback: &mut KnotFeedback, regularisation: f64, keep: bool) -> bool {
         let Self { P, p, .. } = self;
         let (n, stride) = (p.len(), p.len() + SLACK);

@@ -1,4 +1,4 @@
-//! Derivatives of actions that are written for any scalar, by hyper-dual numbers.
+//! Derivatives by hyper-dual numbers, for actions that are generic over the scalar type.
 
 use super::action::ActionModel;
 use super::action::differences::write_curvature;
@@ -8,13 +8,13 @@ use condyle_spatial::Scalar;
 use num_dual::HyperDual64;
 use std::any::Any;
 
-/// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of a knot, written for any [`Scalar`]. [`AutoDiff`] turns them into an
-/// action. The rules for [`ActionModel`]s apply here too.
+/// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of a knot, generic over the [`Scalar`] type. [`AutoDiff`] turns an
+/// implementation into an action. The rules for implementations of [`ActionModel`] apply here too.
 pub trait GenericAction: Any + Send + Sync {
     /// Returns the number of entries of a state x.
     fn nx(&self) -> usize;
 
-    /// Returns the number of entries of a change of state δx; nx unless the state lives on a manifold.
+    /// Returns the number of entries of a change of state δx. The default is nx, for states in a vector space.
     fn ndx(&self) -> usize {
         self.nx()
     }
@@ -36,7 +36,7 @@ pub trait GenericAction: Any + Send + Sync {
         None
     }
 
-    /// Computes x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
+    /// Computes the next state x⁺ = φₜ(x, u) into `next` (nx), and returns the cost ℓₜ(x, u).
     fn calc<S: Scalar>(&mut self, t: usize, x: &[S], u: &[S], next: &mut [S]) -> S;
 
     /// Computes x ⊕ δx into `out` (nx). The default is the sum x + δx, for states in a vector space.
@@ -55,15 +55,15 @@ pub trait GenericAction: Any + Send + Sync {
 }
 
 /// Action with exact first and second derivatives of a [`GenericAction`]. Its function [`calc`](GenericAction::calc) is
-/// differentiated by num-dual's hyper-dual numbers,
+/// evaluated with num-dual's hyper-dual numbers,
 ///
 /// ```text
 /// f(z + ε₁eᵢ + ε₂eⱼ) = f + ε₁ ∂f/∂zᵢ + ε₂ ∂f/∂zⱼ + ε₁ε₂ ∂²f/∂zᵢ∂zⱼ
 /// ```
 ///
-/// with z = (δx, δu) along ⊕. With n = ndx + nu, the cost is n (n + 1) / 2 calls, each about ten times as slow as a
-/// call with plain numbers. It is meant for knots of few states, and for first versions. The Hessian of ℓ is the exact
-/// one, not the Gauss–Newton approximation. The curvature of the dynamics
+/// where z = (δx, δu) is a change along ⊕. With n = ndx + nu, the derivatives take n (n + 1) / 2 calls of `calc`. Each
+/// call is about ten times as slow as a call with `f64`. `AutoDiff` is meant for knots with few states and for first
+/// versions of an action. The Hessian of ℓ is exact, not the Gauss–Newton approximation. The curvature of the dynamics
 /// ([`second_order`](crate::Settings::second_order)) is exact too. Allocates only if `calc` does. Source: Fike and
 /// Alonso, *The development of hyper-dual numbers for exact second-derivative calculations* (2011).
 ///
@@ -93,13 +93,13 @@ pub trait GenericAction: Any + Send + Sync {
 #[derive(Debug, Clone)]
 pub struct AutoDiff<A> {
     action: A,
-    /// x, and x ⊕ δx. Shape: nx.
+    /// State x; the next field is x ⊕ δx. Shape: nx.
     x: Vec<HyperDual64>,
     moved: Vec<HyperDual64>,
-    /// δx, and u + δu. Shape: ndx; nu.
+    /// Change δx of the state; the next field is u + δu. Shape: ndx; nu.
     dx: Vec<HyperDual64>,
     u: Vec<HyperDual64>,
-    /// φ(x, u), φ(x ⊕ δx, u + δu) and their difference. Shape: nx; nx; ndx.
+    /// Next state φ(x, u); the next fields are φ(x ⊕ δx, u + δu) and their difference. Shape: nx; nx; ndx.
     centre: Vec<HyperDual64>,
     next: Vec<HyperDual64>,
     change: Vec<HyperDual64>,
@@ -122,12 +122,12 @@ impl<A: GenericAction> AutoDiff<A> {
         }
     }
 
-    /// Returns the differentiated action, so that it can be changed.
+    /// Returns the differentiated action as a mutable reference.
     pub fn action_mut(&mut self) -> &mut A {
         &mut self.action
     }
 
-    /// Computes φ(x, u), from which all changes of the next state are measured.
+    /// Computes the next state φ(x, u), from which the changes of the next state are measured.
     #[track_caller]
     fn start(&mut self, t: usize, x: &[f64], u: &[f64]) {
         assert_length("x", x.len(), self.x.len());
@@ -141,7 +141,7 @@ impl<A: GenericAction> AutoDiff<A> {
         self.action.calc(t, &self.x, &self.u, &mut self.centre);
     }
 
-    /// Returns ℓ, with ε₁ on zᵢ and ε₂ on zⱼ; `change` receives φ ⊖ φ(x, u).
+    /// Returns ℓ with the dual unit ε₁ on zᵢ and ε₂ on zⱼ, and writes φ(x ⊕ δx, u + δu) ⊖ φ(x, u) to `change`.
     fn along(&mut self, t: usize, i: usize, j: usize) -> HyperDual64 {
         let Self { action, x, moved, dx, u, centre, next, change } = self;
         let ndx = dx.len();

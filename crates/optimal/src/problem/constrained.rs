@@ -1,4 +1,4 @@
-//! Actions with constraints, as terms of an augmented Lagrangian.
+//! Action with constraints, which become terms of an augmented Lagrangian.
 
 use super::action::ActionModel;
 use super::group::{Evaluation, KnotGroup, Results, evaluate, lanes};
@@ -9,22 +9,22 @@ use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
 
-/// Action with constraints lower ≤ g(x, u) ≤ upper. The following term is added to its cost, with the multipliers y and
-/// the penalty 1/μ chosen by [`AugmentedLagrangian`](crate::AugmentedLagrangian):
+/// Action with constraints lower ≤ g(x, u) ≤ upper. The following term is added to its cost.
+/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) sets the multipliers y and the penalty 1/μ:
 ///
 /// ```text
-/// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: into the bounds
+/// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: projection on the bounds
 /// ```
 ///
-/// The Hessian of the term is the Gauss–Newton approximation. For a solver without constraints, the term is an ordinary
-/// cost of values outside the bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes the
-/// dynamics once for cost and constraints.
+/// The Hessian of the term is the Gauss–Newton approximation. A solver without support for constraints treats the term
+/// as an ordinary cost of values outside the bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which
+/// computes the dynamics once for cost and constraints.
 pub struct Constrained {
     action: Box<dyn ActionModel>,
     constraint: Box<dyn PathConstraint>,
     multipliers: Multipliers,
     g: Vec<f64>,
-    /// First and second derivatives of the term with respect to g.
+    /// First derivatives of the term with respect to g; the next field contains the second derivatives.
     d: Vec<f64>,
     dd: Vec<f64>,
     gx: DMatrix<f64>,
@@ -32,7 +32,7 @@ pub struct Constrained {
 }
 
 impl Constrained {
-    /// Creates `action` with `constraint` at all knots that the action serves.
+    /// Creates an action that adds `constraint` to `action`, at all knots that use the action.
     pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn PathConstraint>) -> Self {
         let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
         let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
@@ -40,7 +40,7 @@ impl Constrained {
         Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu }
     }
 
-    /// Returns the action, if its type is `T`.
+    /// Returns the wrapped action, if its type is `T`.
     pub fn action_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
         let action: &mut dyn Any = self.action.as_mut();
         action.downcast_mut()
@@ -52,15 +52,15 @@ impl Constrained {
         constraint.downcast_mut()
     }
 
-    /// Computes the term that the constraints add to the cost.
+    /// Computes the term that the constraints add to the action's cost.
     fn term(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         self.constraint.calc(t, x, u, &mut self.g);
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.value(t, 0, &self.g, lower, upper)
     }
 
-    /// Adds the gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, and likewise r, R and S.
-    /// Here d and D are the term's first and second derivatives with respect to g.
+    /// Adds the gradient and the Gauss–Newton Hessian of the constraints' term: q += gₓᵀ d, Q += gₓᵀ D gₓ, and likewise
+    /// r, R and S. Here d and D are the term's first and second derivatives with respect to g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
@@ -188,7 +188,7 @@ impl KnotGroup for Constrained {
         lanes(&mut *self.action)
     }
 
-    /// Evaluates the action, and adds the constraints' term of each knot.
+    /// Evaluates a group of knots of the action, and adds the constraints' term to the cost of each knot.
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
         let (nx, nu) = (self.nx(), self.nu());

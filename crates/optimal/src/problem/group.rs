@@ -1,4 +1,4 @@
-//! Groups of knots, each of which is evaluated in one call.
+//! Groups of knots. One call evaluates all knots of a group.
 
 use super::action::ActionModel;
 use super::multipliers::Visit;
@@ -7,65 +7,64 @@ use crate::lq::LqKnot;
 use core::any::Any;
 use core::ops::Range;
 
-/// Action that computes several knots in one call: in the lanes of a vector register, or in one call to another
-/// language.
+/// Action that computes several knots in one call, for example in the lanes of a SIMD register, or in one call to
+/// another language.
 ///
 /// An action that implements this trait returns itself from [`ActionModel::group_model`]. The default methods loop over
 /// the knots.
 ///
-/// A **group** consists of consecutive knots of the horizon, or of the trials of a line search at one knot. Each knot
-/// of a group is given by its index t in the horizon. States and controls are stored one knot after the other, and so
-/// are the next states.
+/// A **group** consists of consecutive knots of the horizon, or of the trials of a line search at one knot. The index t
+/// of each knot in the horizon is given. The states, the controls and the next states are stored knot after knot.
 pub trait GroupModel: ActionModel {
-    /// Returns the number of states that a group call computes in the time of one state; 1 unless it uses vector lanes.
+    /// Returns the number of states that a group call computes in about the time of one state; 1 without SIMD lanes.
     ///
-    /// A line search tries this number of step lengths side by side.
+    /// A line search evaluates this number of step lengths in one group.
     fn lanes(&self) -> usize {
         1
     }
 
-    /// Returns whether `other` computes the same results as this action, so that the knots of both form one group. Only
-    /// `self` is then used. By default false.
+    /// Returns whether `other` computes the same results as this action. If so, the knots of both actions form one
+    /// group, which is evaluated by `self`. The default is false.
     fn is_same(&self, other: &dyn ActionModel) -> bool {
         let _ = other;
         false
     }
 
-    /// Computes [`calc`](ActionModel::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control
-    /// of `us`.
+    /// Computes [`calc`](ActionModel::calc) for all knots of a group. Knot `knots[i]` has the i-th state of `xs` and
+    /// the i-th control of `us`.
     ///
     /// # Panics
-    /// If the lengths differ from knots.len() times nx, nu, nx and 1.
+    /// If the lengths of the states, controls, next states and costs are not knots.len() times nx, nu, nx and 1.
     #[track_caller]
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         calc_each(self, knots, [xs, us], next, costs);
     }
 
-    /// Computes [`calc_diff`](ActionModel::calc_diff) for a group.
+    /// Computes [`calc_diff`](ActionModel::calc_diff) for all knots of a group.
     ///
     /// # Panics
-    /// If the lengths differ from knots.len() times nx, nu and 1.
+    /// If the lengths of the states, controls and LQ knots are not knots.len() times nx, nu and 1.
     #[track_caller]
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         calc_diff_each(self, knots, [xs, us], lq_knots);
     }
 }
 
-/// Quantities that a group computes.
+/// Kind of quantities that a group evaluation computes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Evaluation<'m> {
-    /// Next states and costs, and the motions (accelerations and forces) if the results store them.
+    /// Next states and costs, and also the motions (accelerations and forces) if the results have storage for them.
     Values,
     /// Derivatives of dynamics and costs.
     Derivatives,
-    /// Derivatives, with the dynamics as equations of inverse dynamics where a knot supports that. They are taken at
-    /// the given motions (accelerations and forces), which have equal length at each knot. If no motions are given,
-    /// they are computed.
+    /// Derivatives of the costs, with the dynamics as equations of inverse dynamics at knots that support this. The
+    /// equations are taken at the given motions (accelerations and forces), which have the same length at each knot. If
+    /// no motions are given, they are computed.
     Equations(&'m [f64]),
 }
 
 impl Evaluation<'_> {
-    /// Returns the evaluation of the knots `knots` of a group of `count` knots.
+    /// Returns the part of this evaluation for the knots `knots` of a group of `count` knots.
     pub(crate) fn part(self, knots: Range<usize>, count: usize) -> Self {
         match self {
             Self::Equations(motions) => {
@@ -77,50 +76,50 @@ impl Evaluation<'_> {
     }
 }
 
-/// Outputs of a group evaluation. It writes either the first three fields, or the last one.
+/// Outputs of a group evaluation. An evaluation writes either the first three fields, or the last one.
 #[derive(Debug)]
 pub struct Results<'a> {
     /// Next states, one after the other.
     pub(crate) next: &'a mut [f64],
-    /// Costs.
+    /// Costs, one for each knot.
     pub(crate) costs: &'a mut [f64],
-    /// Accelerations and forces. Each knot has an equal share, and uses the beginning of it; empty if they are not
-    /// stored.
+    /// Accelerations and forces; empty if they are not stored. Each knot has an equal share of the slice, and uses the
+    /// beginning of its share.
     pub(crate) motions: &'a mut [f64],
-    /// LQ knots with the derivatives.
+    /// LQ knots that receive the derivatives.
     pub(crate) lq_knots: &'a mut [LqKnot],
 }
 
 impl<'a> Results<'a> {
-    /// Returns results that receive values.
+    /// Returns outputs for an evaluation of values.
     pub(crate) fn values(next: &'a mut [f64], costs: &'a mut [f64], motions: &'a mut [f64]) -> Self {
         Self { next, costs, motions, lq_knots: &mut [] }
     }
 
-    /// Returns results that receive derivatives.
+    /// Returns outputs for an evaluation of derivatives.
     pub(crate) fn derivatives(lq_knots: &'a mut [LqKnot]) -> Self {
         Self { next: &mut [], costs: &mut [], motions: &mut [], lq_knots }
     }
 }
 
-/// Knots that are evaluated in one call: knots of a robot, knots of user-defined accelerations, or knots with
-/// constraints. All other actions are evaluated by [`evaluate`].
+/// Knots that are evaluated in one call: knots of a robot, of user-defined accelerations, or with constraints. All
+/// other actions are evaluated by [`evaluate`].
 ///
 /// One group may represent several models of a robot that differ only in costs, limits and durations.
 pub trait KnotGroup {
-    /// Returns the number of states that are computed in the time of one state.
+    /// Returns the number of states that a group call computes in about the time of one state.
     fn lanes(&mut self) -> usize;
 
     /// Evaluates knot `knots[i]` at the i-th state of `xs` and the i-th control of `us`, for all i.
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>);
 
-    /// Passes the constraints of knot t that contribute augmented Lagrangian terms to its cost to `visit`, in their
-    /// order.
+    /// Calls `visit` for the constraints of knot t whose augmented Lagrangian terms are part of the knot's cost, in the
+    /// order of the constraints.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>);
 
-    /// Returns the number of accelerations and forces at which the equations of inverse dynamics of a knot are taken.
-    /// Also returns the maximum numbers of dependent coordinates and of rows of costs. `None` without such equations.
+    /// Returns the sizes of the equations of inverse dynamics: the number of accelerations and forces of a knot, and
+    /// the maximum numbers of dependent coordinates and of residual rows. Returns `None` without such equations.
     fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
         None
     }
@@ -129,13 +128,13 @@ pub trait KnotGroup {
     fn reserve(&mut self) {}
 
     /// Takes over the model of another action of the same kind, as model `place` or as a new model. Returns whether
-    /// this succeeded; the other action is then unused.
+    /// this succeeded; if so, the other action is no longer used.
     fn merge(&mut self, other: &mut dyn ActionModel, place: Option<usize>) -> bool {
         let _ = (other, place);
         false
     }
 
-    /// Selects the model to be changed, among the models that this action represents.
+    /// Selects the model that later changes affect, among the models that this action represents.
     fn choose(&mut self, model: usize) {
         let _ = model;
     }
@@ -151,18 +150,18 @@ pub trait KnotGroup {
         false
     }
 
-    /// Passes to `show` the vectors that the dynamics of knot t compute besides the next state, each with its name.
+    /// Calls `show` for each vector that the dynamics of knot t compute in addition to the next state, with its name.
     fn show_outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         let _ = (t, x, u, show);
     }
 
-    /// Returns the dynamics of the knots; the module of the group knows their type.
+    /// Returns the dynamics of the knots as `Any`. The module that implements the group knows the type.
     fn dynamics(&mut self) -> Option<&mut dyn Any> {
         None
     }
 }
 
-/// Evaluates a group of knots of any action.
+/// Evaluates a group of knots, for any type of action.
 #[track_caller]
 pub(crate) fn evaluate(
     action: &mut dyn ActionModel,
@@ -184,7 +183,7 @@ pub(crate) fn evaluate(
     }
 }
 
-/// Returns the number of states that an action computes in the time of one state.
+/// Returns the number of states that an action computes in about the time of one state.
 pub(crate) fn lanes(action: &mut dyn ActionModel) -> usize {
     let lanes = match action.knot_group_mut() {
         Some(group) => group.lanes(),
@@ -193,7 +192,7 @@ pub(crate) fn lanes(action: &mut dyn ActionModel) -> usize {
     lanes.max(1)
 }
 
-/// Returns the innermost wrapped action as a group of knots, or the action itself if it wraps none.
+/// Returns the innermost wrapped action, or the action itself if it wraps none, as a group of knots.
 pub(crate) fn innermost(action: &mut dyn ActionModel) -> Option<&mut dyn KnotGroup> {
     if action.inner_mut().is_some() {
         return innermost(action.inner_mut()?);

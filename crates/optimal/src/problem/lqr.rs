@@ -1,13 +1,13 @@
-//! Linear dynamics with a quadratic cost, as an action.
-#![allow(non_snake_case)] // the names of the literature
+//! Action with linear dynamics and a quadratic cost.
+#![allow(non_snake_case)] // names follow the literature
 
 use super::action::ActionModel;
 use crate::lq::LqKnot;
 
-/// Action x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper. These matrices and vectors
-/// are fields of an [`LqKnot`].
+/// Action x⁺ = A x + B u + f with the cost ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu and the bounds lower ≤ u ≤ upper.
+/// These matrices and vectors are fields of an [`LqKnot`].
 ///
-/// Without controls it is a terminal action. In Crocoddyl: `ActionModelLQR`.
+/// An `Lqr` without controls is a terminal action. Crocoddyl's equivalent is `ActionModelLQR`.
 ///
 /// ```
 /// use condyle_optimal::{Fddp, LqKnot, Lqr, Problem};
@@ -53,7 +53,7 @@ impl Lqr {
     }
 }
 
-/// Computes y += X z; X has as many columns as z has entries.
+/// Computes y += X z. X has as many columns as z has entries.
 fn add_product(y: &mut [f64], X: &[f64], z: &[f64]) {
     for (column, z) in X.chunks_exact(y.len()).zip(z) {
         y.iter_mut().zip(column).for_each(|(y, x)| *y += x * z);
@@ -64,7 +64,7 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Returns xᵀ X z.
+/// Returns the product xᵀ X z.
 fn product(x: &[f64], X: &[f64], z: &[f64]) -> f64 {
     X.chunks_exact(x.len().max(1)).zip(z).map(|(column, z)| dot(x, column) * z).sum()
 }

@@ -1,4 +1,4 @@
-//! Optimal control problem: actions, horizons of actions, and derivatives of actions that do not compute any.
+//! Optimal control problem: actions, horizons of actions, and derivatives of actions that do not compute derivatives.
 
 mod action;
 mod action_view;

@@ -1,43 +1,43 @@
-//! Actions of a problem. Models of the same kind, which differ only in costs, limits and durations, are represented by
-//! one action, so that their knots are computed in groups.
+//! Models and actions of a problem. Models that differ only in costs, limits and durations are merged into one action,
+//! so that the knots of these models are evaluated in groups.
 
 use super::action::ActionModel;
 use super::group::{innermost, lanes as group_lanes};
 use super::shape::{MOST_ENTRIES, MOST_KNOTS};
 use crate::error::Error;
 
-/// Maximum number of entries in the matrices [A B] of all knots. A solver stores several arrays of that size, 2 GiB
-/// each.
+/// Maximum number of entries in the matrices [A B] of all knots. A solver stores several arrays of this size; each
+/// array takes up to 2 GiB.
 const MOST_NUMBERS: usize = 1 << 28;
 
-/// Maximum number of actions with which a new model is compared; the most recent actions are taken. The limit makes the
-/// time to create a horizon linear in its length, even if all knots differ.
+/// Maximum number of actions with which a new model is compared. The most recent actions are compared. The limit makes
+/// the time to create a horizon linear in its length, even if all knots differ.
 const COMPARED: usize = 64;
 
-/// Positions of the models within the actions.
+/// Position of each model: its action, and its index within that action.
 #[derive(Clone, Default)]
 struct Places {
-    /// Action that represents each model, and the model's index in that action.
+    /// Index of the action that represents each model, and the model's index in that action.
     of: Vec<[usize; 2]>,
     /// Number of models that each action represents.
     counts: Vec<usize>,
-    /// Indices in each action that no model uses any more.
+    /// Unused model indices of each action, which new models may take.
     free: Vec<Vec<usize>>,
 }
 
-/// Actions of a problem, and the action that represents each model.
+/// Actions of a problem, and the assignment of models to actions.
 #[derive(Default)]
 pub(crate) struct Models {
     pub(crate) actions: Vec<Box<dyn ActionModel>>,
-    /// Number of states that each action computes in the time of one state.
+    /// Number of states that each action computes in about the time of one state.
     pub(crate) lanes: Vec<usize>,
     places: Places,
     /// Number of models with which the problem was created.
     given: usize,
 }
 
-/// Moves a model into an action of the same kind, as model `place` of the action or as a new one; returns whether it
-/// did.
+/// Moves a model into an action of the same kind, as model `place` of the action or as a new model. Returns whether
+/// this succeeded.
 fn merge(action: &mut dyn ActionModel, model: &mut dyn ActionModel, place: Option<usize>) -> bool {
     match action.knot_group_mut() {
         Some(group) => group.merge(model, place),
@@ -64,7 +64,8 @@ impl Models {
         all
     }
 
-    /// Finds an action of the model's kind, which represents the model from now on, or adds the model as a new action.
+    /// Returns the position of a model. The model is merged into an action of the same kind, or else added as a new
+    /// action.
     fn place_of(&mut self, mut model: Box<dyn ActionModel>) -> [usize; 2] {
         let Self { actions, lanes, places: Places { counts, free, .. }, .. } = self;
         let first = actions.len().saturating_sub(COMPARED);
@@ -77,7 +78,7 @@ impl Models {
             }
         }
         lanes.push(group_lanes(&mut *model));
-        // an action that represents no model any more is replaced
+        // the new action replaces an action that represents no model any more, if there is one
         match (0..actions.len()).find(|&k| free[k].len() == counts[k]) {
             Some(k) => {
                 (actions[k], lanes[k], counts[k]) = (model, lanes.pop().expect("was just pushed"), 1);
@@ -93,8 +94,8 @@ impl Models {
         }
     }
 
-    /// Adds a model. It replaces model `unused`, if `unused` was added after the problem was created; otherwise it
-    /// becomes a new model. Returns the index of the added model. Allocates.
+    /// Adds a model. The new model replaces model `unused`, if `unused` was added after the problem was created;
+    /// otherwise it gets a new index. Returns the index of the added model. Allocates.
     pub(crate) fn add(&mut self, model: Box<dyn ActionModel>, unused: Option<usize>) -> usize {
         let index = unused.filter(|index| *index >= self.given).unwrap_or(self.len());
         if let Some(&[action, own]) = self.places.of.get(index) {
@@ -114,7 +115,7 @@ impl Models {
         self.given..self.len()
     }
 
-    /// Returns the actions, and the action that represents each model.
+    /// Returns the actions; also returns, for each model, the index of its action and its index in that action.
     pub(crate) fn parts(&mut self) -> (&mut [Box<dyn ActionModel>], &[[usize; 2]]) {
         (&mut self.actions, &self.places.of)
     }
@@ -124,7 +125,7 @@ impl Models {
         self.places.of.len()
     }
 
-    /// Returns the action that represents a model, and the model's index in that action.
+    /// Returns the index of the action that represents a model, and the model's index in that action.
     pub(crate) fn place(&self, model: usize) -> [usize; 2] {
         self.places.of[model]
     }
@@ -134,12 +135,13 @@ impl Models {
         &*self.actions[self.places.of[model][0]]
     }
 
-    /// Returns the action that represents a model, mutable for computing.
+    /// Returns the action that represents a model, as a mutable reference for evaluations.
     pub(crate) fn of_mut(&mut self, model: usize) -> &mut dyn ActionModel {
         &mut *self.actions[self.places.of[model][0]]
     }
 
-    /// Returns the action that represents a model, with this model selected: changes affect only this model.
+    /// Returns the action that represents a model, and selects this model: later changes of the action affect only this
+    /// model.
     pub(crate) fn chosen(&mut self, model: usize) -> Option<&mut dyn ActionModel> {
         let [action, own] = *self.places.of.get(model)?;
         let action = &mut *self.actions[action];
@@ -165,7 +167,7 @@ impl Models {
     }
 }
 
-/// Checks that the models fit together in one problem.
+/// Checks that the dimensions of the models fit together in one problem.
 pub(crate) fn check(
     models: &[Box<dyn ActionModel>],
     knot_models: &[usize],

@@ -1,17 +1,17 @@
-//! Multipliers of an action's constraints, and the terms that they add to its cost.
+//! Multipliers of an action's constraints, and the terms that the constraints add to the action's cost.
 
 use crate::error::Error;
 use std::sync::Arc;
 
-/// Multipliers y of constraints lower ≤ g(x, u) ≤ upper at the knots that an action serves, and the penalty 1/μ. At
-/// each knot, the following term is added to the cost of the action,
+/// Multipliers y of the constraints lower ≤ g(x, u) ≤ upper at the knots of an action, and the penalty 1/μ. At each
+/// knot, the following term is added to the cost of the action,
 ///
 /// ```text
-/// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: into the bounds
+/// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: projection on the bounds
 /// ```
 ///
-/// with the derivative e / μ with respect to g. Its Gauss–Newton curvature is 1/μ outside the bounds and at equalities,
-/// else 0.
+/// whose derivative with respect to g is e / μ. Its Gauss–Newton curvature is 1/μ outside the bounds and at equalities,
+/// and 0 elsewhere.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Multipliers {
     mu: f64,
@@ -19,12 +19,12 @@ pub(crate) struct Multipliers {
     size: usize,
     /// Multipliers y of each knot. Shape: knots × size, padded with zeros. Written by: `start`, `update`.
     y: Vec<f64>,
-    /// Next multipliers e / μ, from each knot's last derivatives. Written by: `slopes`.
+    /// Multipliers e / μ after the next update, from each knot's last derivatives. Written by: `slopes`.
     next: Vec<f64>,
-    /// Violations g − Π g at each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by:
+    /// Violations g − Π g from each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by:
     /// `slopes`.
     excess: Vec<f64>,
-    /// Term of the cost at each knot's last derivatives. Written by: `begin`, `slopes`.
+    /// Constraint term of the cost from each knot's last derivatives. Written by: `begin`, `slopes`.
     terms: Vec<f64>,
 }
 
@@ -35,7 +35,7 @@ impl Clone for Multipliers {
         Self { mu, size, y, next, excess, terms }
     }
 
-    /// Copies without allocating if the number of knots is the same.
+    /// Copies the multipliers; does not allocate if the number of knots is the same.
     fn clone_from(&mut self, other: &Self) {
         (self.mu, self.size) = (other.mu, other.size);
         self.y.clone_from(&other.y);
@@ -45,24 +45,24 @@ impl Clone for Multipliers {
     }
 }
 
-/// Constraints of a knot, and their multipliers.
+/// Constraints of a knot with their bounds and their multipliers.
 pub struct Bounded<'a> {
-    /// Number of constraints.
+    /// Number of constraints of the knot.
     pub(crate) count: usize,
     pub(crate) lower: &'a [f64],
     pub(crate) upper: &'a [f64],
-    /// Groups of constraints that have a name; empty for user-defined constraints.
+    /// Groups of constraints with the same name; empty for user-defined constraints.
     pub(crate) parts: &'a [Part],
     pub(crate) multipliers: &'a mut Multipliers,
 }
 
-/// Consecutive constraints of a knot that share a name.
+/// Consecutive constraints of a knot that have the same name.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) name: Arc<str>,
-    /// First row of the group; the group ends before the first row of the next one.
+    /// Index of the group's first row. The group ends where the next group begins.
     pub(crate) first: usize,
-    /// Whether the rows are functions of the state alone.
+    /// Whether the rows are functions of only the state.
     pub(crate) of_state: bool,
 }
 
@@ -70,7 +70,7 @@ pub(crate) struct Part {
 pub(crate) type Visit<'a> = dyn FnMut(Bounded<'_>) + 'a;
 
 impl Bounded<'_> {
-    /// Checks the bounds.
+    /// Checks that the bounds have the right lengths and that some value satisfies them.
     ///
     /// # Errors
     /// [`Error`] if the bounds have a wrong length or no value satisfies them.
@@ -94,7 +94,7 @@ pub(crate) fn leave_a_value(lower: f64, upper: f64) -> bool {
     lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY // false for NaN
 }
 
-/// Penalty 1/μ that is used unless a solve has chosen another.
+/// Default penalty 1/μ, which is used until a solver sets another.
 pub(crate) const PENALTY: f64 = 10.0;
 
 /// Returns the signed distance of z from the interval [lower, upper]; zero within it.
@@ -118,7 +118,8 @@ impl Multipliers {
         self.size
     }
 
-    /// Sets y to zero at knot t of `knots` knots, and sets μ. Allocates at the first call.
+    /// Sets the multipliers of knot t to zero, and sets μ; the action serves `knots` knots. Allocates at the first
+    /// call.
     pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
         self.mu = mu;
         for numbers in [&mut self.y, &mut self.next, &mut self.excess] {
@@ -132,7 +133,7 @@ impl Multipliers {
         self.mu = mu;
     }
 
-    /// Sets the first entries of y at knot t, after `start`.
+    /// Sets the first entries of y at knot t. `start` must have been called before.
     pub(crate) fn set(&mut self, t: usize, y: &[f64]) {
         self.y[t * self.size..][..y.len()].copy_from_slice(y);
     }
@@ -142,14 +143,14 @@ impl Multipliers {
         &self.y[t * self.size..][..count]
     }
 
-    /// Updates y ← e / μ at knot t.
+    /// Updates the multipliers of knot t: y ← e / μ.
     pub(crate) fn update(&mut self, t: usize) {
         let knot = t * self.size..(t + 1) * self.size;
         self.y[knot.clone()].copy_from_slice(&self.next[knot]);
     }
 
-    /// Returns three results of the last derivatives of knot t. They are the violations g − Π g and the next
-    /// multipliers of the first `count` constraints, and the term of the cost.
+    /// Returns three results of the last derivatives of knot t: the violations g − Π g of the first `count`
+    /// constraints, the next multipliers of these constraints, and the term of the cost.
     pub(crate) fn measured(&self, t: usize, count: usize) -> (&[f64], &[f64], f64) {
         let first = t * self.size;
         (&self.excess[first..][..count], &self.next[first..][..count], self.terms[t])
@@ -159,7 +160,8 @@ impl Multipliers {
         self.y.get(t * self.size + row).copied().unwrap_or(0.0)
     }
 
-    /// Returns the term of the cost for the constraints from index `first` on, which have the values g.
+    /// Returns the term of the cost for the constraints from index `first` on. `g` contains the values of these
+    /// constraints.
     pub(crate) fn value(&self, t: usize, first: usize, g: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
         let mut term = 0.0;
         for i in 0..g.len() {
@@ -170,14 +172,14 @@ impl Multipliers {
         term
     }
 
-    /// Begins the derivatives of knot t: sets its term of the cost to zero.
+    /// Sets the stored term of the cost of knot t to zero, at the beginning of its derivatives.
     pub(crate) fn begin(&mut self, t: usize) {
         if let Some(term) = self.terms.get_mut(t) {
             *term = 0.0;
         }
     }
 
-    /// Computes the first and second derivatives of [`value`](Self::value), into `d` and `dd`.
+    /// Computes the first and second derivatives of [`value`](Self::value) with respect to g, into `d` and `dd`.
     pub(crate) fn slopes(
         &mut self,
         t: usize,

@@ -1,15 +1,16 @@
-//! Derivatives of any action by finite differences, with which tests compare derivatives written by hand.
+//! Derivatives of any action by finite differences, as a reference for tests of hand-written derivatives.
 
 use super::action::ActionModel;
 use super::action::differences::{SECOND, at, calc_diff, write_curvature};
 use crate::lq::{Hessian, LqKnot};
 
-/// Action whose derivatives are central differences of [`calc`](ActionModel::calc), taken with ⊕ and ⊖. The action's
-/// own derivatives are not used.
+/// Action that differentiates another action by central differences of [`calc`](ActionModel::calc), taken with ⊕ and ⊖.
+/// The derivatives of the other action itself are not used.
 ///
 /// First derivatives are accurate to about 1e-9, second derivatives to about 1e-7 (relative to the size of cost and
-/// state). The Hessian is the exact one; a Gauss–Newton approximation differs from it where the residuals are
-/// nonlinear. `NumDiff` is meant for tests: its derivatives take 2 (ndx + nu) + 2 (ndx + nu)² calls, and allocate.
+/// state). The Hessian is exact up to these errors; a Gauss–Newton approximation differs from it if the residuals are
+/// nonlinear. `NumDiff` is meant for tests: its derivatives take 2 (ndx + nu) + 2 (ndx + nu)² calls of `calc`, and
+/// allocate.
 ///
 /// # Examples
 /// ```

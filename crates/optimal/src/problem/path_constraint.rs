@@ -1,4 +1,4 @@
-//! General constraints on states and controls. Their Jacobians are written by hand, or computed by dual numbers or
+//! General constraints on states and controls. Their Jacobians are hand-written, or computed by dual numbers or by
 //! differences.
 
 use super::action::ActionModel;
@@ -11,8 +11,8 @@ use std::any::Any;
 /// Functions of state and control that must stay within bounds: lower ≤ gₜ(x, u) ≤ upper. A function whose bounds are
 /// equal is an equality.
 ///
-/// At a terminal knot u is empty. The rules for [`ActionModel`]s apply here too. With an
-/// [`AutoDiffConstraint`](crate::AutoDiffConstraint) no Jacobian needs to be written.
+/// At a terminal knot u is empty. The rules for implementations of [`ActionModel`] apply here too. An
+/// [`AutoDiffConstraint`](crate::AutoDiffConstraint) computes the Jacobian by itself.
 ///
 /// # Examples
 /// The second entry of the state may not exceed 1:
@@ -33,19 +33,19 @@ use std::any::Any;
 /// }
 /// ```
 pub trait PathConstraint: Any + Send + Sync {
-    /// Returns the number of functions.
+    /// Returns the number of functions in g.
     fn size(&self) -> usize;
 
-    /// Returns the smallest and largest allowed values at knot t, infinite where a function is unbounded. The bounds
-    /// must not change during a solve.
+    /// Returns the lower and upper bounds of g at knot t, infinite for an unbounded function. The bounds must not
+    /// change during a solve.
     fn bounds(&self, t: usize) -> (&[f64], &[f64]);
 
-    /// Computes gₜ(x, u) into `g`.
+    /// Computes the values gₜ(x, u) into `g`.
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
 
     /// Computes ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu).
-    /// Returns whether it computed them. The default returns false: the solver then takes central differences of
-    /// [`calc`](Self::calc), which are slow, allocate, and are accurate to about 1e-9.
+    /// Returns whether the derivatives were computed. The default returns false; the solver then takes central
+    /// differences of [`calc`](Self::calc), which are slow, allocate, and are accurate to about 1e-9.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         let _ = (t, x, u, gx, gu);
         false
@@ -57,7 +57,7 @@ pub trait PathConstraint: Any + Send + Sync {
     }
 }
 
-/// Computes ∂g/∂x and ∂g/∂u of an action's constraint by central differences.
+/// Computes the Jacobians ∂g/∂x and ∂g/∂u of an action's constraint by central differences.
 pub(super) fn calc_diff(
     action: &dyn ActionModel,
     constraint: &mut dyn PathConstraint,
@@ -89,20 +89,22 @@ pub(super) fn calc_diff(
     }
 }
 
-/// Functions of state and control that must stay within bounds, written for any [`Scalar`]. [`AutoDiffConstraint`]
-/// turns them into a [`PathConstraint`]. For user-defined residuals of a robot, which share its kinematics, see
-/// [`OwnConstraint`](crate::robot::OwnConstraint).
+/// Functions of state and control that must stay within bounds, generic over the [`Scalar`] type.
+/// [`AutoDiffConstraint`] turns them into a [`PathConstraint`]. For a robot, see
+/// [`OwnConstraint`](crate::robot::OwnConstraint): its residuals share the kinematics that the robot has already
+/// computed.
 pub trait GenericConstraint: Any + Clone + Send + Sync {
-    /// Returns the number of functions.
+    /// Returns the number of functions in g.
     fn size(&self) -> usize;
 
     /// Returns the bounds, as [`PathConstraint::bounds`] does.
     fn bounds(&self, t: usize) -> (&[f64], &[f64]);
 
-    /// Computes gₜ(x, u) into `g`.
+    /// Computes the values gₜ(x, u) into `g`.
     fn calc<S: Scalar>(&self, t: usize, x: &[S], u: &[S], g: &mut [S]);
 
-    /// Computes x ⊕ δx into `out` (nx), by default the sum x + δx of a vector space. It must equal the ⊕ of the action.
+    /// Computes x ⊕ δx into `out` (nx). The default is the sum x + δx, for states in a vector space. The result must
+    /// equal the action's ⊕.
     fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
         for ((out, &x), &dx) in out.iter_mut().zip(x).zip(dx) {
             *out = x + dx;
@@ -110,8 +112,8 @@ pub trait GenericConstraint: Any + Clone + Send + Sync {
     }
 }
 
-/// Path constraint with an exact Jacobian: [`GenericConstraint::calc`] is differentiated by dual numbers, in ndx + nu
-/// calls.
+/// Path constraint with an exact Jacobian, by dual numbers. One Jacobian takes ndx + nu calls of
+/// [`GenericConstraint::calc`].
 ///
 /// ```
 /// use condyle_optimal::{AutoDiffConstraint, GenericConstraint, PathConstraint};
@@ -136,10 +138,10 @@ pub trait GenericConstraint: Any + Clone + Send + Sync {
 #[derive(Clone, Debug)]
 pub struct AutoDiffConstraint<C> {
     constraint: C,
-    /// x, and x ⊕ δx. Shape: nx. Written by: `calc_diff`.
+    /// State x; the next field is x ⊕ δx. Shape: nx. Written by: `calc_diff`.
     x: Vec<Dual64>,
     moved: Vec<Dual64>,
-    /// δx, u + δu and g. Shape: ndx; nu; size. Written by: `calc_diff`.
+    /// Change δx of the state; the next fields are u + δu and g. Shape: ndx; nu; size. Written by: `calc_diff`.
     dx: Vec<Dual64>,
     u: Vec<Dual64>,
     g: Vec<Dual64>,
@@ -153,7 +155,7 @@ impl<C: GenericConstraint> AutoDiffConstraint<C> {
         Self { constraint, x, moved, dx, u, g }
     }
 
-    /// Returns the differentiated constraint, so that it can be changed.
+    /// Returns the differentiated constraint as a mutable reference.
     pub fn constraint_mut(&mut self) -> &mut C {
         &mut self.constraint
     }

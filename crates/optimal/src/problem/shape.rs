@@ -6,11 +6,11 @@ use core::ops::Range;
 
 /// Maximum number of knots of a horizon.
 pub(crate) const MOST_KNOTS: usize = 1 << 20;
-/// Maximum number of entries of a state, a change of state, or the controls of a knot: matrices of that size take 128
-/// MiB each.
+/// Maximum number of entries of a state, of a change of state, and of the controls of a knot. A square matrix of this
+/// size takes 128 MiB.
 pub(crate) const MOST_ENTRIES: usize = LqKnot::MOST_SIZE;
 
-/// Dimensions of a horizon. They determine the lengths of trajectories and workspaces.
+/// Dimensions of a horizon, which determine the lengths of trajectories and workspaces.
 #[derive(Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Shape {
@@ -25,7 +25,7 @@ impl Clone for Shape {
         Self { nx: self.nx, ndx: self.ndx, offsets: self.offsets.clone() }
     }
 
-    /// Copies the dimensions, without allocating if both horizons have the same length.
+    /// Copies the dimensions. Does not allocate if both horizons have the same length.
     fn clone_from(&mut self, other: &Self) {
         (self.nx, self.ndx) = (other.nx, other.ndx);
         self.offsets.clone_from(&other.offsets);
@@ -41,22 +41,22 @@ impl Shape {
         self.offsets.get(t + 1).map_or(0, |end| end - self.offsets[t])
     }
 
-    /// Returns the range of xₜ in a flat trajectory.
+    /// Returns the index range of xₜ in a flat trajectory.
     pub(crate) fn x(&self, t: usize) -> Range<usize> {
         t * self.nx..(t + 1) * self.nx
     }
 
-    /// Returns the range of δxₜ in a flat trajectory of changes.
+    /// Returns the index range of δxₜ in a flat trajectory of changes.
     pub(crate) fn dx(&self, t: usize) -> Range<usize> {
         t * self.ndx..(t + 1) * self.ndx
     }
 
-    /// Returns the range of uₜ in flat controls; empty at the terminal knot.
+    /// Returns the index range of uₜ in flat controls; empty at the terminal knot.
     pub(crate) fn u(&self, t: usize) -> Range<usize> {
         self.offsets[t]..self.offsets[t] + self.nu(t)
     }
 
-    /// Checks that a shape from a file can be the shape of a problem.
+    /// Checks that the dimensions, read from a file, are valid dimensions of a problem.
     #[cfg(feature = "serde")]
     pub(crate) fn check_itself(&self) -> Result<(), String> {
         let Self { nx, ndx, offsets } = self;

@@ -1,9 +1,10 @@
-//! Derivatives of a horizon on several threads, each with its own copies of the actions, concurrent with the sweep.
+//! Derivatives of a horizon on several threads, concurrent with the sweep. Each thread has its own copies of the
+//! actions.
 //!
-//! A group has as many knots as its model has lanes. From the end of the horizon to its beginning, each group passes
-//! through three steps. The first free thread computes the derivatives of the group. The calling thread sweeps the
-//! group; while it waits for derivatives, it computes derivatives itself. An idle thread computes the gains of the
-//! group.
+//! A group has as many knots as its model has lanes. The groups are processed from the end of the horizon to its
+//! beginning, in three steps. First, a free thread computes the derivatives of the group. Second, the calling thread
+//! sweeps the group. While the derivatives are not ready, the calling thread computes derivatives of other groups.
+//! Third, an idle thread computes the gains of the group.
 
 use super::action::ActionModel;
 use super::group::{Evaluation, Results, evaluate};
@@ -13,35 +14,35 @@ use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
 use core::sync::atomic::AtomicU8;
 
-/// Steps that each group passes through.
+/// Steps of the work on a group, in order: derivatives, sweep, and gains.
 const DERIVE: u8 = 0;
 const SWEEP: u8 = 1;
 const FINISH: u8 = 2;
 
-/// Number of idle polls (a few ms) after which a helper thread returns and leaves the rest to the sweeping thread. Thus
-/// no thread waits for ever, even if other work occupies the pool.
+/// Number of idle polls (a few ms) after which a helper thread returns and leaves the remaining work to the sweeping
+/// thread. A helper thread therefore never waits for ever, even if other work occupies the pool.
 const PATIENCE: usize = 4096;
 
-/// Copies of actions for threads, and the groups of knots that the copies compute.
+/// Copies of actions for other threads, and the division of the knots into groups.
 #[derive(Default)]
 pub(crate) struct Copies {
-    /// Copy of each model, for each thread except the first one.
+    /// Copy of each action, for each thread except the calling one.
     of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
-    /// First knot of each group, and the end of the horizon.
+    /// Index of the first knot of each group, followed by the number of knots.
     cuts: Vec<usize>,
-    /// Index of the action of each group.
+    /// Index of the action that evaluates each group.
     owners: Vec<usize>,
-    /// Scratch for [`Parts`].
+    /// States of the groups, for [`Parts`].
     states: Vec<AtomicU8>,
 }
 
 impl Copies {
-    /// Returns the copies for the second thread, if they exist.
+    /// Returns the copies of the actions for the second thread, if they exist.
     pub(super) fn first(&mut self) -> Option<&mut [Option<Box<dyn ActionModel>>]> {
         self.of.first_mut().map(Vec::as_mut_slice)
     }
 
-    /// Drops the copies of an action that may have changed, or that is new.
+    /// Drops the copies of an action that is new or may have changed.
     pub(crate) fn forget(&mut self, action: usize) {
         for copies in &mut self.of {
             copies.resize_with(copies.len().max(action + 1), || None);
@@ -54,7 +55,7 @@ impl Copies {
         self.of.iter_mut().flatten().flatten().for_each(|copy| copy.shift());
     }
 
-    /// Assigns knot t, of `horizon` knots, to a model that an action represents.
+    /// Assigns knot t, of `horizon` knots, to a model, in all copies of the action that represents this model.
     pub(crate) fn serve(&mut self, action: usize, t: usize, horizon: usize, model: usize) {
         for copy in self.of.iter_mut().filter_map(|copies| copies.get_mut(action)?.as_mut()) {
             if let Some(group) = copy.knot_group_mut() {
@@ -77,7 +78,8 @@ impl Copies {
         }
     }
 
-    /// Computes the groups of knots. They are counted from the start of a run of knots, as on a single thread.
+    /// Divides the knots into groups. As on a single thread, the first group of each run begins at the first knot of
+    /// the run.
     fn group(&mut self, lanes: &[usize], runs: &[(usize, Range<usize>)]) {
         let Self { cuts, owners, .. } = self;
         cuts.clear();
@@ -114,8 +116,9 @@ impl Copies {
     }
 
     /// Computes the derivatives at all knots on as many threads as `gains` has entries. The calling thread passes the
-    /// groups to `sweep`, from the last to the first, each with its model and the index of its first knot. Deferred
-    /// gains are written afterwards. Models that cannot be copied are evaluated on the calling thread only.
+    /// groups to `sweep`, from the last group to the first. The arguments of `sweep` begin with the group's model and
+    /// the index of its first knot. The deferred gains of a group are written after its sweep. Models that cannot be
+    /// copied are evaluated only on the calling thread.
     pub(super) fn calc_diff(
         &mut self,
         Models { actions: models, lanes, .. }: &mut Models,
@@ -134,13 +137,13 @@ impl Copies {
         join(
             || {
                 let parts = groups.parts;
-                let mut tried = parts.count(); // this thread has tried to derive all groups from this index on
+                let mut tried = parts.count(); // this thread has tried to DERIVE all groups from this index on
                 for group in (0..parts.count()).rev() {
                     while !parts.work(group, SWEEP, |first, lq_knots, found| {
                         sweep(&*models[owners[group]], first, lq_knots, found);
                     }) {
                         if parts.is_abandoned() {
-                            return; // another thread has panicked, so this thread will panic too
+                            return; // another thread has panicked, and `join` passes its panic on
                         } else if tried > 0 {
                             tried -= 1;
                             groups.derive(tried, &mut *models[owners[tried]]);
@@ -156,23 +159,23 @@ impl Copies {
     }
 }
 
-/// Knots before the terminal one, as read by all threads.
+/// Trajectory and indices of the knots before the terminal one, which all threads read.
 #[derive(Clone, Copy)]
 pub(super) struct Knots<'a> {
     /// Indices of the knots.
     pub(super) knots: &'a [usize],
-    /// States and controls.
+    /// States of all knots; the next field contains the controls.
     pub(super) xs: &'a [f64],
     pub(super) us: &'a [f64],
     /// Number of entries of a state.
     pub(super) nx: usize,
     /// Offset of the controls of each knot.
     pub(super) offsets: &'a [usize],
-    /// Kind of derivatives.
+    /// Kind of derivatives to compute.
     pub(super) what: Evaluation<'a>,
 }
 
-/// Groups of knots, as all threads use them.
+/// Groups of knots on which all threads work.
 #[derive(Clone, Copy)]
 struct Groups<'a> {
     parts: &'a Parts<'a, LqKnot, KnotFeedback>,
@@ -181,7 +184,7 @@ struct Groups<'a> {
 }
 
 impl Groups<'_> {
-    /// Computes the derivatives at the knots of a group, by its model or a copy, unless another thread computes them.
+    /// Computes the derivatives at the knots of a group, with `model`. Does nothing if another thread computes them.
     fn derive(self, group: usize, model: &mut dyn ActionModel) {
         let Knots { knots, xs, us, nx, offsets, what } = self.knots;
         self.parts.work(group, DERIVE, |first, lq_knots, _| {
@@ -192,13 +195,14 @@ impl Groups<'_> {
         });
     }
 
-    /// Writes the deferred gains of a group, and returns true, if the group has been swept and no other thread writes
-    /// its gains.
+    /// Writes the deferred gains of a group, if the group has been swept and no other thread writes its gains. Returns
+    /// whether this thread wrote them.
     fn finish(self, group: usize, gains: &mut Gains) -> bool {
         self.parts.work(group, FINISH, |_, lq_knots, found| gains.finish(lq_knots, found))
     }
 
-    /// Lets several threads work on the groups, each thread with its own copies of the actions, until no group is left.
+    /// Distributes the groups over several threads, each with its own copies of the actions. Returns when no group is
+    /// left.
     fn spread(self, copies: &mut [Vec<Option<Box<dyn ActionModel>>>], gains: &mut [Gains]) {
         let ([copies], [gains]) = (&mut *copies, &mut *gains) else {
             let half = copies.len() / 2;

@@ -1,4 +1,4 @@
-//! Unicycle as an action: the smallest problem with curved dynamics.
+//! Unicycle as an action, a minimal problem with nonlinear dynamics.
 
 use super::action::ActionModel;
 use crate::lq::{Hessian, LqKnot};
@@ -9,7 +9,7 @@ use crate::lq::{Hessian, LqKnot};
 /// x⁺ = x + Δt (v cos θ, v sin θ, ω),      ℓ = ½ (w₁² ‖x‖² + w₂² ‖u‖²)
 /// ```
 ///
-/// Dynamics and cost equal Crocoddyl's `ActionModelUnicycle`. Allocates nothing.
+/// Dynamics and cost equal the dynamics and cost of Crocoddyl's `ActionModelUnicycle`. Allocates nothing.
 ///
 /// ```
 /// use condyle_optimal::{Fddp, Problem, Status, Unicycle};
@@ -22,7 +22,7 @@ use crate::lq::{Hessian, LqKnot};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unicycle {
-    /// Δt (s).
+    /// Time step Δt (s).
     pub dt: f64,
     /// Weights w₁ and w₂.
     pub weights: [f64; 2],

@@ -1,8 +1,8 @@
-//! Activations: functions that say how much a residual costs.
+//! Activations: functions that convert a residual into a cost.
 
 use crate::problem::leave_a_value;
 
-/// Function a(r) that says how much a residual r costs.
+/// Activation a(r): a function that converts a residual r into a cost.
 ///
 /// ```
 /// use condyle_optimal::robot::Activation;
@@ -14,14 +14,14 @@ use crate::problem::leave_a_value;
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[non_exhaustive]
 pub enum Activation {
-    /// ½ Σ rᵢ².
+    /// Sum of squares, ½ Σ rᵢ².
     Quadratic,
-    /// ½ Σ wᵢ rᵢ².
+    /// Weighted sum of squares, ½ Σ wᵢ rᵢ².
     Weighted(
-        /// Weights w: a number of at least 0 for each entry of the residual.
+        /// Weights w, one for each entry of the residual, at least 0.
         Vec<f64>,
     ),
-    /// ½ Σ (excess of rᵢ over its bounds)²; zero inside the bounds.
+    /// Sum of squares outside bounds, ½ Σ (excess of rᵢ over its bounds)²; zero inside the bounds.
     Barrier {
         /// Lower bounds; −∞ for an entry without a lower bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
@@ -30,7 +30,8 @@ pub enum Activation {
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
         upper: Vec<f64>,
     },
-    /// ½ Σ wᵢ (excess of rᵢ over its bounds)². (In Crocoddyl the value contains wᵢ² instead of wᵢ.)
+    /// Weighted sum of squares outside bounds, ½ Σ wᵢ (excess of rᵢ over its bounds)². (In Crocoddyl the value contains
+    /// wᵢ² instead of wᵢ.)
     WeightedBarrier {
         /// Lower bounds; −∞ for an entry without a lower bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
@@ -38,22 +39,23 @@ pub enum Activation {
         /// Upper bounds; ∞ for an entry without an upper bound.
         #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
         upper: Vec<f64>,
-        /// Weights w: a number of at least 0 for each entry of the residual.
+        /// Weights w, one for each entry of the residual, at least 0.
         weights: Vec<f64>,
     },
-    /// Σ rᵢ, for a residual that is itself a cost. The Gauss–Newton Hessian of this activation is zero; only the
+    /// Sum Σ rᵢ, for a residual that is itself a cost. The Gauss–Newton Hessian of this activation is zero. Only the
     /// residual contributes second derivatives
     /// ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
     Sum,
-    /// Σ √(ε + rᵢ²): nearly Σ |rᵢ|.
+    /// Smooth absolute value, Σ √(ε + rᵢ²), which is close to Σ |rᵢ|.
     Smooth1 {
-        /// Smoothing ε, above 0; the default of Crocoddyl is 1.
+        /// Smoothing parameter ε, above 0; Crocoddyl's default is 1.
         epsilon: f64,
     },
-    /// √(ε + ‖r‖²): nearly ‖r‖. Its Hessian is approximated by ε/a³ times the identity, with the value a of the
-    /// activation. The factor ε/a³ is the smallest eigenvalue of the exact Hessian (for ε = 1 as in Crocoddyl).
+    /// Smooth norm, √(ε + ‖r‖²), which is close to ‖r‖. Its Hessian is approximated by ε/a³ times the identity, with
+    /// the value a of the activation. The factor ε/a³ is the smallest eigenvalue of the exact Hessian (for ε = 1 as in
+    /// Crocoddyl).
     Smooth2 {
-        /// Smoothing ε, above 0; the default of Crocoddyl is 1.
+        /// Smoothing parameter ε, above 0; Crocoddyl's default is 1.
         epsilon: f64,
     },
 }
@@ -102,8 +104,8 @@ impl Activation {
         }
     }
 
-    /// Calls `visit` for each entry rᵢ with the entry's term of the activation and the first and second derivative of
-    /// this term. Only for activations that are sums over entries.
+    /// Calls `visit` for each entry rᵢ, with the term of rᵢ in the activation and the first and second derivatives of
+    /// this term. Supports only activations that are sums over entries.
     #[inline(always)]
     fn each(&self, r: &[f64], mut visit: impl FnMut(usize, [f64; 3])) {
         let beyond = |i: usize, lower: &[f64], upper: &[f64]| {
@@ -123,11 +125,11 @@ impl Activation {
                 let a = (epsilon + r[i] * r[i]).sqrt();
                 visit(i, [a, r[i] / a, epsilon / (a * a * a)]);
             }),
-            Self::Smooth2 { .. } => {} // not a sum over entries
+            Self::Smooth2 { .. } => {} // `Smooth2` is not a sum over entries
         }
     }
 
-    /// Returns an error message if this activation is invalid or does not fit a residual of n numbers.
+    /// Returns an error message if this activation is invalid or does not fit a residual with n entries.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
             true if numbers.iter().any(|x| x.is_nan()) => Some(format!("its {name} holds a NaN")),

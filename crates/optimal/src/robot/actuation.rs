@@ -4,7 +4,7 @@ use crate::Error;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::{DMatrix, DVector};
 
-/// Length, relative to the longest direction, below which a direction counts as rounding error.
+/// Length below which a basis vector is only a rounding error, relative to the longest one.
 const LEAST: f64 = 1e-9;
 
 /// Linear map τ = S u from controls u to joint efforts τ.
@@ -23,15 +23,15 @@ pub struct Actuation {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Map {
-    /// Number of undriven coordinates, which are the first ones: S = [0; 1]. Each other coordinate has one control.
+    /// Number of coordinates without motor, which are the first ones: S = [0; 1]. Each other coordinate has one
+    /// control.
     After(usize),
-    /// Any matrix S, nv × nu.
+    /// Arbitrary matrix S, nv × nu.
     Matrix(DMatrix<f64>),
 }
 
 impl Actuation {
-    /// Creates the actuation with one control for each coordinate, except a free-flyer at the root, which is not
-    /// driven.
+    /// Creates the actuation with one control for each coordinate. A free-flyer at the root has no controls.
     pub fn joints(model: &Model) -> Self {
         let passive = match model.bodies().get(1) {
             Some(root) if root.joint == Joint::FreeFlyer => 6,
@@ -40,7 +40,8 @@ impl Actuation {
         Self { nv: model.nv(), map: Map::After(passive) }
     }
 
-    /// Creates the actuation with any matrix S, nv × nu, for example for rotors, tendons or joints without motors.
+    /// Creates the actuation with an arbitrary matrix S, nv × nu, for example for rotors, tendons or joints without
+    /// motors.
     ///
     /// # Errors
     /// [`Error::Actuation`] if S does not have nv rows or has an entry that is not finite.
@@ -56,7 +57,7 @@ impl Actuation {
         Ok(Self { nv: rows, map: Map::Matrix(S) })
     }
 
-    /// Returns an error if this actuation does not have as many coordinates as the robot.
+    /// Returns an error if the number of coordinates of this actuation differs from the robot's.
     pub(super) fn check(&self, model: &Model) -> Result<(), Error> {
         let (found, nv) = (self.nv, model.nv());
         match found == nv {
@@ -83,8 +84,8 @@ impl Actuation {
         }
     }
 
-    /// Returns the number of undriven coordinates if these are the first coordinates and each other coordinate has one
-    /// control; otherwise `None`.
+    /// Returns the number of coordinates without motor, if these are the first coordinates and each other coordinate
+    /// has one control; otherwise `None`.
     pub(super) fn passive(&self) -> Option<usize> {
         match self.map {
             Map::After(passive) => Some(passive),
@@ -105,7 +106,7 @@ impl Actuation {
         }
     }
 
-    /// Returns (Sᵀ τ)ₖ, the share of the efforts τ along control k.
+    /// Returns entry k of Sᵀ τ: the component of the efforts τ along control k.
     pub(super) fn along(&self, k: usize, tau: &[f64]) -> f64 {
         match &self.map {
             Map::After(passive) => tau[passive + k],
@@ -113,7 +114,8 @@ impl Actuation {
         }
     }
 
-    /// Computes g_u += c S_row, where S_row is the gradient of the effort of coordinate `row` with respect to u.
+    /// Computes g_u += c S_row, where S_row is row `row` of S: the gradient of the effort of coordinate `row` with
+    /// respect to u.
     pub(super) fn add_row(&self, row: usize, c: f64, g_u: &mut [f64]) {
         match &self.map {
             Map::After(passive) if row < *passive => {}
@@ -122,7 +124,8 @@ impl Actuation {
         }
     }
 
-    /// Computes g_u += c (X S)_row, where (X S)_row is row `row` of X S and X = ∂y/∂τ has nv columns.
+    /// Computes g_u += c (X S)_row, where (X S)_row is row `row` of the product X S. X is a derivative with respect to
+    /// τ and has nv columns.
     pub(super) fn add_product_row(&self, X: &DMatrix<f64>, row: usize, c: f64, g_u: &mut [f64]) {
         let (rows, X) = (X.nrows(), X.as_slice());
         match &self.map {
@@ -140,8 +143,8 @@ impl Actuation {
         }
     }
 
-    /// Returns X S (rows × nu, column after column) for a matrix X with nv columns. The result is in `scratch`, or a
-    /// slice of X if each control drives one coordinate.
+    /// Returns X S (rows × nu, column after column) for a matrix X with nv columns. The product is written to
+    /// `scratch`. If each control drives one coordinate, the result is a slice of X instead.
     pub(super) fn columns<'a>(&self, X: &'a DMatrix<f64>, scratch: &'a mut [f64]) -> &'a [f64] {
         let (rows, X) = (X.nrows(), X.as_slice());
         match &self.map {
@@ -158,7 +161,7 @@ impl Actuation {
         }
     }
 
-    /// Returns the workspace that `columns` needs for a matrix X with nv rows.
+    /// Returns the scratch that `columns` needs for a matrix X with nv rows.
     pub(super) fn scratch(&self) -> Vec<f64> {
         match &self.map {
             Map::After(_) => Vec::new(),
@@ -166,8 +169,8 @@ impl Actuation {
         }
     }
 
-    /// Returns an orthonormal basis of the joint efforts that no control can produce: Nᵀ with Nᵀ S = 0, row after row.
-    /// The rows are unit vectors if each control drives one coordinate.
+    /// Returns an orthonormal basis of the joint efforts that no control can produce: the rows of Nᵀ with Nᵀ S = 0, one
+    /// after the other. The rows are unit vectors if each control drives one coordinate.
     pub(super) fn undriven(&self) -> Vec<f64> {
         let nv = self.nv;
         let mut left = DMatrix::identity(nv, nv);
@@ -179,7 +182,7 @@ impl Actuation {
             }
             Map::Matrix(_) => {}
         }
-        // Gram–Schmidt orthonormalisation, the longest column first; the loop ends when only rounding errors are left
+        // Gram–Schmidt orthonormalisation, the longest column first; ends when only rounding errors are left
         let mut basis = Vec::new();
         loop {
             let squares: Vec<_> = left.column_iter().map(|column| column.norm_squared()).collect();

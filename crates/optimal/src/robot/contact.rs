@@ -1,4 +1,4 @@
-//! Named contacts of a knot, and the check that contacts are not singular together.
+//! Contacts of a knot, each with a name, and the check that the contacts are not singular together.
 
 use crate::Error;
 use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings};
@@ -8,10 +8,10 @@ use core::ops::Range;
 /// Contact of a frame with the world. Residuals refer to the contact by its name.
 ///
 /// The constraint holds the origin of a frame ([`ContactConstraint::point`]) or the whole frame
-/// ([`ContactConstraint::rigid`]). The constraint also has the axes for its rows and its force, and the gains of the
+/// ([`ContactConstraint::rigid`]). It also contains the axes of its rows and its force, and the gains of the
 /// stabilisation. Crocoddyl's `ContactModel3D` and `ContactModel6D` are these two constraints with `gains = [kp, kd]`.
-/// Crocoddyl's `WORLD` is `LocalWorldAligned` here. Crocoddyl's `ContactModel1D` and `ContactModel2D` are
-/// [`ContactConstraint::line`] and [`ContactConstraint::plane`].
+/// Crocoddyl's reference frame `WORLD` is called `LocalWorldAligned` here. Crocoddyl's `ContactModel1D` and
+/// `ContactModel2D` are [`ContactConstraint::line`] and [`ContactConstraint::plane`].
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
@@ -40,11 +40,11 @@ impl Contact {
     }
 }
 
-/// Damping for contacts whose forces are given. A damping above 0 makes the check accept several contacts on one body;
-/// no result depends on this value.
+/// Damping that is passed to the check of contacts whose forces are controls. A damping above 0 allows several contacts
+/// on one body. No result depends on this value.
 pub(super) const SHARED: f64 = 1.0;
 
-/// Returns the constraints of `contacts`, with the damping μ in J M⁻¹ Jᵀ + μ 1.
+/// Returns the constraints of `contacts` as one set, with the damping μ in J M⁻¹ Jᵀ + μ 1.
 pub(super) fn constraint_set<S: Scalar>(
     model: &Model,
     contacts: &[Contact],
@@ -67,14 +67,14 @@ fn named(contacts: &[Contact], error: condyle_dynamics::Error) -> Error {
     }
 }
 
-/// Returns an error for contacts that cannot form a set of constraints.
+/// Returns an error if the contacts cannot form a set of constraints for the robot.
 pub(super) fn check_contacts(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     check_together(model, contacts, damping)?;
     let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
     ConstraintSet::<f64>::check_all(model, &constraints).map_err(|error| named(contacts, error))
 }
 
-/// Returns an error if two contacts have the same name or are singular together, or if the damping is negative or not
+/// Returns an error if two contacts have the same name or are singular together. Also if the damping is negative or not
 /// finite.
 fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     if !(damping >= 0.0 && damping.is_finite()) {
@@ -90,11 +90,11 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
             return wrong(format!("there is no frame {}; the robot has {}", c.frame, model.frames().len()));
         };
         if c.other.is_some() {
-            continue; // a closed loop between two bodies
+            continue; // a closed loop between two bodies is not checked
         }
-        // Two contacts on one body are singular: only five of the six rows of two points are independent, because
+        // Two contacts on one body are singular: two points have six rows, of which only five are independent, because
         // points on a line do not prevent the rotation about this line. With damping, the contacts share the forces.
-        // Constraints of one or two directions may be independent, so they are accepted.
+        // Constraints with one or two directions may be independent, so they are accepted.
         let directions = |c: &ContactConstraint| c.kind.rows() < 3;
         let same = |other: &&Contact| {
             other.constraint.other.is_none()
@@ -113,7 +113,7 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
     Ok(())
 }
 
-/// Returns the name of each contact, and the rows of λ that belong to it.
+/// Returns the name of each contact, and the range of its rows in λ.
 pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     let mut row = 0;
     let rows = contacts.iter().map(|Contact { name, constraint }| {
@@ -123,7 +123,7 @@ pub(super) fn rows_of(contacts: &[Contact]) -> Vec<(String, Range<usize>)> {
     rows.collect()
 }
 
-/// Returns, for each row of all contacts, the coordinates that move the frames of its contact.
+/// Returns, for each row of all contacts, the coordinates that move the frames of the row's contact.
 pub(super) fn moved_by(model: &Model, contacts: &[Contact]) -> Vec<Vec<usize>> {
     let rows = contacts.iter().flat_map(|Contact { constraint, .. }| {
         let frames = [Some(constraint.frame), constraint.other].into_iter().flatten();

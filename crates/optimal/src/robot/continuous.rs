@@ -1,4 +1,4 @@
-//! Dynamics in continuous time, from which an integrator makes knots.
+//! Dynamics in continuous time. An integrator turns them into knots.
 
 use crate::lq::{Hessian, LqKnot};
 use core::any::Any;
@@ -7,11 +7,11 @@ use nalgebra::DMatrix;
 
 /// Dynamics in continuous time: acceleration q̈ = a(q, v, u) and cost ℓ(x, u) per second, with x = (q, v).
 ///
-/// [`Integrated`](super::Integrated) makes a knot from such dynamics. The models of a robot are
+/// [`Integrated`](super::Integrated) turns such dynamics into a knot. The models of a robot are
 /// [`FreeAcceleration`](super::FreeAcceleration), [`ContactAcceleration`](super::ContactAcceleration),
 /// [`ControlledAcceleration`](super::ControlledAcceleration) and
 /// [`ControlledContactAcceleration`](super::ControlledContactAcceleration). Implement this trait for any other system
-/// that moves with accelerations.
+/// whose dynamics are accelerations.
 ///
 /// ```
 /// use condyle_optimal::robot::{ContinuousModel, Derivatives, Integrated, Integrator, KnotInput};
@@ -56,16 +56,16 @@ pub trait ContinuousModel: Send + Sync + 'static {
     /// Returns the number of controls.
     fn nu(&self) -> usize;
 
-    /// Returns the acceleration a(x, u), nv numbers, and the cost ℓ(x, u) per second.
+    /// Returns the acceleration a(x, u), nv entries, and the cost ℓ(x, u) per second.
     fn calc(&mut self, input: KnotInput<'_>) -> (&[f64], f64);
 
     /// Returns the derivatives of the acceleration a. Overwrites q, r, Q, S and R of the knot with the derivatives of
     /// `scale` · ℓ, where ℓ is the cost per second.
     fn calc_diff(&mut self, input: KnotInput<'_>, scale: f64, knot: &mut LqKnot) -> Derivatives<'_>;
 
-    /// Computes the second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, with μ = `mu` (nv numbers).
-    /// Returns the first derivatives of the acceleration a. By default `None`: solvers then treat a as linear, even if
-    /// [`second_order`](crate::Settings::second_order) is set.
+    /// Computes the second derivatives of ψ = μᵀ a(q ⊕ δq, v + δv, u + δu) into `hessian`, where μ is `mu` (nv
+    /// entries). Returns the first derivatives of the acceleration a. The default returns `None`: solvers then treat a
+    /// as linear, even if [`second_order`](crate::Settings::second_order) is set.
     fn hessian(&mut self, input: KnotInput<'_>, mu: &[f64], hessian: &mut Hessian) -> Option<Derivatives<'_>> {
         let _ = (input, mu, hessian);
         None
@@ -75,21 +75,21 @@ pub trait ContinuousModel: Send + Sync + 'static {
     /// [`ActionModel::shift`](crate::ActionModel::shift). Does nothing by default.
     fn shift(&mut self) {}
 
-    /// Calls `show` with the name and the numbers of each vector that the dynamics compute; by default only
+    /// Calls `show` for each vector that the dynamics compute, with its name and its entries. The default shows only
     /// `acceleration`.
     fn outputs(&mut self, input: KnotInput<'_>, show: &mut dyn FnMut(&str, &[f64])) {
         show("acceleration", self.calc(input).0);
     }
 
-    /// Returns the controls that hold the state x still, computed from statics. By default `None`: Newton steps then
-    /// find these controls.
+    /// Returns the controls that hold the state x still, computed from statics. The default returns `None`: the solver
+    /// then computes them by Newton steps.
     fn quasi_static(&mut self, x: &[f64]) -> Option<Vec<f64>> {
         let _ = x;
         None
     }
 
-    /// Returns a copy that computes the same results: see [`ActionModel::try_clone`](crate::ActionModel::try_clone). By
-    /// default `None`.
+    /// Returns a copy that computes the same results: see [`ActionModel::try_clone`](crate::ActionModel::try_clone).
+    /// The default returns `None`.
     fn try_clone(&self) -> Option<Self>
     where
         Self: Sized,
@@ -98,7 +98,7 @@ pub trait ContinuousModel: Send + Sync + 'static {
     }
 
     /// Returns the coordinates of each group of positions that is not a vector space, at most six in each group. For
-    /// all other coordinates q ⊕ δ is a sum. Empty by default.
+    /// all other coordinates, q ⊕ δ is the sum q + δ. The default is empty.
     fn groups(&self) -> &[Range<usize>] {
         &[]
     }
@@ -112,12 +112,12 @@ pub trait ContinuousModel: Send + Sync + 'static {
         Ok(())
     }
 
-    /// Computes q ⊕ δq into `out` (nq numbers).
+    /// Computes q ⊕ δq into `out` (nq entries).
     fn integrate(&self, q: &[f64], dq: &[f64], out: &mut [f64]) {
         (0..out.len()).for_each(|k| out[k] = q[k] + dq[k]);
     }
 
-    /// Computes q₁ ⊖ q₀ into `out` (nv numbers).
+    /// Computes q₁ ⊖ q₀ into `out` (nv entries).
     fn difference(&self, q0: &[f64], q1: &[f64], out: &mut [f64]) {
         (0..out.len()).for_each(|k| out[k] = q1[k] - q0[k]);
     }
@@ -127,16 +127,17 @@ pub trait ContinuousModel: Send + Sync + 'static {
         let _ = (dq, by_q, by_dq);
     }
 
-    /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`. There δ
-    /// is the state and ε the control, with nv numbers each. Only the blocks of the [`groups`](Self::groups) are read.
-    /// Returns whether these derivatives were computed. By default they are not: with groups, solvers then treat a step
-    /// as linear, even if [`second_order`](crate::Settings::second_order) is set.
+    /// Computes the second derivatives of θ(δ, ε) = λᵀ((q ⊕ δ) ⊕ (δq + ε) ⊖ (q ⊕ δq)) at zero into `hessian`. In the
+    /// Hessian, δ has the blocks of the state and ε the blocks of the control, nv entries each. Only the blocks of the
+    /// [`groups`](Self::groups) are read. Returns whether the derivatives were computed; the default returns false.
+    /// With groups and without these derivatives, solvers treat a step as linear, even if
+    /// [`second_order`](crate::Settings::second_order) is set.
     fn integrate_hessian(&mut self, dq: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let _ = (dq, lambda, hessian);
         false
     }
 
-    /// Returns the dynamics if they belong to a robot: the knots of a robot are computed in groups.
+    /// Returns the dynamics as a robot, if they belong to one. The knots of a robot are computed in groups.
     #[doc(hidden)]
     fn robot(&self) -> Option<&dyn Any> {
         None
@@ -149,7 +150,7 @@ pub trait ContinuousModel: Send + Sync + 'static {
     }
 }
 
-/// Knot t of the horizon with its state x = (q, v) and its controls u.
+/// Index t of a knot in the horizon, with the knot's state x = (q, v) and controls u.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct KnotInput<'a> {
@@ -161,15 +162,15 @@ pub struct KnotInput<'a> {
     pub u: &'a [f64],
 }
 
-/// Result of [`ContinuousModel::calc_diff`]. For a knot in inverse-dynamics form only `a` is read.
+/// Result of [`ContinuousModel::calc_diff`]. If a knot is written in inverse-dynamics form, only `a` is read.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives<'d> {
-    /// Acceleration a, nv numbers.
+    /// Acceleration a, nv entries.
     pub a: &'d [f64],
-    /// ∂a/∂q in the tangent space, nv × nv.
+    /// Derivative ∂a/∂q in the tangent space, nv × nv.
     pub da_dq: &'d DMatrix<f64>,
-    /// ∂a/∂v, nv × nv.
+    /// Derivative ∂a/∂v, nv × nv.
     pub da_dv: &'d DMatrix<f64>,
-    /// ∂a/∂u, nv × nu, column after column.
+    /// Derivative ∂a/∂u, nv × nu, column after column.
     pub da_du: &'d [f64],
 }

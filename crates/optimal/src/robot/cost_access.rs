@@ -1,4 +1,4 @@
-//! Access to the costs of the robots in a problem by name, to change targets, weights and activations in place.
+//! Access by name to the costs of the robots in a problem, which changes targets, weights and activations in place.
 
 use super::activation::Activation;
 use super::costs::{Cost, Costs, check_weight};
@@ -8,8 +8,8 @@ use super::residuals::target::Target;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
 
-/// Cost term of a robot's knots that may be changed between solves. A change that does not fit the robot or the
-/// residual is an error and has no effect.
+/// Cost term of a robot's knots, which may be changed between solves. If a change does not fit the robot or the
+/// residual, the call returns an error and has no effect.
 #[derive(Debug)]
 pub struct CostMut<'a> {
     cost: &'a mut Cost,
@@ -20,7 +20,7 @@ pub struct CostMut<'a> {
 }
 
 impl CostMut<'_> {
-    /// Returns the term.
+    /// Returns the cost term.
     pub fn get(&self) -> &Cost {
         self.cost
     }
@@ -30,8 +30,7 @@ impl CostMut<'_> {
         self.cost.residual.target()
     }
 
-    /// Sets the target of the residual: a position, a placement, or a reference with as many numbers as before.
-    /// Allocates nothing.
+    /// Sets the target of the residual: a position, a placement, or a reference of unchanged length. Allocates nothing.
     ///
     /// # Errors
     /// [`Error::Cost`] if the residual has no target or a target of another kind, or if the length of the reference
@@ -44,7 +43,7 @@ impl CostMut<'_> {
         Ok(())
     }
 
-    /// Sets the weight. Allocates nothing.
+    /// Sets the weight of the cost term. Allocates nothing.
     ///
     /// # Errors
     /// [`Error::Cost`] if the weight is negative or not finite.
@@ -54,11 +53,11 @@ impl CostMut<'_> {
         Ok(())
     }
 
-    /// Sets the activation.
+    /// Sets the activation of the cost term.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the weights or bounds of the activation are invalid or do not have as many numbers as the
-    /// residual.
+    /// [`Error::Cost`] if the weights or bounds of the activation are invalid, or if their number differs from the
+    /// number of entries of the residual.
     pub fn set_activation(&mut self, activation: Activation) -> Result<(), Error> {
         if let Some(what) = activation.wrong(self.n) {
             return Err(Error::Cost { name: self.cost.name.clone(), what });
@@ -69,8 +68,8 @@ impl CostMut<'_> {
 }
 
 impl Costs {
-    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if no term has
-    /// this name.
+    /// Returns the term called `name`, whose target, weight or activation may be changed between solves. Returns `None`
+    /// if no term has this name.
     pub fn cost_mut(&mut self, name: &str) -> Option<CostMut<'_>> {
         let k = self.terms().iter().position(|cost| cost.name == name)?;
         let Self { model, capabilities, terms } = self;
@@ -84,11 +83,11 @@ fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
     Some(&mut robot_of(action)?.terms)
 }
 
-/// Access to the costs of robots with any dynamics and any integrator, also inside [`Constrained`](crate::Constrained)
-/// actions.
+/// Access to the costs of robots with any dynamics and any integrator, also for actions inside
+/// [`Constrained`](crate::Constrained) actions.
 impl Problem {
     /// Returns the cost called `name` of the model `index`. All knots of this model share the cost, except knots with
-    /// separate costs. `None` if the model or the cost does not exist, or the model has no robot.
+    /// separate costs. Returns `None` if the model or the cost does not exist, or the model has no robot.
     ///
     /// ```
     /// use condyle_dynamics::{Vec3, robots};
@@ -109,8 +108,8 @@ impl Problem {
     }
 
     /// Returns the cost called `name` of knot t, or of the terminal knot for t = N. If knot t has separate costs, the
-    /// result is one of these; otherwise it is a cost of the knot's model, which other knots share. `None` if the cost
-    /// does not exist.
+    /// result is one of these costs. Otherwise the result is a cost of the knot's model, which other knots share.
+    /// Returns `None` if the cost does not exist.
     ///
     /// # Panics
     /// If t > N.
@@ -124,11 +123,11 @@ impl Problem {
         terms_of(action)?.costs_mut(Some(t)).cost_mut(name)
     }
 
-    /// Calls `change` with each cost called `name`: in the costs of all models, of knots with separate costs, and of
-    /// the terminal knot. Returns whether such a cost exists.
+    /// Calls `change` for each cost called `name`: in the costs of all models, of knots with separate costs, and of the
+    /// terminal knot. Returns whether such a cost exists.
     ///
     /// # Errors
-    /// The first error of `change`. Costs that were changed before this error stay changed.
+    /// The first error that `change` returns. Costs that were changed before this error stay changed.
     pub fn change_costs(
         &mut self,
         name: &str,

@@ -9,23 +9,23 @@ use crate::Error;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Term w · a(r(x, u)) of a cost.
+/// Term w · a(r(x, u)) of a robot's cost.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Cost {
     /// Name of the term.
     pub name: String,
-    /// Weight w, finite and at least 0; a term whose weight is 0 is not computed.
+    /// Weight w, finite and at least 0. A term with the weight 0 is not computed.
     pub weight: f64,
-    /// Residual r.
+    /// Residual r of the term.
     pub residual: Residual,
-    /// Activation a.
+    /// Activation a of the term.
     pub activation: Activation,
 }
 
 impl Cost {
-    /// Returns the term `weight` · activation(residual), called `name`.
+    /// Returns the cost term `weight` · activation(residual), with the name `name`.
     pub fn new(name: &str, weight: f64, residual: Residual, activation: Activation) -> Self {
         Self { name: name.to_owned(), weight, residual, activation }
     }
@@ -54,7 +54,7 @@ impl Term for Cost {
 }
 
 impl Cost {
-    /// Returns the plan of the residual, or an error if the term does not fit the robot.
+    /// Returns the plan of the term's residual, or an error if the term does not fit the robot.
     fn plan(&self, model: &Model, capabilities: &Capabilities) -> Result<Plan, Error> {
         let wrong = |what: String| Error::Cost { name: self.name.clone(), what };
         let plan = Plan::new(model, capabilities, &self.residual).map_err(wrong)?;
@@ -63,8 +63,8 @@ impl Cost {
     }
 }
 
-/// Returns an error if the weight of the term called `name` is negative or not finite: solvers minimise, and assume
-/// that Hessians of costs are positive semidefinite.
+/// Returns an error if the weight of the term called `name` is negative or not finite. No weight may be negative,
+/// because solvers assume that Hessians of costs are positive semidefinite.
 pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
     if weight >= 0.0 && weight.is_finite() {
         return Ok(());
@@ -73,7 +73,7 @@ pub(super) fn check_weight(name: &str, weight: f64) -> Result<(), Error> {
     Err(Error::Cost { name: name.to_owned(), what })
 }
 
-/// Weighted activations w a(r), times a factor that all terms share.
+/// Objective of costs: weighted activations w a(r), times a common factor.
 pub(super) struct WeightedActivations(pub f64);
 
 impl Objective<Cost> for WeightedActivations {
@@ -88,7 +88,7 @@ impl Objective<Cost> for WeightedActivations {
 }
 
 impl Costs {
-    /// Creates the sum of the terms `costs`. `capabilities` are the outputs of the robot's dynamics.
+    /// Creates the sum of the cost terms `costs`. `capabilities` describes the outputs of the robot's dynamics.
     pub(super) fn new(model: Arc<Model>, capabilities: Arc<Capabilities>, costs: Vec<Cost>) -> Result<Self, Error> {
         for (k, cost) in costs.iter().enumerate() {
             if costs[..k].iter().any(|other| other.name == cost.name) {
@@ -104,12 +104,12 @@ impl Costs {
         Ok(Self { model, capabilities, terms })
     }
 
-    /// Returns the terms.
+    /// Returns all cost terms.
     pub fn terms(&self) -> &[Cost] {
         self.terms.all()
     }
 
-    /// Changes the weight of the term called `name`, between solves; returns whether it exists.
+    /// Changes the weight of the term called `name`, between solves. Returns whether such a term exists.
     ///
     /// # Errors
     /// [`Error::Cost`] if the weight is negative or not finite; the old weight then stays.
@@ -122,8 +122,8 @@ impl Costs {
     /// Replaces the residual of the term called `name` between solves, for example to change its target. Allocates.
     ///
     /// # Errors
-    /// [`Error::Cost`] if the term does not exist, the residual does not fit the robot, or the residual has another
-    /// number of entries than the old one.
+    /// [`Error::Cost`] if the term does not exist, the residual does not fit the robot, or the number of the residual's
+    /// entries differs from the old number.
     pub fn set_residual(&mut self, name: &str, residual: Residual) -> Result<(), Error> {
         let wrong = |what: &str| Error::Cost { name: name.to_owned(), what: what.to_owned() };
         let there = self.terms().iter().position(|cost| cost.name == name);

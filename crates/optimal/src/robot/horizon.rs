@@ -13,19 +13,19 @@ use crate::problem::MOST_KNOTS;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// One value for each model that an action represents, and the index of each knot's model.
+/// List with one value for each model that an action represents, and with the index of each knot's model.
 #[derive(Clone, Debug)]
 pub(crate) struct PerModel<T> {
     /// Value of each model.
     all: Vec<T>,
     /// Index of each knot's model; knots beyond the end of this list have model 0.
     of: Vec<usize>,
-    /// Index of the model that setters change.
+    /// Index of the model that later changes affect.
     chosen: usize,
 }
 
 impl<T> PerModel<T> {
-    /// Creates the value of a single model.
+    /// Creates the list for a single model, with the value `only`.
     pub(crate) fn new(only: T) -> Self {
         Self { all: vec![only], of: Vec::new(), chosen: 0 }
     }
@@ -45,17 +45,17 @@ impl<T> PerModel<T> {
         self.of.get(t).and_then(|&model| self.all.get(model)).unwrap_or(&self.all[0])
     }
 
-    /// Returns the value of the chosen model, which setters change.
+    /// Returns the value of the chosen model, which later changes affect.
     pub(crate) fn chosen_mut(&mut self) -> &mut T {
         &mut self.all[self.chosen]
     }
 
-    /// Chooses the model that setters change.
+    /// Chooses the model that later changes affect.
     pub(crate) fn choose(&mut self, model: usize) {
         self.chosen = model.min(self.all.len() - 1);
     }
 
-    /// Moves the value of another action's model here, as model `place` or as a new model.
+    /// Moves the value of another action's model into this list, as model `place` or as a new model.
     pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         match (place, other.all.pop()) {
             (Some(place), Some(value)) => self.all[place] = value,
@@ -63,7 +63,7 @@ impl<T> PerModel<T> {
         }
     }
 
-    /// Assigns a model to knot t of a horizon with `horizon` knots. Allocates at the first call only.
+    /// Assigns a model to knot t of a horizon with `horizon` knots. Allocates only at the first call.
     pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         if self.all.len() > 1 {
             self.of.resize(horizon, 0);
@@ -72,19 +72,19 @@ impl<T> PerModel<T> {
     }
 }
 
-/// Values of the knots of a horizon: one common value, and separate values for single knots.
+/// List of the values of a horizon's knots: a common value, and separate values for single knots.
 #[derive(Clone, Debug)]
 pub(crate) struct PerKnot<T> {
     /// Common value, followed by the separate values of single knots.
     all: Vec<T>,
     /// Index in `all` of each knot's value; knots beyond the end of this list have index 0, the common value.
     of: Vec<usize>,
-    /// Indices in `all` of values whose knots have left the horizon; new values overwrite them.
+    /// Free slots of `all`, whose knots have left the horizon; new values overwrite them.
     free: Vec<usize>,
 }
 
 impl<T> PerKnot<T> {
-    /// Creates the common value of all knots.
+    /// Creates the list with a common value for all knots.
     pub(crate) fn new(common: T) -> Self {
         Self { all: vec![common], of: Vec::new(), free: Vec::new() }
     }
@@ -130,12 +130,12 @@ impl<T> PerKnot<T> {
             Some(old) => *old = value,
             None => {
                 self.all.push(value);
-                self.free.reserve(self.all.len()); // so that `shift` does not allocate
+                self.free.reserve(self.all.len()); // `shift` needs this capacity and must not allocate
             }
         }
     }
 
-    /// Moves the horizon on: knot t becomes knot t − 1.
+    /// Moves the horizon by one knot: knot t becomes knot t − 1.
     pub(crate) fn shift(&mut self) {
         if !self.of.is_empty() {
             let first = self.of.remove(0);
@@ -144,7 +144,7 @@ impl<T> PerKnot<T> {
     }
 }
 
-/// Costs and limits of all knots that an action serves.
+/// Costs and limits of all knots of an action.
 #[derive(Clone, Debug)]
 pub(crate) struct HorizonTerms {
     model: Arc<Model>,
@@ -153,7 +153,7 @@ pub(crate) struct HorizonTerms {
     pub limits: Limits,
     /// Memory layouts of costs and of limits, each large enough for every knot.
     layouts: [KnotLayout; 2],
-    /// Workspace of residuals, made when it is first needed and replaced when the layouts change.
+    /// Workspace of residuals. It is created at its first use and replaced when the layouts change.
     scratch: Option<Box<Scratch>>,
 }
 
@@ -193,7 +193,7 @@ impl HorizonTerms {
         Ok(found)
     }
 
-    /// Sets separate costs for knot t, which replace the common costs there.
+    /// Sets separate costs for knot t, which replace the common costs at this knot.
     pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         Error::check_size("knot", t, MOST_KNOTS)?;
         let costs = Costs::new(self.model.clone(), self.capabilities.clone(), costs).map_err(|error| match error {
@@ -219,7 +219,7 @@ impl HorizonTerms {
         self.set_layouts([costs, self.limits.layout()]);
     }
 
-    /// Sets the layouts. If they differ from the old ones, an existing scratch is replaced.
+    /// Sets the layouts. If they differ from the old layouts, an existing scratch is replaced.
     fn set_layouts(&mut self, layouts: [KnotLayout; 2]) {
         if self.layouts != layouts {
             self.layouts = layouts;
@@ -235,14 +235,15 @@ impl HorizonTerms {
         scratch.get_or_insert_with(|| Box::new(Scratch::new(model, capabilities.nu, layouts[0] + layouts[1])));
     }
 
-    /// Moves the costs and limits of another action with the same dynamics here, as model `place` or as a new model.
+    /// Moves the costs and limits of another action with the same dynamics to this action, as model `place` or as a new
+    /// model.
     pub(crate) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         self.costs.append(&mut other.costs, place);
         self.limits.append(&mut other.limits, place);
         self.set_layouts([0, 1].map(|k| self.layouts[k].or(other.layouts[k])));
     }
 
-    /// Selects the model that setters change.
+    /// Selects the model that later changes affect.
     pub(crate) fn choose(&mut self, model: usize) {
         self.costs.choose(model);
         self.limits.choose(model);
@@ -254,7 +255,7 @@ impl HorizonTerms {
         self.limits.serve(t, horizon, model);
     }
 
-    /// Moves the horizon on: knot t becomes knot t − 1.
+    /// Moves the horizon by one knot: knot t becomes knot t − 1.
     pub(crate) fn shift(&mut self) {
         self.costs.all_mut().iter_mut().for_each(PerKnot::shift);
         self.limits.shift();
@@ -275,7 +276,7 @@ impl HorizonTerms {
         KnotTerms([&self.costs.at(t).at(t).terms, self.limits.at(t, limited)])
     }
 
-    /// Computes the cost ℓ of knot t and, if `limited`, the term of the knot's limits in the augmented Lagrangian.
+    /// Computes the cost ℓ of knot t and, if `limited`, the limit term of the knot in the augmented Lagrangian.
     pub(crate) fn calc(&mut self, t: usize, state: KnotState<'_>, limited: bool) -> (f64, f64) {
         self.reserve();
         let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
@@ -291,8 +292,8 @@ impl HorizonTerms {
         (cost, term)
     }
 
-    /// Computes the derivatives of `scale` · ℓ at knot t, with the cost ℓ. If `limited`, adds the derivatives of the
-    /// term of the knot's limits in the augmented Lagrangian.
+    /// Computes the derivatives of `scale` · ℓ at knot t, where ℓ is the cost. If `limited`, also adds the derivatives
+    /// of the knot's limit term in the augmented Lagrangian.
     pub(crate) fn calc_diff(
         &mut self,
         t: usize,

@@ -15,28 +15,30 @@ pub(crate) struct KnotData {
     pub tau: Vec<f64>,
     /// Forces λ of all contacts, or impulses at an impact. Shape: rows.
     pub lambda: Vec<f64>,
-    /// Derivatives of q̈ with respect to q, v and the quantities that the controls drive: τ, or q̈ and λ. Shape: nv ×
-    /// nv. The last matrix has one more column, of zeros, for each entry of λ that is a control.
+    /// Derivatives of q̈ with respect to q, v and the quantity that the controls drive: τ, or q̈ and λ. Shape: nv × nv.
+    /// The last matrix has an additional column of zeros for each entry of λ that is a control.
     pub da: [DMatrix<f64>; 3],
-    /// Derivatives of λ with respect to the same quantities as in `da`, written only if a residual reads forces. Shape:
+    /// Derivatives of λ with respect to the same quantities as in `da`. Written only if a residual reads forces. Shape:
     /// rows × nv.
     pub dlambda: [DMatrix<f64>; 3],
-    /// Derivatives of τ with respect to q, v and q̈ if the controls drive q̈, else empty. Shape: nv × nv.
+    /// Derivatives of τ with respect to q, v and q̈, if accelerations are controls; empty otherwise. Shape: nv × nv.
     pub dtau: [DMatrix<f64>; 3],
-    /// Contact accelerations J q̈ + γ if the controls drive q̈, else empty. Shape: rows.
+    /// Contact accelerations J q̈ + γ, if accelerations are controls; empty otherwise. Shape: rows.
     pub contact_acceleration: Vec<f64>,
-    /// Derivatives of J q̈ + γ with respect to q, v and q̈; the last matrix is J, and ∂τ/∂λ = −Jᵀ. Shape: rows × nv.
+    /// Derivatives of J q̈ + γ with respect to q, v and q̈. The last matrix is J, which also gives ∂τ/∂λ = −Jᵀ. Shape:
+    /// rows × nv.
     pub dcontact_acceleration: [DMatrix<f64>; 3],
-    /// Derivatives of the equations of motion, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
+    /// Derivatives of the equations of motion, row after row, in the layout of a
+    /// [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
-    /// Number of eliminations (of limbs and of the base) that are already done in `equations`, at most all eliminations
-    /// of the robot.
+    /// Number of eliminations that are already done in `equations`. The eliminations are, in order, of the limbs and of
+    /// the base.
     pub eliminations: usize,
     pub residuals: ResidualData,
 }
 
 impl KnotData {
-    /// Creates data of zeros. If `given` is the acceleration, the constant derivatives of q̈ are set, too.
+    /// Creates data of zeros. If `given` is the acceleration, also sets the derivatives of q̈, which are constant.
     pub(crate) fn new(nv: usize, capabilities: &Capabilities, given: Output) -> Self {
         let rows = capabilities.rows();
         let square = || DMatrix::zeros(nv, nv);
@@ -74,21 +76,21 @@ pub(crate) trait Sensitivities {
     /// Computes g += c · ∂y_row/∂(u, v, q) for entry `row` of an output y.
     fn add_row(&self, output: Output, row: usize, c: f64, g: &mut Row<'_>);
 
-    /// Computes g += c · ∂u_k/∂(u, v, q) for control k, or for the quantity that replaces the control.
+    /// Computes g += c · ∂u_k/∂(u, v, q) for control k, also if another unknown replaces the control.
     fn add_control(&self, k: usize, c: f64, g: &mut Row<'_>);
 }
 
-/// Computes g += c X[row, :], for as many columns of X as g has numbers.
+/// Computes g += c X[row, :], for as many columns of X as g has entries.
 pub(crate) fn add_matrix_row(X: &DMatrix<f64>, row: usize, c: f64, g: &mut [f64]) {
     for (g, column) in g.iter_mut().zip(X.as_slice().chunks_exact(X.nrows())) {
         *g += c * column[row];
     }
 }
 
-/// Maximum number of knots, one for each lane of a vector.
+/// Maximum number of knots in a batch, which is the maximum number of lanes of a SIMD register.
 pub(crate) const WIDEST: usize = 8;
 
-/// Returns, for each knot, the slice of its data that `part` selects, as a mutable slice.
+/// Returns a mutable slice for each knot: the part of the knot's data that `part` selects.
 pub(crate) fn parts(of: &mut [KnotData], part: impl Fn(&mut KnotData) -> &mut [f64]) -> [&mut [f64]; WIDEST] {
     let mut parts: [&mut [f64]; WIDEST] = Default::default();
     for (to, of) in parts.iter_mut().zip(of) {
@@ -97,7 +99,7 @@ pub(crate) fn parts(of: &mut [KnotData], part: impl Fn(&mut KnotData) -> &mut [f
     parts
 }
 
-/// Writes each lane of `from` to the data of one knot: to the slice that `part` selects.
+/// Writes each lane of `from` to the data of one knot, to the slice that `part` selects.
 pub(crate) fn unpack<S: Block<Number = f64>>(
     from: &[S],
     to: &mut [KnotData],
@@ -107,8 +109,8 @@ pub(crate) fn unpack<S: Block<Number = f64>>(
     scatter_rows(from, &mut parts(to, part)[..count]);
 }
 
-/// Writes each lane of the matrix `from` to the data of one knot: to the slice that `part` selects, in rows of `stride`
-/// numbers.
+/// Writes each lane of the matrix `from` to the data of one knot, to the slice that `part` selects. The rows of this
+/// slice have `stride` entries.
 pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     from: &Strided<'_, S>,
     to: &mut [KnotData],
@@ -119,18 +121,18 @@ pub(crate) fn unpack_matrix<S: Block<Number = f64>>(
     scatter_matrix(from, &mut parts(to, part)[..count], stride);
 }
 
-/// Workspace that is allocated when it is first needed, so that actions are cheap to make and to merge. A copy starts
-/// without a workspace: its content is not copied.
+/// Workspace that is allocated at its first use, so that creating and merging actions takes little time. A copy starts
+/// without a workspace.
 #[derive(Debug)]
 pub(crate) struct OnDemand<T>(Option<Box<T>>);
 
 impl<T> OnDemand<T> {
-    /// Returns the workspace; `make` creates it if it does not exist.
+    /// Returns the workspace, which `make` creates at the first call.
     pub(crate) fn get(&mut self, make: impl FnOnce() -> T) -> &mut T {
         self.0.get_or_insert_with(|| Box::new(make()))
     }
 
-    /// Returns the workspace, if it exists.
+    /// Returns the workspace, if it has been created.
     pub(crate) fn made(&self) -> Option<&T> {
         self.0.as_deref()
     }

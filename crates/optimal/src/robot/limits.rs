@@ -1,4 +1,4 @@
-//! Limits of a robot's state, control and forces: residuals that are held within bounds.
+//! Limits: bounds on residuals of a robot's state, controls and forces.
 
 use super::horizon::{PerKnot, PerModel};
 use super::outputs::Capabilities;
@@ -9,13 +9,13 @@ use crate::Error;
 use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
-/// Residual within bounds: lower ≤ r(x, u) ≤ upper. If both bounds are equal, it is an equality; if both lists of
-/// bounds are empty, r(x, u) = 0.
+/// Residual within bounds: lower ≤ r(x, u) ≤ upper. Equal bounds make an equality. If both lists of bounds are empty,
+/// the limit is r(x, u) = 0.
 ///
-/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces the limit; for [`Fddp`](crate::Fddp) alone the limit is
-/// a cost for leaving the bounds. The limit shares dynamics and kinematics with the costs of its knot. It applies at
-/// the beginning of the knot, with any integrator and any Δt. All entries of r have the same penalty, whatever their
-/// units.
+/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces the limit. For [`Fddp`](crate::Fddp) alone the limit is
+/// a cost for values outside the bounds. The limit uses the dynamics and kinematics that the costs of its knot compute.
+/// It applies at the beginning of the knot, with any integrator and any Δt. All entries of r have the same penalty,
+/// whatever their units.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -58,18 +58,18 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// Returns the limit lower ≤ residual ≤ upper, called `name`.
+    /// Returns the limit lower ≤ residual ≤ upper, with the name `name`.
     pub fn new(name: &str, residual: Residual, lower: Vec<f64>, upper: Vec<f64>) -> Self {
         Self { name: name.to_owned(), residual, lower, upper }
     }
 
-    /// Returns the limit residual = 0, called `name`.
+    /// Returns the limit residual = 0, with the name `name`.
     pub fn equality(name: &str, residual: Residual) -> Self {
         Self::new(name, residual, vec![], vec![])
     }
 
-    /// Returns the plan of the residual, or a text that describes what does not fit the robot. Sets both bounds to 0 if
-    /// both are empty.
+    /// Returns the plan of the limit's residual, or a text that describes why the limit does not fit the robot. Sets
+    /// both bounds to 0 if both are empty.
     fn plan(&mut self, model: &Model, capabilities: &Capabilities) -> Result<Plan, String> {
         let plan = Plan::new(model, capabilities, &self.residual)?;
         if self.lower.is_empty() && self.upper.is_empty() {
@@ -92,7 +92,7 @@ impl Term for Limit {
     }
 }
 
-/// Limits of a knot.
+/// Limits of one knot.
 #[derive(Clone, Debug, Default)]
 struct LimitSet {
     terms: Terms<Limit>,
@@ -104,8 +104,8 @@ struct LimitSet {
 }
 
 impl LimitSet {
-    /// Creates the set of `limits` for one knot; for all knots if `knot` is `None`. `capabilities` are the outputs of
-    /// the robot's dynamics.
+    /// Creates the set of `limits` for knot `knot`, or for all knots if `knot` is `None`. `capabilities` describes the
+    /// outputs of the robot's dynamics.
     fn new(model: &Model, capabilities: &Capabilities, limits: Vec<Limit>, knot: Option<usize>) -> Result<Self, Error> {
         let mut set = Self::default();
         for mut limit in limits {
@@ -125,13 +125,13 @@ impl LimitSet {
     }
 }
 
-/// Limits of all knots that an action serves, with their multipliers.
+/// Limits of all knots of an action, with their multipliers.
 #[derive(Clone, Debug)]
 pub(crate) struct Limits {
     sets: PerModel<PerKnot<LimitSet>>,
-    /// Limits that the dynamics require at every knot; they precede the user's limits.
+    /// Limits that the dynamics require at every knot. They precede the user's limits.
     own: Vec<Limit>,
-    /// Empty list, for evaluations in which limits do not count.
+    /// Empty list of limits, for evaluations without limits.
     none: Terms<Limit>,
     multipliers: Multipliers,
 }
@@ -143,7 +143,8 @@ impl Limits {
         Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0) }
     }
 
-    /// Returns a set without user's limits, with the limits `own` that the dynamics require at every knot.
+    /// Returns a set of limits without the user's limits. It contains the limits `own`, which the dynamics require at
+    /// every knot.
     pub(super) fn asked_for(own: Vec<Limit>) -> Self {
         Self { own, ..Self::none() }
     }
@@ -162,24 +163,25 @@ impl Limits {
         Ok(())
     }
 
-    /// Returns the sets of all knots of all models.
+    /// Returns the limit sets of all knots and all models.
     fn all(&self) -> impl Iterator<Item = &LimitSet> {
         self.sets.all().iter().flat_map(PerKnot::all)
     }
 
-    /// Returns the largest number of limited entries at a knot.
+    /// Returns the largest number of constraint rows of a knot.
     fn most(&self) -> usize {
         self.all().map(|set| set.terms.len()).max().unwrap_or(0)
     }
 
-    /// Moves the limits of another action's model here, as model `place` or as a new model. Deletes the multipliers.
+    /// Moves the limits of another action's model to this action, as model `place` or as a new model. Deletes the
+    /// multipliers.
     pub(super) fn append(&mut self, other: &mut Self, place: Option<usize>) {
         let most = self.multipliers.size().max(other.multipliers.size());
         self.sets.append(&mut other.sets, place);
         self.multipliers = Multipliers::new(most);
     }
 
-    /// Chooses the model whose limits the setters change.
+    /// Chooses the model whose limits later changes affect.
     pub(super) fn choose(&mut self, model: usize) {
         self.sets.choose(model);
     }
@@ -189,7 +191,7 @@ impl Limits {
         self.sets.serve(t, horizon, model);
     }
 
-    /// Moves the horizon on: knot t becomes knot t − 1.
+    /// Moves the horizon by one knot: knot t becomes knot t − 1.
     pub(super) fn shift(&mut self) {
         self.sets.all_mut().iter_mut().for_each(PerKnot::shift);
     }
@@ -199,8 +201,8 @@ impl Limits {
         self.all().fold(KnotLayout::default(), |most, set| most.or(set.terms.layout()))
     }
 
-    /// Returns the limits of knot t if `limited`, else no limits. Limits count only at the first stage of an
-    /// integration step.
+    /// Returns the limits of knot t if `limited`, else an empty list. Only the first stage of an integration step has
+    /// limits.
     pub(super) fn at(&self, t: usize, limited: bool) -> &Terms<Limit> {
         if limited { &self.sets.at(t).at(t).terms } else { &self.none }
     }
@@ -212,7 +214,7 @@ impl Limits {
         (terms, LimitObjective { multipliers, t })
     }
 
-    /// Calls `visit` with the limits of knot t: bounds, names and multipliers.
+    /// Calls `visit` with the bounds, names and multipliers of the limits of knot t.
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
         let LimitSet { terms, lower, upper, parts } = self.sets.at(t).at(t);
         visit(Bounded { count: terms.len(), lower, upper, parts, multipliers: &mut self.multipliers });

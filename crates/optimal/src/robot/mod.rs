@@ -1,19 +1,21 @@
-//! Robots as optimal control problems: the state x = (q, v), costs, and the actions of robots that move freely, are in
-//! contact, or hit something.
+//! Robots as optimal control problems: states x = (q, v), costs, and the knots of robots in free motion, in contact, or
+//! at an impact.
 //!
-//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]. An action has the sum of several costs, each with a
-//!   name. A [`Limit`] keeps a residual within bounds, or at zero.
+//! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]. An action has a sum of costs, each with a name. A
+//!   [`Limit`] keeps a residual within bounds, or at zero.
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots with a duration. [`ImpulseDynamics`] is an impact, a knot
 //!   without duration. In [`FreeInverseDynamics`] the controls are the accelerations; in [`ContactInverseDynamics`]
 //!   they are the accelerations and the contact forces. An [`Actuation`] maps controls to joint efforts, an
 //!   [`Integrator`] integrates over the duration of a knot, and a [`ControlPolynomial`] describes how the controls
 //!   change during a knot.
-//! - A residual of your own is a [`GenericResidual`], written once for any scalar and differentiated exactly
-//!   ([`OwnResidual::autodiff`]), or a [`ResidualFunction`] with its Jacobian. Costs and limits accept both.
-//! - [`Problem::motion`](crate::Problem::motion) gives the accelerations, efforts and contact forces of a solution;
-//!   [`Problem::cost_mut`](crate::Problem::cost_mut) gives a cost by its name, to change its [`Target`] or weight.
+//! - A user-defined residual is a [`GenericResidual`] or a [`ResidualFunction`]. A [`GenericResidual`] is generic over
+//!   the scalar type and is differentiated exactly ([`OwnResidual::autodiff`]); a [`ResidualFunction`] contains its own
+//!   Jacobian. Costs and limits accept both.
+//! - [`Problem::motion`](crate::Problem::motion) returns the accelerations, efforts and contact forces of a solution.
+//!   [`Problem::cost_mut`](crate::Problem::cost_mut) returns the cost with a given name, whose [`Target`] or weight may
+//!   be changed.
 //! - A [`RobotProblem`] describes a problem as data, for example in a file.
-//! - [`Integrated`] makes a knot from a [`ContinuousModel`] of your own, too.
+//! - [`Integrated`] also turns a user-defined [`ContinuousModel`] into a knot.
 //!
 //! ```
 //! use condyle_dynamics::robots;
@@ -46,7 +48,7 @@
 //! assert_eq!(solution.status, Status::Converged);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
-#![allow(non_snake_case)] // names of matrices follow the literature
+#![allow(non_snake_case)] // names follow the literature
 
 mod activation;
 mod actuation;

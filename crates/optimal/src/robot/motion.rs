@@ -1,4 +1,4 @@
-//! The motion of a robot at a knot: accelerations, efforts of joints, and forces of contacts.
+//! Motion of a robot at a knot: accelerations, efforts of joints, and forces of contacts.
 
 use super::contact::Contact;
 use super::dynamics::robot::robot_of;
@@ -11,9 +11,9 @@ use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_k
 pub struct KnotMotion {
     /// Accelerations q̈. Shape: nv; empty at an impact.
     pub acceleration: Vec<f64>,
-    /// Efforts τ = S u of all joints (N, N m). If accelerations are controls, inverse dynamics give the efforts; the
-    /// efforts of an undriven base are then 0 up to the tolerance of the constraints. Shape: nv; empty at an impact,
-    /// and for actions without a robot.
+    /// Efforts τ = S u of all joints (N, N m). If accelerations are controls, the efforts follow from inverse dynamics.
+    /// The efforts of a base without motors are then 0, except for the tolerance of the constraints. Shape: nv; empty
+    /// at an impact, and for actions without a robot.
     pub effort: Vec<f64>,
     /// Jump of the velocities at an impact, v⁺ − v. Shape: nv; empty at other knots.
     pub velocity_change: Vec<f64>,
@@ -21,23 +21,24 @@ pub struct KnotMotion {
     pub contacts: Vec<ContactForce>,
 }
 
-/// Force with which the world acts on the body of a contact (N, N m); at an impact, the impulse (N s, N m s). For a
-/// closed loop, the force on the body of the constraint's first frame.
+/// Force that the world exerts on the body of a contact (N, N m); at an impact, the impulse (N s, N m s). For a closed
+/// loop, it is the force on the body of the constraint's first frame.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ContactForce {
     /// Name of the contact.
     pub name: String,
-    /// Index of the contact's frame among the robot's frames.
+    /// Index of the contact's frame in the robot's list of frames.
     pub frame: usize,
-    /// Force along the world's axes, with the moment about the frame's origin. The moment of a point contact is 0.
+    /// Force along the world's axes, with the moment about the origin of the contact's frame. The moment of a point
+    /// contact is 0.
     pub force: Force<f64>,
-    /// Same force, along the axes of the contact's frame.
+    /// Same force and moment, along the axes of the contact's frame.
     pub local: Force<f64>,
 }
 
 impl KnotMotion {
-    /// Returns the force of the contact called `name`; `None` if the knot has no such contact.
+    /// Returns the force of the contact with the name `name`; `None` if the knot has no such contact.
     pub fn contact(&self, name: &str) -> Option<&ContactForce> {
         self.contacts.iter().find(|contact| contact.name == name)
     }
@@ -49,7 +50,8 @@ impl KnotMotion {
 }
 
 impl ContactForce {
-    /// Returns the force of a contact from its rows of λ. R is the rotation of the contact's frame in the world.
+    /// Returns the force of a contact from the contact's rows of λ. R is the rotation of the contact's frame in the
+    /// world.
     fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
         let axes = constraint.axes;
         let along = match *rows {
@@ -68,7 +70,8 @@ impl ContactForce {
     }
 }
 
-/// Returns the force of each contact at the position q. `rows` is λ: the rows of all contacts, one after the other.
+/// Returns the force of each contact at the position q. `rows` contains λ: the rows of all contacts, one after the
+/// other.
 fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<ContactForce> {
     if contacts.is_empty() {
         return Vec::new();
@@ -84,14 +87,14 @@ fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<C
     contacts.iter().map(force).collect()
 }
 
-/// Accelerations, efforts and contact forces of robots with any dynamics and any integrator, also inside
-/// [`Constrained`](crate::Constrained) actions.
+/// Access to the accelerations, efforts and contact forces of robots with any dynamics and any integrator, also for
+/// actions inside [`Constrained`](crate::Constrained) actions.
 impl Problem {
-    /// Computes the accelerations, efforts and contact forces of a solution at knot t, from 0 to N. Returns `None` at
-    /// the end of a horizon, and for actions that have no robot and compute no accelerations. Allocates.
+    /// Computes the accelerations, efforts and contact forces of a solution at knot t, from 0 to N. Returns `None` for
+    /// a terminal knot without impact, and for actions that have no robot and compute no accelerations. Allocates.
     ///
-    /// The solution must belong to the current knots of this problem. An earlier solution does not, after
-    /// [`shift`](Self::shift).
+    /// The solution must belong to the current knots of this problem. After [`shift`](Self::shift), earlier solutions
+    /// no longer belong to them.
     ///
     /// ```
     /// use condyle_dynamics::robots;
@@ -110,7 +113,7 @@ impl Problem {
     /// ```
     ///
     /// # Panics
-    /// If t > N, or the solution has another horizon, or other dimensions at knot t.
+    /// If t > N, or if the horizon of the solution or its dimensions at knot t differ from the problem's.
     #[track_caller]
     pub fn motion(&mut self, solution: &Solution, t: usize) -> Option<KnotMotion> {
         self.assert_knot(t);
@@ -120,8 +123,8 @@ impl Problem {
         self.motion_at(t, solution.x(t), u)
     }
 
-    /// Computes the same as [`motion`](Self::motion) at knot t, but from a given state x and given controls u. At t =
-    /// N, u is empty.
+    /// Computes the same quantities as [`motion`](Self::motion) at knot t, from a given state x and given controls u.
+    /// At t = N, u is empty.
     ///
     /// # Panics
     /// If t > N, or x or u has a wrong length.
@@ -131,7 +134,7 @@ impl Problem {
         self.outputs(t, x, u, &mut |name, numbers| match name {
             "acceleration" => motion.acceleration = numbers.to_vec(),
             "effort" => motion.effort = numbers.to_vec(),
-            name if name.starts_with("force/") => rows.extend_from_slice(numbers), // in the order of contacts
+            name if name.starts_with("force/") => rows.extend_from_slice(numbers), // contacts are shown in their order
             _ => {}
         });
         let action = self.action_mut(t);

@@ -1,21 +1,21 @@
-//! Outputs of the dynamics of a knot, on which its residuals may depend.
+//! Outputs of the dynamics of a knot that residuals may read.
 
 use core::ops::Range;
 
-/// Vector that the dynamics of a knot compute besides the next state.
+/// Vector that the dynamics of a knot compute in addition to the next state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Output {
     /// Accelerations q̈, or the jump v⁺ − v of the velocities at an impact.
     Acceleration,
     /// Efforts τ of all joints.
     Effort,
-    /// Forces λ, or impulses at an impact, of all contacts.
+    /// Forces λ of all contacts, or their impulses at an impact.
     Force,
     /// Accelerations J q̈ + γ of all contacts, if joint accelerations are controls.
     ContactAcceleration,
 }
 
-/// Outputs that the dynamics of a knot can compute, known when the knot is made.
+/// Outputs that the dynamics of a knot can compute. They are known when the action is created.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Capabilities {
     pub nu: usize,
@@ -23,12 +23,12 @@ pub(crate) struct Capabilities {
     pub effort: bool,
     /// Whether the knot is an impact.
     pub impulse: bool,
-    /// Whether accelerations, and forces of contacts, are controls.
+    /// Whether accelerations are controls, and also the forces of contacts.
     pub inverse: bool,
-    /// Basis Nᵀ of the joint efforts that no control can produce, if accelerations are controls. Shape: undriven
-    /// efforts × nv, row after row.
+    /// Orthonormal basis Nᵀ of the joint efforts that no control can produce; empty unless accelerations are controls.
+    /// Shape: undriven efforts × nv, row after row.
     pub undriven: Vec<f64>,
-    /// Name of each contact, and the rows of λ that belong to it.
+    /// Name of each contact, and the range of its rows in λ.
     pub contacts: Vec<(String, Range<usize>)>,
 }
 
@@ -38,7 +38,7 @@ impl Capabilities {
         self.contacts.last().map_or(0, |(_, rows)| rows.end)
     }
 
-    /// Returns the rows of the contact called `name`, or an error text with the existing names.
+    /// Returns the rows of the contact with the name `name`, or an error text that lists the existing names.
     pub(crate) fn contact(&self, name: &str) -> Result<Range<usize>, String> {
         match self.contacts.iter().find(|(n, _)| n == name) {
             Some((_, rows)) => Ok(rows.clone()),

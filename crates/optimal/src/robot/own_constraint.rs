@@ -6,9 +6,9 @@ use crate::error::Error;
 use crate::problem::leave_a_value;
 use nalgebra::DMatrix;
 
-/// [`PathConstraint`] lower ≤ r(t, x, u) ≤ upper on a user-defined residual r, with the same bounds at every knot. Use
-/// this constraint for actions that are not knots of a robot. Knots of a robot accept a [`Limit`](crate::robot::Limit)
-/// of the same residual, which takes less time.
+/// [`PathConstraint`] lower ≤ r(t, x, u) ≤ upper for a user-defined residual r, with the same bounds at every knot. Use
+/// this constraint for actions that are not knots of a robot. For knots of a robot, a [`Limit`](crate::robot::Limit) of
+/// the same residual is faster.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -37,16 +37,16 @@ pub struct OwnConstraint {
     residual: OwnResidual,
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// Jacobians ∂r/∂x and ∂r/∂u, row after row. Written by: `calc_diff`.
+    /// Jacobian ∂r/∂x, then ∂r/∂u, row after row. Written by: `calc_diff`.
     slopes: [Vec<f64>; 2],
 }
 
 impl OwnConstraint {
-    /// Makes the constraint lower ≤ r ≤ upper, with infinite bounds where r is unbounded.
+    /// Creates the constraint lower ≤ r ≤ upper, with infinite bounds where r is unbounded.
     ///
     /// # Errors
-    /// [`Error::Length`] if a bound does not have as many numbers as r; [`Error::Constraint`] if no value satisfies the
-    /// bounds of an entry.
+    /// [`Error::Length`] if the length of a bound differs from the number of entries of r; [`Error::Constraint`] if no
+    /// value satisfies the bounds of an entry.
     pub fn new(residual: OwnResidual, lower: Vec<f64>, upper: Vec<f64>) -> Result<Self, Error> {
         for (name, bound) in [("lower", &lower), ("upper", &upper)] {
             if bound.len() != residual.size() {
@@ -61,7 +61,7 @@ impl OwnConstraint {
         Ok(Self { residual, lower, upper, slopes: [Vec::new(), Vec::new()] })
     }
 
-    /// Makes the constraint r = 0.
+    /// Creates the constraint r = 0.
     pub fn equality(residual: OwnResidual) -> Self {
         let zeros = vec![0.0; residual.size()];
         Self { residual, lower: zeros.clone(), upper: zeros, slopes: [Vec::new(), Vec::new()] }

@@ -19,10 +19,10 @@ use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Optimal control problem of a robot as data, including the robot. It can be stored in a file, sent, and solved again.
-/// [`build`](Self::build) makes the [`Problem`] and checks the data.
+/// Optimal control problem of a robot as data, including the robot. The data can be stored in a file, sent, and solved
+/// again. [`build`](Self::build) checks the data and creates the [`Problem`].
 ///
-/// All formats of serde can be used. In JSON an infinite bound is `null`.
+/// All formats of serde are supported. In JSON an infinite bound is `null`.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -45,60 +45,61 @@ use std::sync::Arc;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct RobotProblem {
-    /// Robot.
+    /// Robot of the problem.
     pub model: Model,
     /// Initial state (q, v).
     pub x0: Vec<f64>,
-    /// Different knots that the horizon uses.
+    /// Kinds of knots that the horizon uses.
     pub knots: Vec<Knot>,
-    /// Index in `knots` for each knot of the horizon.
+    /// Index into `knots` for each knot of the horizon.
     #[cfg_attr(feature = "serde", serde(alias = "stages"))]
     pub knot_models: Vec<usize>,
-    /// Terminal knot: the end of the horizon, or an impact.
+    /// Terminal knot, which may be an impact.
     pub terminal: Knot,
 }
 
-/// Knot as data.
+/// Description of a knot as data.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Knot {
-    /// Rule that gives the next state.
+    /// Dynamics, which give the next state.
     pub dynamics: Dynamics,
-    /// Costs.
+    /// Common costs at all indices of the horizon.
     pub costs: Vec<Cost>,
-    /// Costs that replace `costs` at single knots, by the index of the knot in the horizon.
+    /// Costs that replace `costs` at single knots. The key is the index of the knot in the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub costs_at: BTreeMap<usize, Vec<Cost>>,
-    /// Limits.
+    /// Common limits at all indices of the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
     pub limits: Vec<Limit>,
-    /// Limits that replace `limits` at single knots, by the index of the knot in the horizon.
+    /// Limits that replace `limits` at single knots. The key is the index of the knot in the horizon.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "BTreeMap::is_empty"))]
     pub limits_at: BTreeMap<usize, Vec<Limit>>,
-    /// Bounds on the controls, if there are any.
+    /// Bounds on the controls; `None` without bounds.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub bounds: Option<ControlBounds>,
-    /// Polynomial of the controls in time; constant at an impact and at the terminal knot, which have no controls.
+    /// Polynomial of the controls in time. It must be constant at an impact and at the terminal knot, which have no
+    /// controls.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "ControlPolynomial::is_constant"))]
     pub controls: ControlPolynomial,
 }
 
-/// Bounds on the controls of a knot, nu numbers each, infinite for an unbounded control. If the controls are a
-/// polynomial in time, the bounds hold at each node of the polynomial.
+/// Bounds on the controls of a knot, nu entries each, infinite for an unbounded control. If the controls follow a
+/// polynomial in time, the bounds apply at each node of the polynomial.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ControlBounds {
-    /// Least values.
+    /// Lower bounds of the controls.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
     pub lower: Vec<f64>,
-    /// Greatest values.
+    /// Upper bounds of the controls.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
 }
 
-/// Rule that gives the next state of a knot. The actuation is the matrix S, nv × nu; without this matrix,
+/// Dynamics of a knot, which give its next state. The actuation is the matrix S, nv × nu; without a matrix,
 /// [`Actuation::joints`] is used.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -111,24 +112,24 @@ pub enum Dynamics {
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Motion in contact: [`ContactDynamics`](super::ContactDynamics).
     Contact {
         /// Contacts that hold during the knot.
         contacts: Vec<Contact>,
-        /// Damping μ (1/kg).
+        /// Damping μ of the contacts (1/kg).
         damping: f64,
         /// Actuation matrix S, nv × nu.
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Impact: [`ImpulseDynamics`].
@@ -137,14 +138,14 @@ pub enum Dynamics {
         contacts: Vec<Contact>,
         /// Coefficient of restitution ε, from 0 to 1.
         restitution: f64,
-        /// Damping μ (1/kg).
+        /// Damping μ of the contacts (1/kg).
         damping: f64,
     },
     /// Free motion, with accelerations as controls: [`FreeInverseDynamics`](super::FreeInverseDynamics).
     Inverse {
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
     /// Motion in contact, with accelerations and contact forces as controls:
@@ -156,12 +157,12 @@ pub enum Dynamics {
         #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
         #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::optional_matrix"))]
         actuation: Option<DMatrix<f64>>,
-        /// Integrator.
+        /// Integrator of the knot.
         integrator: Integrator,
-        /// Duration Δt (s).
+        /// Duration Δt of the knot (s).
         dt: f64,
     },
-    /// End of the horizon, after the last knot: [`FreeDynamics::terminal`].
+    /// Terminal knot, after the last step of the horizon: [`FreeDynamics::terminal`].
     #[cfg_attr(feature = "serde", serde(alias = "end"))]
     Terminal,
 }
@@ -178,7 +179,7 @@ impl Dynamics {
         }
     }
 
-    /// Sets the duration Δt (s), except for an impact and the terminal knot, which have no duration.
+    /// Sets the duration Δt (s). Has no effect for an impact and the terminal knot, which have no duration.
     pub fn set_dt(&mut self, seconds: f64) {
         match self {
             Self::Free { dt, .. }
@@ -203,8 +204,8 @@ impl RobotProblem {
 }
 
 impl Knot {
-    /// Returns a knot with the same costs at every index of the horizon, constant controls, and without limits and
-    /// bounds.
+    /// Returns a knot with constant controls and with the same costs at every index of the horizon. The knot has no
+    /// limits and no bounds.
     pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
         let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
         let controls = ControlPolynomial::Constant;
@@ -213,9 +214,8 @@ impl Knot {
 
     /// Returns the action of this knot. Allocates.
     ///
-    /// # Errors
-    /// The errors of the action's constructor; [`Error::Length`] for bounds of another length than nu;
-    /// [`Error::Actuation`] for a polynomial of controls at a knot without controls.
+    /// The errors of the action's constructor; [`Error::Length`] for bounds with a length other than nu;
+    /// [`Error::Actuation`] for a control polynomial at a knot without controls.
     pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
         let (model, costs) = (model.clone(), self.costs.clone());
         let drives = |actuation: &Option<DMatrix<f64>>| match actuation {
@@ -253,7 +253,7 @@ impl Knot {
         }
     }
 
-    /// Adds the limits, and the costs and limits of single knots, to an action.
+    /// Adds the limits of a knot, and the costs and limits of single knots, to an action.
     fn complete<K: RobotKind>(
         &self,
         mut action: Integrated<RobotAcceleration<K>>,

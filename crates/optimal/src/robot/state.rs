@@ -1,4 +1,4 @@
-//! State x = (q, v) of a robot: differences of states, and second derivatives of q ⊕ δ.
+//! States x = (q, v) of a robot: differences of states, and second derivatives of q ⊕ δ.
 
 use crate::lq::Hessian;
 use condyle_dynamics::{
@@ -25,18 +25,19 @@ pub fn groups(model: &Model) -> Vec<Range<usize>> {
     model.bodies()[1..].iter().filter(|b| group(b.joint)).map(|b| b.idx_v..b.idx_v + b.joint.nv()).collect()
 }
 
-/// Workspace for the second derivatives of q ⊕ δ in the groups: the joints whose positions are not a vector space.
-/// Empty without groups.
+/// Workspace for the second derivatives of q ⊕ δ in the groups, which are the joints whose positions are not a vector
+/// space. The workspace is empty without groups.
 #[derive(Debug)]
 pub(super) struct GroupHessian {
-    /// Step δ as dual numbers, differentiated along one coordinate of each group. Shape: nv. Written by: `run`.
-    delta: Vec<LaneDual<f64>>,
-    /// Matrix E = J_exp(δ) and its derivative along the same coordinate as in `delta`. Shape: nv × nv. Written by:
+    /// Step δ as dual numbers, which differentiate with respect to one coordinate of each group. Shape: nv. Written by:
     /// `run`.
+    delta: Vec<LaneDual<f64>>,
+    /// Matrix E = J_exp(δ) as dual numbers, with its derivative along the same coordinates as in `delta`. Shape: nv ×
+    /// nv. Written by: `run`.
     E: DMatrix<LaneDual<f64>>,
     /// Matrix −J_log(−δ). Shape: nv × nv. Written by: `run`.
     back: DMatrix<f64>,
-    /// Matrix M, defined at `run`, in the blocks of groups only. Shape: nv × nv. Written by: `run`.
+    /// Matrix M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. Only the blocks of groups are written. Shape: nv × nv. Written by: `run`.
     M: DMatrix<f64>,
 }
 
@@ -51,14 +52,14 @@ impl GroupHessian {
     /// δ₀ and ε, at zero.
     ///
     /// Let E(δ) = J_exp(δ) and M_ik = Σᵣ λᵣ ∂E_ri/∂δ_k. In one group, θ = λᵀ log(exp(Tδ₀) exp(η)) with T = Ad exp(−δ)
-    /// and dη = J_log(η) E(δ + ε) dε. This gives
+    /// and dη = J_log(η) E(δ + ε) dε. The expansion of θ to second order, and an identity for ∂E, are
     ///
     /// ```text
     /// θ = λᵀ(T δ₀ + E ε + ½ ∂E[ε] ε + ½ [T δ₀, E ε]) + …      [E e, E ε] = ∂E[ε] e − ∂E[e] ε
     /// ```
     ///
-    /// The second equation is the equation of Maurer and Cartan. With e = E⁻¹ T δ₀ = J_log(−δ) δ₀ the derivatives are
-    /// ∂²θ/∂δ₀∂δ₀ = 0, ∂²θ/∂δ₀∂ε = ½ J_log(−δ)ᵀ (M − Mᵀ), ∂²θ/∂ε∂ε = ½ (M + Mᵀ).
+    /// The identity is the equation of Maurer and Cartan, where [·, ·] is the Lie bracket. With e = E⁻¹ T δ₀ =
+    /// J_log(−δ) δ₀ the derivatives are ∂²θ/∂δ₀∂δ₀ = 0, ∂²θ/∂δ₀∂ε = ½ J_log(−δ)ᵀ (M − Mᵀ), ∂²θ/∂ε∂ε = ½ (M + Mᵀ).
     pub(super) fn run(
         &mut self,
         model: &Model,

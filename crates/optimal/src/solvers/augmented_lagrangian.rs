@@ -1,4 +1,4 @@
-//! Constrained problems by an augmented Lagrangian.
+//! Solver of constrained problems by an augmented Lagrangian method.
 
 use super::outcome::{Outcome, Violation, ViolationKind};
 use super::settings::{ConstraintSettings, Settings};
@@ -11,16 +11,16 @@ use crate::problem::Problem;
 use crate::time::Instant;
 use nalgebra::DVector;
 
-/// Augmented Lagrangian solver around [`Fddp`](crate::Fddp), for problems with [`Constrained`](crate::Constrained)
-/// actions and robots with [`Limit`](crate::robot::Limit)s. It uses the bound-constrained Lagrangian method (Conn,
-/// Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP does (Jallet, Bambade, Arlaud, El-Kazdadi,
-/// Mansard, Carpentier, 2023).
+/// Augmented Lagrangian solver for problems with [`Constrained`](crate::Constrained) actions and robots with
+/// [`Limit`](crate::robot::Limit)s. Its inner solves are FDDP, as in [`Fddp`](crate::Fddp). It uses the
+/// bound-constrained Lagrangian method (Conn, Gould, Toint, 1991; Nocedal and Wright, algorithm 17.4), as ProxDDP does
+/// (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier, 2023).
 ///
 /// ```text
 /// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω
-///          if the constraints hold to η:   y ← (z − Π z) / μ,   η and ω fall
-///          else:                           μ falls
-/// until    the constraints and the gradient of the Lagrangian ℓ + yᵀg, along the dynamics, vanish to the tolerances
+///          if the violation is below the tolerance η:   y ← (z − Π z) / μ,   and η and ω become smaller
+///          else:                                        μ becomes smaller
+/// until    the violations, and the gradient of the Lagrangian ℓ + yᵀg under the dynamics, are below the tolerances
 /// ```
 ///
 /// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
@@ -75,33 +75,33 @@ use nalgebra::DVector;
 /// ```
 #[derive(Debug, Clone)]
 pub struct AugmentedLagrangian {
-    /// Settings of the constraints; may be changed between solves.
+    /// Settings for the constraints; may be changed between solves.
     pub settings: ConstraintSettings,
     /// Settings of the inner solves. The solver chooses the tolerances itself. The time budget applies to all inner
     /// solves together.
     pub inner: Settings,
     solver: SolverLoop,
     outcome: Outcome,
-    /// Adjoint state λ, and scratch for the adjoint state of the previous knot.
+    /// Adjoint state λ of a knot, and scratch for the adjoint state of the previous knot.
     adjoint: [DVector<f64>; 2],
-    /// Durations of the last measurements of the residuals.
+    /// Last durations of `measure`.
     measuring: Recent,
-    /// Whether the next solve cannot use the multipliers and the penalty.
+    /// Whether the next solve must reset the multipliers and the penalty.
     lost: bool,
 }
 
-/// Residuals of the stopping tests, in addition to the residuals in [`Outcome`].
+/// Residuals of the stopping tests that [`Outcome`] does not contain.
 struct Residuals {
-    /// Largest violation of a constraint that controls can change, or largest gap.
+    /// Largest gap, or largest violation of a constraint that controls can change, whichever is larger.
     primal: f64,
-    /// Largest violation of a constraint that depends on x̂₀ alone.
+    /// Largest violation of a constraint that depends only on the initial state x̂₀.
     fixed: Option<Violation>,
-    /// Whether the trajectory minimises the augmented Lagrangian, up to rounding.
+    /// Whether the trajectory minimises the augmented Lagrangian, except for rounding errors.
     stationary: bool,
 }
 
-/// Largest gradient entry of the augmented Lagrangian that counts as stationary, relative to the largest multiplier.
-/// Chosen because rounding at the largest penalty leaves four digits of the violation's gradient.
+/// Largest gradient entry of the augmented Lagrangian that counts as zero, relative to the largest multiplier. Rounding
+/// at the largest penalty leaves four correct digits in the gradient of a violation.
 const STATIONARY: f64 = 1e-4;
 
 impl AugmentedLagrangian {
@@ -122,20 +122,21 @@ impl AugmentedLagrangian {
     /// start at zero.
     ///
     /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances.
-    /// It is [`Status::ConstraintsViolated`] if the penalty reached its limit and the inner solve found a minimum, but
-    /// the constraints do not hold. It is [`Status::Infeasible`] if x̂₀ itself violates a constraint of knot 0 that is
-    /// a function of the state alone; the solve then continues under the other constraints. Otherwise it is the status
-    /// of the inner solve that stopped early.
+    /// It is [`Status::ConstraintsViolated`] if the penalty reached its limit and the inner solve found a minimum at
+    /// which the constraints do not hold. It is [`Status::Infeasible`] if x̂₀ violates a constraint of knot 0 that is a
+    /// function of the state alone; the solve then continues under the other constraints. In all other cases the status
+    /// is the status of the inner solve that stopped early.
     ///
-    /// The cost of the solution contains the terms of the constraints; the cost of the outcome does not. After the
+    /// The cost of the solution includes the terms of the constraints; the cost of the outcome does not. After the
     /// solve, the multipliers in the problem are zero again.
     ///
     /// Controls of the warm start outside their bounds are moved to the bounds, whatever the value of
-    /// [`Settings::project_warm_start`] in [`inner`](Self::inner). If the solve fails, it is repeated from a start that
-    /// holds x̂₀ still: see [`ConstraintSettings::restart`].
+    /// [`Settings::project_warm_start`] in [`inner`](Self::inner). A failed solve is repeated from x̂₀ at all knots and
+    /// the controls that hold x̂₀ still: see [`ConstraintSettings::restart`].
     ///
     /// # Errors
-    /// [`Error`] as for [`Fddp::solve`](crate::Fddp::solve), or if no value satisfies the bounds of a constraint.
+    /// The errors of [`Fddp::solve`](crate::Fddp::solve). Also an [`Error`] if no value satisfies the bounds of a
+    /// constraint.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut |_: &Iteration| {})
     }
@@ -144,7 +145,7 @@ impl AugmentedLagrangian {
     /// end the solve.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// The same errors as [`solve`](Self::solve).
     pub fn solve_with(
         &mut self,
         problem: &mut Problem,
@@ -155,13 +156,13 @@ impl AugmentedLagrangian {
         self.run(problem, Some([xs, us]), &mut observer)
     }
 
-    /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new
-    /// references or, after [`shift`](Self::shift), for the next horizon. The multipliers and the penalty are reset if
-    /// the last solve ended as [`Status::NotFinite`], or with violated constraints at the largest penalty. The
-    /// multipliers then start at zero, and the penalty at its first value.
+    /// Solves `problem` from the last solution, its multipliers and its penalty. The problem may have a new initial
+    /// state or new references, or may be [shifted](Self::shift) to the next horizon. If the last solve ended as
+    /// [`Status::NotFinite`], or with violated constraints at the largest penalty, the multipliers and the penalty are
+    /// reset. The multipliers then start at zero, and the penalty at its first value.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// The same errors as [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
         self.run(problem, None, &mut |_: &Iteration| {})
     }
@@ -170,7 +171,7 @@ impl AugmentedLagrangian {
     /// end the solve.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// The same errors as [`solve`](Self::solve).
     pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
         self.run(problem, None, &mut observer)
     }
@@ -199,7 +200,7 @@ impl AugmentedLagrangian {
         &self.solver.iterate.solution
     }
 
-    /// Returns the state of the constraints after the last solve.
+    /// Returns the results for the constraints of the last solve.
     pub fn outcome(&self) -> &Outcome {
         &self.outcome
     }
@@ -228,7 +229,7 @@ impl AugmentedLagrangian {
         Ok(self.solver.end(&settings, &watch))
     }
 
-    /// Makes one attempt: passes of the solver's loop, each followed by an update of the multipliers or of the penalty.
+    /// Makes one attempt: repeats a pass of the solver's loop and an update of the multipliers or of the penalty.
     fn attempt(
         &mut self,
         problem: &mut Problem,
@@ -249,12 +250,13 @@ impl AugmentedLagrangian {
         self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
         self.lost = false;
         self.solver.begin(problem, settings, warm_start)?;
-        // tolerances of one pass: eta for the constraints, omega for the gradient; both follow from μ
+        // tolerances of one pass, both functions of μ: eta for the constraints, omega for the gradient
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
         let mut status = Status::MaxIterations;
         let mut residuals = Residuals { primal: f64::INFINITY, fixed: None, stationary: false };
         for solve in 0..self.settings.max_solves {
-            // the tolerance of a pass is squared, because its expected improvement is about the square of its gradient
+            // the tolerance of a pass is dual², because the expected decrease of the cost is about the square of the
+            // gradient
             let dual = omega.max(0.1 * tolerance_dual);
             let resumes = warm_start.is_none() && solve == 0;
             self.solver.clock.reserve = self.measuring.median();
@@ -262,7 +264,7 @@ impl AugmentedLagrangian {
             let stopped = self.solver.pass(problem, settings, pass, watch);
             self.outcome.solves += 1;
             self.outcome.iterations += self.solver.iterate.solution.trace.len();
-            // computes z − Π z at the iterate, and the residuals of the stopping tests
+            // computes the violations z − Π z at the iterate, and the residuals of the stopping tests
             residuals = self.measure(problem);
             if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
                 self.lost = stopped == Status::NotFinite;
@@ -288,7 +290,8 @@ impl AugmentedLagrangian {
                 self.outcome.penalty = 1.0 / mu;
             }
         }
-        // x₀ = x̂₀ cannot be changed: if x̂₀ violates a constraint on x₀ alone, no trajectory satisfies it
+        // no control changes x₀ = x̂₀: if x̂₀ violates a constraint on x₀ alone, no trajectory satisfies that
+        // constraint
         if let Some(proof) = residuals.fixed.filter(|violation| violation.amount > tolerance) {
             self.outcome.worst = Some(proof);
             return Ok(Status::Infeasible);
@@ -298,10 +301,10 @@ impl AugmentedLagrangian {
 
     /// Makes a second attempt after a failed one: from x̂₀ at all knots and the controls that hold x̂₀ still, with
     /// multipliers of zero. Returns the status of the better attempt, and keeps its solution and outcome. A converged
-    /// attempt is better; otherwise the attempt with the smaller violation is.
+    /// attempt is better; if neither converged, the attempt with the smaller violation is better.
     ///
-    /// Does nothing if the first attempt already started from x̂₀ held still, or if no time is left. It also does
-    /// nothing without constraints and bounds, where the solve equals a solve by [`Fddp`](crate::Fddp).
+    /// Does nothing if the first attempt already had this start, or if no time is left. Also does nothing without
+    /// constraints and bounds, because the solve is then a plain solve by [`Fddp`](crate::Fddp).
     fn restart(
         &mut self,
         problem: &mut Problem,
@@ -338,8 +341,9 @@ impl AugmentedLagrangian {
         Ok(kept)
     }
 
-    /// Computes the cost and the residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺. The vectors q and r contain
-    /// the terms yᵀ∂g of the constraints, with the multipliers y that the next update would give.
+    /// Computes the cost and the residuals at the iterate, by the recursion λ = q + Aᵀλ⁺ and the gradient ∂L/∂u = r +
+    /// Bᵀλ⁺ at each knot. The vectors q and r contain the terms yᵀ∂g of the constraints, with the multipliers y that
+    /// the next update would give.
     fn measure(&mut self, problem: &mut Problem) -> Residuals {
         let Self { settings, solver: SolverLoop { iterate, knots, .. }, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
@@ -366,7 +370,7 @@ impl AugmentedLagrangian {
                     Some((lower, upper)) => (lower[j], upper[j]),
                     None => (f64::NEG_INFINITY, f64::INFINITY),
                 };
-                // u = the projection of u − ∂L/∂u into its bounds
+                // at a minimum, u equals u − ∂L/∂u projected on the bounds of u
                 let projected = if slope.is_nan() { slope } else { (u - slope).min(upper).max(lower) };
                 outcome.dual = larger(outcome.dual, (u - projected).abs());
                 if !(*u <= lower && slope > 0.0 || *u >= upper && slope < 0.0) {

@@ -1,27 +1,29 @@
-//! Best iterate of a solve, restored at the end if the last iterate is worse.
+//! Storage of the best iterate of a solve, which is restored at the end if the last iterate is worse.
 
 use super::iterate::Iterate;
 use crate::problem::Problem;
 
-/// Largest difference of two gaps that count as equal: gaps are differences of states, which are rounded.
+/// Largest difference of two gaps that count as equal. Gaps are differences of rounded states.
 const SAME_GAP: f64 = 1e-12;
-/// Largest difference of two costs that count as equal, relative to 1 + cost: costs are sums, which are rounded.
+/// Largest difference of two costs that count as equal, relative to 1 + cost. Costs are rounded sums.
 const SAME_COST: f64 = 1e-12;
-/// Bound on the cost of an iterate: it has diverged if its cost exceeds the lowest of the solve by more than 1e8·(1 +
-/// |lowest|), whatever its gaps. Iterates that close gaps may cost much more than the warm start. A weight of 1e6 at a
+/// Bound on the cost of an iterate. An iterate has diverged if its cost exceeds the lowest cost of the solve by more
+/// than 1e8·(1 + |lowest|), whatever its gaps. The bound is high because closing the gaps of a warm start may raise the
+/// cost. For example, a term with weight 1e6 at a distance of ten stays within the bound.
 /// distance of ten is still within the bound.
 const RUNAWAY: f64 = 1e8;
 
-/// Merit of an iterate, and the data from which its feedback was computed. An iterate within the bounds on controls is
-/// better than an iterate outside. Next, the smaller gap is better, and for equal gaps the lower cost.
+/// Merit of an iterate, and the values from which its feedback was computed. An iterate within the bounds on controls
+/// is better than an iterate outside the bounds. Next, the iterate with the smaller gap is better; for equal gaps, the
+/// iterate with the lower cost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Merit {
-    /// Largest gap.
+    /// Largest gap of the iterate.
     pub(super) gap: f64,
     pub(super) cost: f64,
     /// Whether the iterate counts as feasible.
     pub(super) feasible: bool,
-    /// Whether all controls are within their bounds; only a warm start that was not projected can be outside.
+    /// Whether all controls are within their bounds. Only a warm start that was not projected can violate them.
     pub(super) bounded: bool,
     /// Number of accepted steps that led to the iterate.
     pub(super) steps: usize,
@@ -29,9 +31,10 @@ pub(super) struct Merit {
     pub(super) regularisation: f64,
 }
 
-/// Best iterate at which a direction could be computed.
+/// Best iterate so far for which the solver found a search direction.
 ///
-/// When a step is accepted, the old iterate may be stored here. Buffers are exchanged for this, and nothing is copied.
+/// An accepted step replaces the current iterate. The old iterate is stored here, if it is the best, by an exchange of
+/// buffers without a copy.
 #[derive(Debug, Clone)]
 pub(super) struct Best {
     xs: Vec<f64>,
@@ -62,13 +65,13 @@ impl Best {
         self.us.resize(problem.shape().offsets[problem.horizon()], 0.0);
     }
 
-    /// Forgets the iterates of the last solve.
+    /// Removes the stored iterate of the last solve.
     pub(super) fn start(&mut self) {
         (self.merit, self.lowest) = (None, f64::INFINITY);
     }
 
-    /// Exchanges the iterate before an accepted step with the best one, unless the best one is better. Returns whether
-    /// the iterate before the step is now the best.
+    /// Stores the iterate from which an accepted step starts, unless the stored iterate is better. The two iterates
+    /// exchange their buffers. Returns whether the iterate was stored.
     pub(super) fn leave(&mut self, iterate: &mut Iterate, merit: Merit) -> bool {
         self.lowest = self.lowest.min(merit.cost);
         let good = !self.is_better_than(&merit);

@@ -1,4 +1,4 @@
-//! Differential dynamic programming, feasibility-driven or not.
+//! Differential dynamic programming (DDP) and its feasibility-driven variant (FDDP).
 
 use super::settings::Settings;
 use super::solution::{Iteration, Solution};
@@ -7,32 +7,32 @@ use super::watch::{Observer, Watch};
 use crate::error::Error;
 use crate::problem::Problem;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of
-/// Crocoddyl 3.2: both produce the same iterates. Bounds on controls ([`bounds`](crate::ActionModel::bounds)) are
-/// handled as in Crocoddyl's box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022). While gaps
-/// exist, the bounds only clamp the controls of trials. Afterwards, each knot's step minimises its quadratic model
-/// within the bounds.
+/// Solver by FDDP (Mastalli et al., ICRA 2020) or DDP (see [`DdpMethod`](crate::DdpMethod)). It has the rules and
+/// constants of Crocoddyl 3.2 and produces the same iterates. Bounds on controls
+/// ([`bounds`](crate::ActionModel::bounds)) are handled as in Crocoddyl's box solvers (Tassa, Mansard, Todorov, ICRA
+/// 2014; Mastalli et al., RA-L 2022). While gaps exist, the bounds only clamp the controls of trials. Afterwards, the
+/// sweep minimises each knot's quadratic model within the bounds.
 ///
-/// The warm start may have gaps f, where the trajectory does not satisfy the dynamics. One iteration is
+/// The warm start may have gaps f, where the trajectory does not satisfy the dynamics. One iteration consists of:
 ///
 /// ```text
 /// derivatives   at the iterate, if it is new
 /// sweep         k, K, Vx, Vxx; repeated with a larger regularisation while Quu is not positive definite
-/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap; accepted if it lowers the cost
-///               by more than `accept` times the expected α (d₁ + ½ α d₂), or, while gaps exist, raises it by less
-///               than `accept_ascent` times that
+/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap. The rollout is accepted if it lowers
+///               the cost by more than `accept` times the expected decrease α (d₁ + ½ α d₂). While gaps exist, it is
+///               also accepted if it raises the cost by less than `accept_ascent` times the expected rise
 /// ```
 ///
-/// Iterates count as feasible after the first full step (α = 1 closes all gaps at once). The feedback is u = ū + α k +
-/// K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
+/// An iterate counts as feasible after the first full step, because a step of length α = 1 closes all gaps at once. The
+/// feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
 ///
-/// The first step length is tried alone. If it fails, the next four are tried side by side, and then the others. The
-/// number of lengths tried at once is limited by the [`lanes`](crate::GroupModel::lanes) of the actions. The longest
-/// good step is taken, as in a search that tries one length after the other.
+/// The line search first tries the step length 1 alone. If that step is rejected, the next four lengths are evaluated
+/// together in one group, and then the remaining lengths. The [`lanes`](crate::GroupModel::lanes) of the actions limit
+/// the size of a group. The longest acceptable step is taken, as in a search that tries one length after the other.
 ///
-/// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace, and workspaces for
+/// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace and the workspaces for
 /// [`segments`](Settings::segments). The first solve that needs copies of actions for [`threads`](Settings::threads)
-/// allocates them. Nothing else is allocated, except by rayon itself.
+/// allocates these copies. Nothing else is allocated, except by rayon itself.
 ///
 /// # Examples
 /// ```
@@ -82,9 +82,9 @@ impl Fddp {
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat.
     ///
     /// # Errors
-    /// [`Error`] if the dimensions of `problem` differ from the problem given to [`new`](Self::new), the warm start has
-    /// a wrong length, is not finite or contains an invalid state, or a setting is invalid. A solve that does not
-    /// converge is not an error: see [`Solution::status`].
+    /// [`Error`] if the dimensions of `problem` differ from the dimensions of the problem given to [`new`](Self::new),
+    /// or if a setting is invalid. Also if the warm start has a wrong length, is not finite or contains an invalid
+    /// state. A solve that does not converge is not an error: see [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut |_: &Iteration| {})
     }
@@ -93,7 +93,7 @@ impl Fddp {
     /// end the solve.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// The same errors as [`solve`](Self::solve).
     pub fn solve_with(
         &mut self,
         problem: &mut Problem,
@@ -104,15 +104,16 @@ impl Fddp {
         self.run(problem, Some([xs, us]), &mut observer)
     }
 
-    /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
-    /// [`shift`](Self::shift), for the next horizon.
+    /// Solves `problem` from the trajectory of the last solve. The problem may have a new initial state or new
+    /// references, or may be [shifted](Self::shift) to the next horizon.
     ///
-    /// A lost trajectory is replaced by x̂₀ held still at all knots, if that costs less. A trajectory is lost if it is
-    /// not finite, or if its cost exceeds the cost c of the last solution by more than 10 (1 + |c|). If the last solve
-    /// ran out of time or iterations with a rejected step, the regularisation starts at its last value.
+    /// A trajectory is lost if it is not finite, or if its cost exceeds the cost c of the last solution by more than 10
+    /// (1 + |c|). A lost trajectory is replaced by x̂₀ at all knots and the controls that hold x̂₀ still, if the
+    /// replacement costs less. If the last solve ran out of time or iterations after a rejected step, the
+    /// regularisation starts at its last value.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// The same errors as [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
         self.run(problem, None, &mut |_: &Iteration| {})
     }
@@ -121,19 +122,19 @@ impl Fddp {
     /// end the solve.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// The same errors as [`solve`](Self::solve).
     pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
         self.run(problem, None, &mut observer)
     }
 
     /// Turns the solution into a warm start for a problem that has since been [shifted](Problem::shift) by one knot.
-    /// States, controls and gains move one knot towards the beginning, and the last control is repeated (it is zero
-    /// where the number of controls changes). Allocates only if the number of controls differs along the horizon.
+    /// States, controls and gains move one knot towards the beginning. The last control is repeated, or is zero if the
+    /// number of controls changes there. Allocates only if the number of controls differs along the horizon.
     ///
     /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory comes from a warm
-    /// start or from a solve that took a step. If further shifts follow without such a solve, the last state is
-    /// repeated, x_N = x_{N−1}, and the next solve closes the gap. The reason is that nothing stabilises a rollout with
-    /// repeated controls: the end of the horizon would diverge exponentially while solves run out of time.
+    /// start or from a solve that took a step. If the trajectory is shifted again without such a solve, the last state
+    /// is repeated, x_N = x_{N−1}, and the next solve closes the gap. The reason is that no feedback stabilises a
+    /// rollout with repeated controls. The end of the horizon would diverge exponentially while solves run out of time.
     ///
     /// # Errors
     /// [`Error`] if the numbers of knots, states and controls differ from the numbers of the last problem, shifted

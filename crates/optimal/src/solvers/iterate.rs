@@ -5,12 +5,12 @@ use crate::problem::Problem;
 use crate::time::Instant;
 use condyle_linalg::max_abs;
 
-/// Sum that is rounded only once, at the end, because near an optimum costs differ in their last digits. (Neumaier,
-/// 1974.)
+/// Sum that is rounded only once, at the end (Neumaier, 1974). The solver compares costs that differ only in their last
+/// digits near an optimum.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sum {
     sum: f64,
-    /// Sum of the rounding errors.
+    /// Sum of the rounding errors of all additions.
     lost: f64,
 }
 
@@ -30,13 +30,13 @@ impl Sum {
 /// Iterate, and the storage in which its cost and gaps are computed.
 #[derive(Debug, Clone)]
 pub(super) struct Iterate {
-    /// Solution. Its trajectory and cost are the trajectory and cost of the iterate.
+    /// Solution, with the trajectory and the cost of the iterate.
     pub(super) solution: Solution,
     /// Next states φₜ(xₜ, uₜ), N·nx.
     pub(super) next: Vec<f64>,
-    /// Accelerations and forces at knots in inverse-dynamics form, N equal parts.
+    /// Accelerations and forces at knots in inverse-dynamics form, in N parts of equal length.
     pub(super) motions: Vec<f64>,
-    /// Whether `motions` belongs to the trajectory.
+    /// Whether `motions` was computed at the current trajectory.
     pub(super) knows_motions: bool,
     costs: Vec<f64>,
     /// Gaps f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
@@ -85,7 +85,7 @@ impl Iterate {
         max_abs(&self.gaps)
     }
 
-    /// Returns the knot of the largest gap, its entry in the tangent space, and its size.
+    /// Returns the largest gap: the index of its knot, the index of its entry in the tangent space, and its size.
     pub(super) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
         let ndx = self.solution.shape().ndx;
         let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });

@@ -1,4 +1,4 @@
-//! Solvers: a loop of derivatives, sweeps and searches that all solvers share, and the methods that use it.
+//! Solvers. All of them share one loop of derivatives, sweeps and line searches.
 
 mod augmented_lagrangian;
 mod best;

@@ -1,26 +1,26 @@
-//! Multipliers of all constraints of a problem.
+//! Access of the solvers to the multipliers of all constraints of a problem.
 
 use super::outcome::{Violation, ViolationKind};
 use crate::error::Error;
 use crate::problem::{PENALTY, Problem, Visit};
 
-/// State of all constraints at a trajectory.
+/// Measurements of all constraints at a trajectory.
 #[derive(Debug, Default)]
 pub(super) struct Measured {
     /// Largest violation; `None` if all constraints hold exactly.
     pub(super) worst: Option<Violation>,
-    /// Largest violation of a constraint that no control can change, because it depends on x₀ = x̂₀ alone.
+    /// Largest violation of a constraint that no control can change, because it depends only on x₀ = x̂₀.
     pub(super) fixed: Option<Violation>,
-    /// Largest violation of all other constraints, which controls can change.
+    /// Largest violation of the constraints that controls can change.
     pub(super) rest: f64,
-    /// Largest next multiplier |z − Π z| / μ of the constraints that controls can change.
+    /// Largest multiplier |z − Π z| / μ after the next update, among the constraints that controls can change.
     pub(super) multiplier: f64,
     /// Sum of the terms that the constraints add to the cost.
     pub(super) terms: f64,
 }
 
 impl Problem {
-    /// Passes the constraints of knot t to `visit`, in their order.
+    /// Calls `visit` for the constraints of knot t, in their order.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         if let Some(group) = self.action_mut(t).knot_group_mut() {
             group.constraints(t, visit);
@@ -45,7 +45,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Sets the multipliers of each knot whose number of constraints equals the number of given multipliers.
+    /// Sets the multipliers of each knot for which `y` has as many entries as the knot has constraints.
     pub(super) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
         for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
             let mut all = 0;
@@ -87,7 +87,7 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// Updates y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
+    /// Updates the multipliers, y ← (z − Π z) / μ, at the trajectory of the last derivatives.
     pub(super) fn update_multipliers(&mut self) {
         for t in 0..=self.horizon() {
             self.constraints(t, &mut |bounded| bounded.multipliers.update(t));
@@ -95,8 +95,8 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// Measures the constraints at the trajectory at which derivatives were computed last. `starts_at_x0` tells whether
-    /// its x₀ is x̂₀. A constraint whose value is NaN has an infinite violation.
+    /// Measures the constraints at the trajectory of the last derivatives. `starts_at_x0` tells whether the first state
+    /// x₀ of this trajectory is x̂₀. A constraint whose value is NaN has an infinite violation.
     pub(super) fn measure_constraints(&mut self, starts_at_x0: bool) -> Measured {
         let mut all = Measured::default();
         for t in 0..=self.horizon() {

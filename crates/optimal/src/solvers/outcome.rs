@@ -1,27 +1,29 @@
-//! Outcome of a solve with constraints, and the row of a constraint that does not hold.
+//! Outcome of a solve with constraints, and the description of a violated constraint row.
 
 use core::fmt;
 use std::sync::Arc;
 
-/// State of the constraints after a solve; the trajectory is in the [`Solution`](crate::Solution).
+/// Result of a solve for its constraints; the trajectory is in the [`Solution`](crate::Solution).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
-    /// Cost Σ ℓ without the terms that the constraints add to it.
+    /// Sum Σ ℓ of the knots' costs, without the penalty terms of the constraints.
     pub cost: f64,
     /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
     pub primal: f64,
-    /// Row with the violation or gap in `primal`: the evidence of [`Status::ConstraintsViolated`]. `None` if all
-    /// constraints hold exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on
-    /// x̂₀ with the largest violation.
+    /// Constraint or dynamics row with the violation in `primal`: the evidence of [`Status::ConstraintsViolated`].
+    /// `None` if all constraints hold exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the
+    /// constraint on x̂₀ with the largest violation.
     ///
     /// [`Status::ConstraintsViolated`]: crate::Status::ConstraintsViolated
     /// [`Status::Infeasible`]: crate::Status::Infeasible
     pub worst: Option<Violation>,
-    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on their bounds.
+    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on the bounds of the
+    /// controls.
     pub dual: f64,
     /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
     /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in the order
-    /// of the limits. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
+    /// of the limits. The multipliers of a [`Constrained`](crate::Constrained) action that contains the robot's action
+    /// follow.
     pub multipliers: Vec<Vec<f64>>,
     /// Penalty 1/μ at the end of the solve.
     pub penalty: f64,
@@ -41,7 +43,7 @@ pub enum ViolationKind {
     Gap,
 }
 
-/// Row of a constraint or of the dynamics that does not hold at the end of a solve.
+/// Violated row of a constraint or of the dynamics at the end of a solve.
 ///
 /// ```
 /// # use condyle_dynamics::robots;
@@ -70,12 +72,12 @@ pub enum ViolationKind {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Violation {
-    /// Kind of the row.
+    /// Kind of the row: constraint or gap.
     pub kind: ViolationKind,
     /// Index of the knot, 0 … N.
     pub knot: usize,
-    /// Index of the row. For a constraint, the index in the knot's
-    /// [`Outcome::multipliers`](crate::Outcome::multipliers); for a gap, the entry of the tangent vector.
+    /// Index of the row. A constraint has the index of its multiplier in the knot's
+    /// [`Outcome::multipliers`](crate::Outcome::multipliers). A gap has the index of its entry in the tangent vector.
     pub row: usize,
     /// Name of the [`Limit`](crate::robot::Limit), if the row belongs to one.
     pub name: Option<Arc<str>>,

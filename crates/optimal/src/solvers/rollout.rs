@@ -1,4 +1,4 @@
-//! Rollouts of several step lengths side by side.
+//! Rollouts of several step lengths in one group.
 
 use super::iterate::{Iterate, Sum};
 use super::solution::Solution;
@@ -7,8 +7,8 @@ use crate::problem::{ActionView, Evaluation, Problem, Results, Shape, evaluate};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
 
-/// Trial trajectories, one per step length, that are rolled out together: at each knot the trials form one group. They
-/// are stored knot after knot and, within a knot, trial after trial.
+/// Trial trajectories, one per step length, that are rolled out together. At each knot, one group call evaluates all
+/// trials. The trials are stored knot after knot and, within a knot, trial after trial.
 #[derive(Debug, Clone)]
 pub(super) struct Trials {
     shape: Shape,
@@ -17,12 +17,12 @@ pub(super) struct Trials {
     width: usize,
     xs: Vec<f64>,
     us: Vec<f64>,
-    /// Next states φₜ(xₜ, uₜ) of N knots. Each differs from x of the next knot by the remaining gap.
+    /// Next states φₜ(xₜ, uₜ) of N knots. Each next state differs from the state of the next knot by the remaining gap.
     next: Vec<f64>,
-    /// Accelerations and forces of each knot, in equal parts.
+    /// Accelerations and forces of each knot, in parts of equal length.
     motions: Vec<f64>,
     motion_size: usize,
-    /// Sum of the costs of each trial; meaningless if the trial `failed`.
+    /// Sum of the costs of each trial; meaningless for a trial with `failed`.
     costs: Vec<Sum>,
     /// Whether each trial has diverged.
     failed: Vec<bool>,
@@ -33,7 +33,7 @@ pub(super) struct Trials {
     unread: Vec<f64>,
 }
 
-/// Trajectory from which trials start, and direction of their steps.
+/// Trajectory from which trials start, and the feedback that gives the direction of their steps.
 #[derive(Clone, Copy)]
 pub(super) struct Nominal<'a> {
     pub(super) xs: &'a [f64],
@@ -87,7 +87,8 @@ impl Trials {
     ///
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
     ///
-    /// with uₜ moved into its bounds. The given knots begin the horizon, or follow the knots of the last call.
+    /// with uₜ moved into its bounds. The range of `knots` begins at the first knot, or continues where the last call
+    /// ended.
     pub(super) fn run(
         &mut self,
         view: &mut ActionView<'_>,
@@ -133,7 +134,7 @@ impl Trials {
                 add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
                 if let Some((lower, upper)) = action.bounds(t) {
                     for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
-                        *u = if *u < *lower { *lower } else { *u }; // a NaN remains
+                        *u = if *u < *lower { *lower } else { *u }; // unlike `max`, this keeps a NaN
                         *u = if *u > *upper { *upper } else { *u };
                     }
                 }
@@ -159,7 +160,8 @@ impl Trials {
         (!self.failed[i]).then_some(self.costs[i].value())
     }
 
-    /// Computes −Σ bᵀ (x ⊖ x_trial) for trial `i`, summed over the states x and the vectors b of all knots, both flat.
+    /// Computes −Σ bᵀ (x ⊖ x_trial) for trial `i`. The sum is over all knots, with the states x in `xs` and the vectors
+    /// b in `b`, both flat.
     pub(super) fn distance(&mut self, view: &ActionView<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
         let mut dx = std::mem::take(&mut self.dx);
         let mut sum = 0.0;

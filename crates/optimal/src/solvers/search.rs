@@ -1,5 +1,5 @@
-//! Line search of differential dynamic programming: the expected improvement of a step, and the test whether a trial
-//! achieves it.
+//! Line search of differential dynamic programming: the expected decrease of the cost by a step, and the test that
+//! accepts a trial.
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;
@@ -14,16 +14,16 @@ use condyle_linalg::threads::join;
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Number of step lengths that are tried side by side when 1 fails, unless ½ is likely to succeed. One of four lengths
-/// usually succeeds. A group of four takes two to three times as long as a single trial, in which branches of the robot
-/// are computed in parallel lanes.
+/// Number of step lengths that are evaluated as one group when the step length 1 fails, unless ½ is likely to succeed.
+/// Usually one of the four lengths succeeds. A group of four takes two to three times as long as a single trial,
+/// because a single trial computes branches of the robot in parallel SIMD lanes.
 const SECOND: usize = 4;
 
-/// Number of searches after a shortened step in which shorter steps are tried concurrently. Every second or third of
-/// these searches needs a shorter step.
+/// Number of searches after a shortened step in which another thread tries shorter steps concurrently. In every second
+/// or third of these searches, a shorter step is needed.
 const WARY: usize = 3;
 
-/// Outcome of a line search: data of the accepted trial, or else of the last trial that stayed finite.
+/// Outcome of a line search: data of the accepted trial, or of the last trial that stayed finite if none was accepted.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Search {
     pub(super) step: f64,
@@ -34,18 +34,18 @@ pub(super) struct Search {
     pub(super) accepted: bool,
     /// Reason why the search ended early, if the solve must stop.
     pub(super) stopped: Option<Status>,
-    /// Whether the iterate before the accepted step is now the best one.
+    /// Whether the iterate before the accepted step was stored as the best one.
     pub(super) left_best: bool,
 }
 
-/// Iterate with its feedback, and the fields of a solver that a search around the iterate uses.
+/// Iterate with its feedback, and the fields of a solver that its line search uses.
 pub(super) struct Surroundings<'a, 'o> {
     /// Iterate, which the accepted trial replaces.
     pub(super) iterate: &'a mut Iterate,
     pub(super) merit: Merit,
-    /// Best earlier iterate.
+    /// Best iterate before the current one.
     pub(super) best: &'a mut Best,
-    /// Feedback and value functions.
+    /// Feedback and value functions of all knots.
     pub(super) feedback: &'a [KnotFeedback],
     pub(super) settings: &'a Settings,
     pub(super) clock: &'a mut Clock,
@@ -56,15 +56,15 @@ pub(super) struct Surroundings<'a, 'o> {
 #[derive(Debug, Clone)]
 pub(super) struct LineSearch {
     trials: Trials,
-    /// Trials that another thread rolls out while this thread tries the first step.
+    /// Trials of the next step lengths, which another thread rolls out while this thread tries the first step length.
     ahead: Option<Trials>,
-    /// Number of following searches that may try several lengths concurrently.
+    /// Number of coming searches in which another thread may try shorter steps concurrently.
     wary: usize,
     /// Step lengths, 1, ½, ¼, ….
     steps: Vec<f64>,
     /// Products Vxx f of all knots, (N + 1)·ndx.
     curved_gaps: Vec<f64>,
-    /// Terms dg and dq of the expected improvement, which do not depend on the trial.
+    /// Terms dg and dq of the expected decrease, which do not depend on the trial.
     expected: [f64; 2],
 }
 
@@ -88,8 +88,8 @@ impl LineSearch {
         self.ahead.iter_mut().for_each(|ahead| ahead.reshape(problem));
     }
 
-    /// Begins a solve with `count` step lengths. `motion_size` is the number of entries kept of each knot's motion,
-    /// `threads` the number of threads.
+    /// Prepares the searches of a solve that try `count` step lengths on `threads` threads. `motion_size` is the number
+    /// of accelerations and forces that are stored per knot.
     pub(super) fn start(&mut self, problem: &Problem, count: usize, motion_size: usize, threads: usize) {
         if threads > 1 && self.ahead.is_none() {
             self.ahead = Some(Trials::new(problem, self.trials.width()));
@@ -101,12 +101,12 @@ impl LineSearch {
         self.steps.extend((0..count).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
     }
 
-    /// Tries α = 1, ½, ¼, … until a step is accepted; its trial becomes the iterate. With several threads, if a recent
-    /// search needed a shorter step than 1, another thread tries the next length at the same time as the first.
+    /// Tries α = 1, ½, ¼, … until a step is accepted; the accepted trial becomes the iterate. If a recent search needed
+    /// a step shorter than 1, a second thread tries the next lengths at the same time as the first length.
     ///
-    /// A trial that diverges keeps the expected improvement of the trial before it. If the first trial diverges, it
-    /// keeps the expected improvement of the previous line search, `last`. In DDP the expected improvement does not
-    /// depend on the trial, so a diverging trial keeps the value of this search.
+    /// The expected decrease of a diverging trial is the expected decrease of the trial before it. If the first trial
+    /// diverges, it is the expected decrease of the previous line search, `last`. In DDP the expected decrease does not
+    /// depend on the trial, so a diverging trial has the same terms as any other trial of the search.
     #[inline(never)] // `benches/instructions.py` counts this function by name
     pub(super) fn run(&mut self, problem: &mut Problem, around: Surroundings<'_, '_>, last: Search) -> Search {
         self.expect(&around);
@@ -185,7 +185,8 @@ impl LineSearch {
         search
     }
 
-    /// Computes the terms dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP omits the gaps f.
+    /// Computes the terms dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf and dq = −Σ kᵀQuu k + Σ fᵀVxx f of the expected decrease. DDP
+    /// omits the terms with gaps f.
     fn expect(&mut self, around: &Surroundings<'_, '_>) {
         let Surroundings { iterate, merit, feedback, settings, .. } = around;
         let ((mut dg, mut dq), counts_gaps) = ((0.0, 0.0), settings.counts_gaps(merit.feasible));
@@ -206,22 +207,22 @@ impl LineSearch {
     }
 }
 
-/// Rule that decides whether a trial from one iterate is accepted.
+/// Rule that decides whether a trial is accepted. The rule is the same for all trials that start from one iterate.
 struct Rule<'a> {
     settings: &'a Settings,
     feasible: bool,
-    /// Terms dg and dq of the expected improvement.
+    /// Terms dg and dq of the expected decrease.
     expected: [f64; 2],
-    /// Products Vxx f of all knots, if gaps count.
+    /// Products Vxx f of all knots, if the expected decrease includes the gaps.
     curved_gaps: Option<&'a [f64]>,
-    /// States and cost of the iterate.
+    /// States of the iterate; the next field is the cost of the iterate.
     xs: &'a [f64],
     cost: f64,
 }
 
 impl Rule<'_> {
     /// Writes the expected and the actual decrease of trial i, with step length α, to `search`. Returns the trial's
-    /// cost if the trial is good.
+    /// cost if the trial is accepted.
     ///
     /// ```text
     /// d₁ = dg + dv,   d₂ = dq − 2 dv,   dv = −Σ fᵀVxx (x ⊖ x_trial),   expected decrease α (d₁ + ½ α d₂)
@@ -246,9 +247,9 @@ impl Rule<'_> {
 }
 
 impl Search {
-    /// Returns whether the step lowers the cost enough. While gaps exist, a step is also good if it raises the cost
-    /// little enough (FDDP). In DDP it is then good if it is expected to lower the cost of the rollout that closes the
-    /// gaps.
+    /// Returns whether the step is accepted: whether it lowers the cost enough. While gaps exist, FDDP also accepts a
+    /// step that raises the cost by little. DDP then accepts each step with an expected decrease: the first accepted
+    /// step closes all gaps, whatever it costs.
     fn is_good(&self, settings: &Settings, feasible: bool) -> bool {
         let Self { d1, decrease, expected_decrease, .. } = *self;
         let closes_gaps = !feasible && settings.method == DdpMethod::Ddp;

@@ -10,8 +10,8 @@ use std::time::Duration;
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum DdpMethod {
-    /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`. Every trial is a plain rollout from
-    /// x̂₀. The first accepted step therefore closes the gaps of a warm start at once, however much this costs.
+    /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`. Every trial is a rollout from x̂₀
+    /// without gaps. The first accepted step therefore closes the gaps of a warm start at once, whatever this costs.
     Ddp,
     /// Feasibility-driven differential dynamic programming (Mastalli et al., ICRA 2020), Crocoddyl's `SolverFDDP`: a
     /// trial of length α keeps the fraction 1 − α of each gap.
@@ -20,7 +20,7 @@ pub enum DdpMethod {
 }
 
 impl DdpMethod {
-    /// Returns the name used in files and in Python: `"ddp"` or `"fddp"`.
+    /// Returns the method's name in files and in Python: `"ddp"` or `"fddp"`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ddp => "ddp",
@@ -29,7 +29,7 @@ impl DdpMethod {
     }
 }
 
-/// Writes the method by its usual abbreviation.
+/// Writes the abbreviation of the method: DDP or FDDP.
 impl fmt::Display for DdpMethod {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
@@ -46,61 +46,61 @@ impl fmt::Display for DdpMethod {
 pub struct Settings {
     /// Method, which decides how gaps are closed and which steps are accepted.
     pub method: DdpMethod,
-    /// Whether the curvature of the dynamics is included: Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action computes
-    /// it. This is full DDP, which converges quadratically; Quu may need more regularisation. A robot's knots compute
-    /// the exact curvature if they have no contacts and use semi-implicit Euler. All other knots of robots count as
-    /// linear.
+    /// Whether the quadratic model includes the curvature of the dynamics, that is, Vx·∂²φ in Qxx, Qxu and Quu. This is
+    /// full DDP, which converges quadratically; Quu may need more regularisation. A robot's knots compute the exact
+    /// curvature if they have no contacts and use semi-implicit Euler steps. The dynamics of all other robot knots
+    /// count as linear. A user-defined action may compute the curvature of its dynamics.
     pub second_order: bool,
-    /// Whether the sweep receives a robot's knots as equations of inverse dynamics, with accelerations and contact
-    /// forces as unknowns instead of the controls. This is possible without bounds on controls and without
-    /// `second_order`. Steps and gains are the same, up to rounding, in about half the time.
+    /// Whether the sweep receives a robot's knots as equations of inverse dynamics. The unknowns are then accelerations
+    /// and contact forces instead of the controls. This form is used only without bounds on controls and without
+    /// `second_order`. Steps and gains are the same, except for rounding errors, in about half the time.
     pub inverse_dynamics_form: bool,
-    /// Maximum number of iterations, at most 1 000 000. With a tolerance of 0, exactly this number of iterations is
-    /// made.
+    /// Maximum number of iterations, at most 1 000 000. With a tolerance of 0, a solve makes exactly this number of
+    /// iterations.
     pub max_iterations: usize,
-    /// Tolerance of the expected decrease |d₁ + ½ d₂| of the cost. A solve has converged when the iterate was feasible
-    /// and the expected decrease is below the tolerance.
+    /// Tolerance of the expected decrease |d₁ + ½ d₂| of the cost. A solve has converged when the iterate before the
+    /// last step was feasible and the expected decrease is below the tolerance.
     pub tolerance: f64,
-    /// Tolerance for problems with bounds on controls, whose expected decrease does not include the multipliers of the
-    /// bounds.
+    /// Tolerance that replaces `tolerance` for problems with bounds on controls. The expected decrease of such problems
+    /// does not include the multipliers of the bounds.
     pub tolerance_bounded: f64,
-    /// Whether a warm start outside the bounds on controls is moved into them, entry by entry, before a solve. This
-    /// applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl does not move
-    /// such a start, so its iterates are reproduced only with `false`. With either value, a solution that violates a
-    /// bound is never [`Converged`].
+    /// Whether a warm start outside the bounds on controls is moved into the bounds, entry by entry, before a solve.
+    /// This applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl does not
+    /// move its warm start, so only `false` reproduces Crocoddyl's iterates. With either value, a solution that
+    /// violates a bound is never [`Converged`].
     ///
     /// [`solve`]: crate::Fddp::solve
     /// [`resume`]: crate::Fddp::resume
     /// [`Converged`]: crate::Status::Converged
     pub project_warm_start: bool,
-    /// Time limit of a solve; `None` for no limit. The first iteration always runs, unless the budget is zero. A later
-    /// phase (derivatives, a sweep, a trial; with several threads, derivatives and sweep together) starts only if it is
-    /// predicted to end in time. The prediction is the median of the last five durations of that phase, over all
-    /// solves, so one or two delays do not shorten later solves. A solve that takes longer reports
-    /// [`Timings::overrun`](crate::Timings::overrun): the budget was shorter than an iteration, or something delayed
-    /// the solve. A solve that restores a better iterate may need one more sweep.
+    /// Time limit of a solve; `None` for no limit. The first iteration always runs, unless the budget is zero. The
+    /// later phases are derivatives, a sweep and a trial; with several threads, derivatives and sweep are one phase. A
+    /// phase starts only if it is predicted to end in time. The prediction is the median of the last five durations of
+    /// that phase, over all solves. One or two delays therefore do not shorten later solves. A solve may exceed the
+    /// limit if the budget is shorter than an iteration, or if a phase is delayed: see
+    /// [`Timings::overrun`](crate::Timings::overrun). A solve that restores a better iterate may need one more sweep.
     pub time_budget: Option<Duration>,
-    /// Number of segments of the horizon that a sweep processes at the same time: see [`Sweep::set_segments`]. It is
-    /// independent of the number of threads in rayon's pool; any number of threads gives the same result. At most 1024.
+    /// Number of segments of the horizon that a sweep processes at the same time, at most 1024: see
+    /// [`Sweep::set_segments`]. The number of threads in rayon's pool does not change the result.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,
-    /// Number of threads that share an iteration, at most 1024. They belong to the rayon pool in which a solve is
-    /// called, otherwise to the global pool. They compute derivatives and gains while the calling thread sweeps, and
-    /// try a second step length when the first is often too long. The result is the same to the last bit for any number
-    /// of threads. More than one thread needs copies of the actions ([`try_clone`]). The copies are made when they are
-    /// missing or a model has changed.
+    /// Number of threads that share an iteration, at most 1024. The threads belong to the rayon pool from which the
+    /// solver is called, or else to the global pool. They compute derivatives and gains while the calling thread
+    /// sweeps, and try shorter step lengths when the first length is often too long. The result is the same to the last
+    /// bit for any number of threads. More than one thread needs copies of the actions ([`try_clone`]). The copies are
+    /// made when they are missing or a model has changed.
     ///
     /// [`try_clone`]: crate::ActionModel::try_clone
     pub threads: usize,
-    /// Number of step lengths that a line search tries, 2⁻ⁿ for n = 0, 1, ….
+    /// Number n of step lengths that a line search tries: 1, ½, …, 2¹⁻ⁿ.
     pub step_lengths: usize,
-    /// Fraction of the expected decrease by which the cost must fall for a step to be accepted.
+    /// Fraction of the expected decrease. A step is accepted if the cost falls by more than this fraction.
     pub accept: f64,
-    /// Factor for steps that are expected to raise the cost, while gaps exist. Such a step is accepted if the rise of
-    /// the cost is less than this factor times the expected rise.
+    /// Factor of the test for steps that are expected to raise the cost, while gaps exist. Such a step is accepted if
+    /// the rise of the cost is less than this factor times the expected rise.
     pub accept_ascent: f64,
-    /// Bound on |d₁| below which any step that is expected to lower the cost is accepted.
+    /// Bound on |d₁|. Below this bound, any step that is expected to lower the cost is accepted.
     pub flat: f64,
     /// Regularisation of the first iteration.
     pub regularisation_start: f64,
@@ -108,18 +108,18 @@ pub struct Settings {
     pub regularisation_min: f64,
     /// Largest regularisation; a solve that reaches it stops.
     pub regularisation_max: f64,
-    /// Factor by which the regularisation rises and falls.
+    /// Factor by which the regularisation is raised or lowered.
     pub regularisation_factor: f64,
-    /// Step length above which the regularisation falls.
+    /// Step length above which an accepted step lowers the regularisation.
     pub regularisation_decrease_above: f64,
-    /// Step length at or below which the regularisation rises.
+    /// Step length at or below which the regularisation is raised.
     pub regularisation_increase_below: f64,
 }
 
-/// Maximum number of segments and of threads: each has its own memory.
+/// Maximum number of segments, and of threads. Each segment and each thread has its own memory.
 const MOST_AT_ONCE: usize = 1024;
 
-/// Valid range of the numbers of segments and threads, in words.
+/// Text of an error message: valid range of the numbers of segments and threads.
 const AT_ONCE: &str = "at least 1 and at most 1024";
 
 impl Default for Settings {
@@ -150,7 +150,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Returns whether gaps count in the expected improvement of a step.
+    /// Returns whether the expected decrease of a step includes the gaps.
     pub(super) fn counts_gaps(&self, feasible: bool) -> bool {
         !feasible && self.method == DdpMethod::Fddp
     }
@@ -198,7 +198,7 @@ impl Settings {
     }
 }
 
-/// Setting to check: name, value, whether the value is valid, and the valid range in words.
+/// Setting to check: its name, its value, whether the value is valid, and a text for the valid range.
 type Checked = (&'static str, f64, bool, &'static str);
 
 /// Returns the error of the first invalid setting, if there is one.
@@ -234,13 +234,13 @@ pub struct ConstraintSettings {
     pub penalty_start: f64,
     /// Largest penalty 1/μ.
     pub penalty_max: f64,
-    /// Factor by which the penalty 1/μ rises.
+    /// Factor by which the penalty 1/μ is raised.
     pub penalty_factor: f64,
     /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold x̂₀ still
-    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if it ends as not finite, or with violated
-    /// constraints at the largest penalty. The better result is kept. Typical causes of failures are warm starts that
-    /// diverge or saturate the controls. The repetition allocates. `resume` never repeats a solve, and neither is a
-    /// problem without constraints and bounds solved twice.
+    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if its status is `NotFinite`, or if
+    /// constraints are violated at the largest penalty. The better of the two results is kept. Typical causes of
+    /// failures are warm starts that diverge or saturate the controls. The repetition allocates. `resume` never repeats
+    /// a solve. A problem without constraints and bounds is never solved twice.
     pub restart: bool,
 }
 

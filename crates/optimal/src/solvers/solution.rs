@@ -1,5 +1,5 @@
-//! Solutions: the trajectory, its feedback, the outcome of the solve and a record of its iterations.
-#![allow(non_snake_case)] // K besides k: names of the literature
+//! Solution of a solve: the trajectory, its feedback, the outcome of the solve and a record of its iterations.
+#![allow(non_snake_case)] // names follow the literature: K, k
 
 use crate::problem::{Problem, Shape};
 use core::fmt;
@@ -9,11 +9,11 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::time::Duration;
 
-/// Outcome of a solve. Whatever the status, the [`Solution`] holds the best iterate found. A converged iterate is the
-/// best. Otherwise the candidates are the last iterate and all iterates from which a step could be computed. Among them
-/// the iterate with the smallest gap is the best, and among equal gaps the iterate with the lowest cost. An iterate
-/// within the bounds on controls precedes a warm start outside. An iterate has diverged, and is not a candidate, if its
-/// cost exceeds the lowest cost of the solve by more than 1e8·(1 + |lowest|).
+/// Outcome of a solve. With any status, the [`Solution`] contains the best iterate found. A converged iterate is the
+/// best. If no iterate converged, the candidates are the last iterate and all iterates for which a search direction was
+/// found. Among the candidates, the iterate with the smallest gap is the best; for equal gaps, the iterate with the
+/// lowest cost. An iterate within the bounds on controls is better than a warm start outside the bounds. An iterate has
+/// diverged, and is not a candidate, if its cost exceeds the lowest cost of the solve by more than 1e8·(1 + |lowest|).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -29,23 +29,23 @@ pub enum Status {
     Interrupted,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
-    /// The penalty reached its limit, and constraints are still violated. This is not a proof of infeasibility: another
-    /// warm start, or a larger penalty, may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the
-    /// largest violation.
+    /// The penalty reached its limit, and constraints are still violated. This does not prove infeasibility: another
+    /// warm start or a larger penalty may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest
+    /// violation.
     ConstraintsViolated,
-    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof. The initial state x̂₀ itself
-    /// violates a constraint of knot 0 that no control can change, such as a built-in residual of the state alone. The
-    /// solution satisfies the other constraints, as far as the solve progressed.
+    /// No solution exists. The initial state x̂₀ violates a constraint of knot 0 that no control can change, for
+    /// example a built-in residual of the state alone. [`Outcome::worst`](crate::Outcome::worst) names this constraint.
+    /// The solution satisfies the other constraints, as far as the solve progressed.
     Infeasible,
-    /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so no direction can be computed. The
-    /// solution is the best earlier iterate. If that is the warm start itself, its cost may be infinite. States and
-    /// controls are finite. Another warm start may help, such as x̂₀ held still
-    /// ([`Problem::quasi_static`](crate::Problem::quasi_static)).
+    /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so no search direction can be computed.
+    /// The solution is the best earlier iterate. Its states and controls are finite, but its cost may be infinite if it
+    /// is the warm start. Another warm start may help, for example x̂₀ at all knots and the controls that hold x̂₀
+    /// still ([`Problem::quasi_static`](crate::Problem::quasi_static)).
     NotFinite,
 }
 
 impl Status {
-    /// Returns the name used in files and in Python: `"converged"`, `"max_iterations"` and so on.
+    /// Returns the status's name in files and in Python: `"converged"`, `"max_iterations"` and so on.
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
@@ -76,11 +76,11 @@ impl fmt::Display for Status {
     }
 }
 
-/// Record of one iteration.
+/// Record of one iteration of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Iteration {
-    /// Index of the iteration, from 0.
+    /// Index of the iteration; the first iteration has the index 0.
     pub iteration: usize,
     /// Cost of the iterate after the step.
     pub cost: f64,
@@ -88,13 +88,13 @@ pub struct Iteration {
     pub gap: f64,
     /// Expected decrease of the cost by the full step, |d₁ + ½ d₂|, which is compared with the tolerance.
     pub stop: f64,
-    /// Length α of the accepted step, or else the step length tried last.
+    /// Length α of the accepted step, or the step length tried last if no step was accepted.
     pub step: f64,
     /// Regularisation after the iteration.
     pub regularisation: f64,
-    /// Slope d₁ of the expected change: the expected decrease of the cost is α (d₁ + ½ α d₂).
+    /// Linear coefficient d₁ of the expected decrease α (d₁ + ½ α d₂) of the cost.
     pub d1: f64,
-    /// Curvature d₂ of the expected change.
+    /// Quadratic coefficient d₂ of the expected decrease α (d₁ + ½ α d₂) of the cost.
     pub d2: f64,
     /// Actual decrease of the cost by the step tried last.
     pub decrease: f64,
@@ -106,24 +106,25 @@ pub struct Iteration {
     pub accepted: bool,
 }
 
-/// Durations of the phases of a solve. For an [`AugmentedLagrangian`](crate::AugmentedLagrangian) they cover all inner
-/// solves together.
+/// Durations of the phases of a solve. For an [`AugmentedLagrangian`](crate::AugmentedLagrangian) they are sums over
+/// all inner solves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timings {
-    /// Dynamics and cost of the warm start.
+    /// Duration of the first evaluation: dynamics and cost of the warm start.
     pub calc: Duration,
-    /// Derivatives. With several threads, the time in which the sweep waited for derivatives or computed some itself.
+    /// Duration of the derivatives. With several threads, the time in which the sweeping thread waited for derivatives
+    /// or computed derivatives itself.
     pub calc_diff: Duration,
-    /// Backward sweeps, including repeated ones.
+    /// Duration of the backward sweeps, including repeated sweeps.
     pub sweep: Duration,
-    /// Trial rollouts of the line searches, accepted or not.
+    /// Duration of the trial rollouts in the line searches, whether accepted or not.
     pub rollout: Duration,
-    /// Whole solve, including the time in the observer.
+    /// Duration of the whole solve, including the time in the observer.
     pub total: Duration,
     /// Time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time. It is
-    /// positive if the budget is shorter than the first iteration, or a phase took longer than predicted. A budget of
-    /// zero requests no iteration, and is never overrun.
+    /// positive if the budget is shorter than the first iteration, or if a phase took longer than predicted. It is zero
+    /// with a budget of zero, because no iteration then runs.
     #[cfg_attr(feature = "serde", serde(default))]
     pub overrun: Duration,
 }
@@ -137,7 +138,7 @@ impl Timings {
     }
 }
 
-/// Result of a solve. Reading a solution from a file checks that the lengths of its fields fit one horizon.
+/// Result of a solve. A solution that is read from a file is checked: the lengths of all fields must fit one horizon.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(remote = "Self"))] // serde reads the fields; the implementations below check them
@@ -150,13 +151,13 @@ pub struct Solution {
     /// xₜ).
     #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::matrices"))]
     pub K: Vec<DMatrix<f64>>,
-    /// Feed-forward terms of the last sweep, nu numbers per knot: the full step of the controls.
+    /// Feed-forward terms of the last sweep, nu entries per knot. They are the changes of the controls by a full step.
     pub k: Vec<DVector<f64>>,
     /// Cost of the trajectory; infinite if it is NaN.
     pub cost: f64,
     /// Largest gap of the trajectory, ‖f‖∞; infinite if it is NaN.
     pub gap: f64,
-    /// Whether the trajectory satisfies the dynamics: it is a plain rollout from x̂₀.
+    /// Whether the trajectory satisfies the dynamics, as a rollout from x̂₀ without gaps.
     pub feasible: bool,
     /// Regularisation at the end of the solve.
     pub regularisation: f64,
@@ -212,9 +213,9 @@ impl Solution {
         &self.us[self.shape.u(t)]
     }
 
-    /// Returns the regularisation with which a resumed solve begins. It is `start`, unless the last solve ran out of
-    /// time or iterations after a rejected step. It is then the last regularisation of that solve, because with a
-    /// smaller one the same step would be rejected again.
+    /// Returns the first regularisation of a resumed solve. This is `start`, unless the last solve ran out of time or
+    /// iterations after a rejected step. In that case it is the last regularisation, because a smaller one would lead
+    /// to the same rejected step.
     pub(super) fn resumed_regularisation(&self, start: f64) -> f64 {
         let stopped = matches!(self.status, Status::TimeLimit | Status::MaxIterations | Status::Interrupted);
         match self.trace.last() {
@@ -223,8 +224,8 @@ impl Solution {
         }
     }
 
-    /// Drops the first knot and appends one at the end, so that the dimensions become `shape`. The new knot copies the
-    /// last state and, if its size fits, the last control; the gains of the new knot are zero.
+    /// Drops the first knot and appends a knot at the end. The dimensions become `shape`. The new knot copies the last
+    /// state and, if its size fits, the last control. The gains of the new knot are zero.
     pub(crate) fn shift(&mut self, shape: &Shape) {
         let (nx, last, ndx) = (shape.nx, shape.horizon() - 1, shape.ndx);
         self.xs.copy_within(nx.., 0);

@@ -1,9 +1,10 @@
-//! Loop that all solvers share: derivatives, a sweep and a search, repeated until there is a reason to stop.
+//! Loop that all solvers share. The loop repeats derivatives, a sweep and a line search until there is a reason to
+//! stop.
 //!
 //! A solve [begins](SolverLoop::begin) from a trajectory and makes one or more [passes](SolverLoop::pass). A pass
 //! iterates on one cost. A solver with an outer method, such as an augmented Lagrangian, changes the cost between
 //! passes. All passes of a solve share the clock, the observer and the timings.
-#![allow(non_snake_case)] // K besides k: names of the literature
+#![allow(non_snake_case)] // names follow the literature: K, k
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;
@@ -17,7 +18,7 @@ use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::time::Instant;
 use std::time::Duration;
 
-/// Number of iterations for which the trace is allocated when a solve begins; the trace grows if more are made.
+/// Number of iterations for which a solve allocates the trace at its beginning; the trace grows if more are made.
 const FORESEEN: usize = 10_000;
 
 /// Iterate of a solver, the linear-quadratic problem around it, and the workspace of an iteration.
@@ -31,31 +32,32 @@ pub(super) struct SolverLoop {
     /// Best iterate; it becomes the solution if the last iterate is worse.
     pub(super) best: Best,
     pub(super) clock: Clock,
-    /// Whether knots may be given as equations of inverse dynamics.
+    /// Whether this solve uses the inverse-dynamics form of knots, where actions support it.
     inverse_dynamics: bool,
     /// Whether some control has a bound.
     bounded: bool,
-    /// Whether a trajectory exists from which a solve can resume.
+    /// Whether the solver has a trajectory from which a solve can resume.
     started: bool,
-    /// Whether the trajectory was given or found since the last shift. If not, the next shift repeats the last state.
+    /// Whether a warm start or a solve has set the trajectory since the last shift. If not, the next shift repeats the
+    /// last state.
     pub(super) renewed: bool,
 }
 
-/// Properties of a pass that the calling solver chooses, in addition to the settings.
+/// Options of a pass that the calling solver sets, in addition to the settings.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Pass {
-    /// Tolerance that replaces the tolerance in the settings.
+    /// Tolerance that replaces the tolerance in the settings; `None` for the tolerance in the settings.
     pub(super) tolerance: Option<f64>,
-    /// Whether a warm start without gaps counts as feasible if a control lies on its bound. Crocoddyl's value is false:
-    /// the bounds then only clamp trials until the first full step. Where the bounds are active, the full step is never
-    /// accepted.
+    /// Whether a warm start without gaps counts as feasible if a control lies on its bound. In Crocoddyl such a warm
+    /// start is not feasible, so the bounds only clamp trials until the first full step. If bounds are active, the full
+    /// step may never be accepted.
     pub(super) trusts_start: bool,
-    /// Whether the pass continues the last solve, instead of starting from a warm start or an earlier pass of the same
-    /// solve.
+    /// Whether the pass continues the last solve. If not, the pass starts from a warm start or follows an earlier pass
+    /// of the same solve.
     pub(super) resumes: bool,
 }
 
-/// State that one iteration passes to the next.
+/// Variables that one iteration passes to the next.
 struct Progress {
     /// Merit of the iterate.
     merit: Merit,
@@ -63,7 +65,8 @@ struct Progress {
     was_feasible: bool,
     /// Whether this pass has computed gains.
     swept: bool,
-    /// Whether the gains of this pass belong to the best iterate, from which the last step started.
+    /// Whether the last sweep of this pass computed the gains at the best iterate, because the last step started from
+    /// that iterate.
     swept_best: bool,
 }
 
@@ -86,10 +89,10 @@ impl SolverLoop {
         }
     }
 
-    /// Begins an attempt to solve `problem`, from a warm start or else from the last trajectory.
+    /// Begins an attempt to solve `problem`, from a warm start if one is given, else from the last trajectory.
     ///
     /// # Errors
-    /// [`Error`] as documented for [`Fddp::solve`](crate::Fddp::solve).
+    /// The errors of [`Fddp::solve`](crate::Fddp::solve).
     pub(super) fn begin(
         &mut self,
         problem: &mut Problem,
@@ -113,7 +116,7 @@ impl SolverLoop {
         settings.check()?;
         solution.shape().check(problem.shape())?;
         if self.knots[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.knots) {
-            self.sweep = Sweep::new(&self.knots); // `new` was given a problem without equations of inverse dynamics
+            self.sweep = Sweep::new(&self.knots); // `new` was called with a problem without inverse-dynamics form
         }
         self.bounded = problem.check_bounds()?;
         self.inverse_dynamics = settings.inverse_dynamics_form && !self.bounded && !settings.second_order;
@@ -172,7 +175,7 @@ impl SolverLoop {
         &self.iterate.solution
     }
 
-    /// Makes iterations until one of the reasons to stop occurs.
+    /// Makes iterations until there is a reason to stop.
     fn make_iterations(
         &mut self,
         problem: &mut Problem,
@@ -203,7 +206,7 @@ impl SolverLoop {
             now.advance(&search, settings, self.iterate.solution.cost);
             let Merit { gap, cost, feasible, regularisation, .. } = now.merit;
             let Search { step, d1, d2, decrease, expected_decrease, accepted, .. } = search;
-            let stop = (d1 + 0.5 * d2).abs(); // expected improvement for α = 1
+            let stop = (d1 + 0.5 * d2).abs(); // expected decrease for α = 1
             let record = Iteration {
                 iteration,
                 cost,
@@ -234,8 +237,8 @@ impl SolverLoop {
         Status::MaxIterations
     }
 
-    /// Computes the derivatives, if the iterate is new, and the feedback by a sweep. The sweep is repeated with a
-    /// larger regularisation while Quu is not positive definite.
+    /// Computes the derivatives, if the iterate is new, and then the feedback by a sweep. The sweep is repeated with a
+    /// larger regularisation while a block Quu is not positive definite.
     ///
     /// # Errors
     /// The reason to stop, if no direction was found or no time is left.
@@ -274,9 +277,9 @@ impl SolverLoop {
         Ok(())
     }
 
-    /// Computes the linear-quadratic problem at the iterate. It contains the gaps until the first full step, and the
-    /// bounds afterwards. With several threads, if possible, the sweep processes knots as soon as their derivatives are
-    /// known; its outcome is returned.
+    /// Computes the linear-quadratic problem at the iterate. The problem contains the gaps until the first full step,
+    /// and the bounds afterwards. With several threads, the sweep processes knots as soon as their derivatives are
+    /// known, if possible. In that case the result of the sweep is returned.
     #[inline(never)] // `benches/instructions.py` counts this function by name
     fn calc_diff(
         &mut self,
@@ -399,7 +402,7 @@ impl SolverLoop {
 }
 
 impl Progress {
-    /// Stores the outcome of a search in the solution; the iterate now has the given cost.
+    /// Updates the progress after a line search; the iterate now has the given cost.
     fn advance(&mut self, search: &Search, settings: &Settings, cost: f64) {
         let Self { merit, was_feasible, swept_best, .. } = self;
         merit.cost = cost;

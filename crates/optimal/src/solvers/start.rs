@@ -1,5 +1,5 @@
-//! Starts of a solve that follow from the last solve: its trajectory shifted by a knot, or x̂₀ held still if that
-//! trajectory is lost.
+//! Start of a solve that follows an earlier solve. It is the last trajectory shifted by a knot, or the quasi-static
+//! start if that trajectory is lost.
 
 use super::iterate::Iterate;
 use super::settings::Settings;
@@ -9,8 +9,8 @@ use crate::lq::{LqKnot, Sweep};
 use crate::problem::Problem;
 
 /// Maximum excess of the cost of a start over the cost c of the last solution, relative to 1 + |c|. A push of the state
-/// or a new reference rarely raises the cost more. A horizon whose end diverges exceeds the limit within a few shifts
-/// (measured: 0.3, 1e3, 2e4, 3e7).
+/// or a new reference rarely raises the cost more. If the end of the horizon diverges, the excess passes this limit
+/// within a few shifts (measured: 0.3, 1e3, 2e4, 3e7).
 const LOST: f64 = 10.0;
 
 /// Returns x̂₀ at all knots, and the controls that hold x̂₀ still. Allocates.
@@ -24,9 +24,9 @@ pub(super) fn quasi_static_start(problem: &mut Problem) -> Result<[Vec<f64>; 2],
 }
 
 impl SolverLoop {
-    /// Replaces a lost start of a resumed solve by x̂₀ at all knots and the controls that hold x̂₀ still, if this costs
-    /// less. A start is lost if its cost or a gap is not finite, or if it costs far more than the last solution.
-    /// Returns the largest gap of the start. Allocates only if a start is lost.
+    /// Replaces a lost start of a resumed solve by x̂₀ at all knots and the controls that hold x̂₀ still, if the
+    /// replacement costs less. A start is lost if its cost or a gap is not finite, or if it costs far more than the
+    /// last solution. Returns the largest gap of the start. Allocates only if the start is lost.
     pub(super) fn recover(&mut self, problem: &mut Problem, settings: &Settings, gap: f64, last_cost: f64) -> f64 {
         let cost = self.iterate.solution.cost;
         let limit = if last_cost.is_finite() { LOST * (1.0 + last_cost.abs()) } else { f64::INFINITY };
@@ -80,9 +80,9 @@ impl SolverLoop {
             solution.project(problem, horizon - 1..horizon);
         }
         if !std::mem::take(&mut self.renewed) {
-            return Ok(()); // x_N = x_{N−1}
+            return Ok(()); // the last state stays repeated: x_N = x_{N−1}
         }
-        // x_N = φ(x_{N−1}, u_{N−1}), if it is a valid state
+        // the last state is x_N = φ(x_{N−1}, u_{N−1}), if this state is finite
         let new = problem.shape();
         let (x, u, last) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
         let next = &mut next[..last.len()];

@@ -1,12 +1,12 @@
-//! Reasons to stop a solve early: its time limit, and its observer.
+//! Reasons to stop a solve early: the time limit, and the return value of the observer.
 
 use super::solution::{Iteration, Status};
 use crate::time::Instant;
 use core::ops::ControlFlow;
 use std::time::Duration;
 
-/// Observer of a solve. If it ends the solve, the solution is the best iterate so far, with
-/// [`Status::Interrupted`](crate::Status::Interrupted).
+/// Observer of a solve, which is called after each iteration. If the observer ends the solve, the solution is the best
+/// iterate so far, with [`Status::Interrupted`](crate::Status::Interrupted).
 ///
 /// A closure that takes an [`Iteration`] is an observer of each iteration. If it returns a [`ControlFlow`], it may end
 /// the solve after that iteration:
@@ -19,13 +19,13 @@ use std::time::Duration;
 /// observe(|now: &Iteration| if now.cost < 1e-3 { Break(()) } else { Continue(()) });
 /// ```
 pub trait Observer {
-    /// Receives an iteration that has ended, and returns whether to continue. The return value is ignored if the solve
-    /// would end now anyway.
+    /// Receives an iteration that has ended, and returns whether to continue. The return value has no effect if the
+    /// solve ends after this iteration anyway.
     fn iteration(&mut self, now: &Iteration) -> ControlFlow<()>;
 
-    /// Returns whether to continue, while an iteration is running. It is called between the phases of an iteration
-    /// (derivatives, sweep, trials), at most every 10 ms. A program can check here for signals, or for a flag that
-    /// another thread sets.
+    /// Returns whether to continue, while an iteration is running. The solver calls this method between the phases of
+    /// an iteration (derivatives, sweep, trials), at most every 10 ms. A program can test here for signals, or for a
+    /// flag that another thread sets.
     fn go_on(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -37,7 +37,7 @@ impl<R: Verdict, F: FnMut(&Iteration) -> R> Observer for F {
     }
 }
 
-/// Return value of a closure used as an [`Observer`]: a [`ControlFlow`], or nothing, which means to continue.
+/// Return value of a closure that serves as an [`Observer`]: a [`ControlFlow`], or `()`, which means to continue.
 pub trait Verdict {
     /// Returns whether to continue.
     fn verdict(self) -> ControlFlow<()>;
@@ -58,7 +58,7 @@ impl Verdict for ControlFlow<()> {
 /// Minimum time between two calls of [`Observer::go_on`].
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// Observer of a solve, the time at which the solve began, and the time at which the observer was called last.
+/// Observer of a solve, with two times: the beginning of the solve, and the last call of the observer.
 pub(super) struct Watch<'a> {
     observer: &'a mut dyn Observer,
     pub(super) begin: Instant,
@@ -66,7 +66,7 @@ pub(super) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    /// Begins a solve now.
+    /// Creates the watch of a solve that begins now.
     pub(super) fn new(observer: &'a mut dyn Observer) -> Self {
         let begin = Instant::now();
         Self { observer, begin, asked: begin }
@@ -77,7 +77,7 @@ impl<'a> Watch<'a> {
         self.observer.iteration(now)
     }
 
-    /// Asks the observer whether to continue, if the minimum time has passed.
+    /// Calls the observer, if the minimum time since its last call has passed. Returns whether to continue.
     fn go_on(&mut self, now: Instant) -> ControlFlow<()> {
         if now.duration_since(self.asked) < PERIOD {
             return ControlFlow::Continue(());
@@ -87,7 +87,7 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Phase of an iteration.
+/// Phase of an iteration whose duration is predicted.
 #[derive(Clone, Copy)]
 pub(super) enum Phase {
     CalcDiff,
@@ -95,27 +95,27 @@ pub(super) enum Phase {
     Rollout,
 }
 
-/// Number of durations whose median predicts the next duration of a phase. Two delays among five then change nothing,
-/// and a slower machine is noticed after three durations. (The minimum would never notice a slower machine, and each
-/// solve would overrun.)
+/// Number of durations whose median predicts the next duration of a phase. Two delays among five durations do not
+/// change the median. If the machine becomes slower, the median follows after three durations. (The minimum would not
+/// follow, and each solve would exceed its time limit.)
 const RECENT: usize = 5;
 
-/// Last durations of a phase, of this solve and the previous ones.
+/// Last durations of a phase, over all solves.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Recent {
     durations: [Duration; RECENT],
-    /// Number of durations ever added.
+    /// Number of durations added since the beginning.
     count: usize,
 }
 
 impl Recent {
-    /// Stores a duration; it replaces the oldest one if five are stored.
+    /// Stores a duration, in place of the oldest one if five are stored.
     pub(super) fn add(&mut self, duration: Duration) {
         self.durations[self.count % RECENT] = duration;
         self.count += 1;
     }
 
-    /// Returns the median, or the lower of the two middle values; zero if no duration is stored.
+    /// Returns the median of the stored durations, or the lower of the two middle values; zero if none is stored.
     pub(super) fn median(&self) -> Duration {
         let mut sorted = self.durations;
         let known = &mut sorted[..self.count.min(RECENT)];
@@ -124,27 +124,27 @@ impl Recent {
     }
 }
 
-/// Time limit of a solve, and the recent durations of each phase.
+/// Clock of a solve: its time limit, and the recent durations of each phase.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Clock {
-    /// Beginning and time limit of the solve.
+    /// Beginning and time limit of the solve; `None` without a time limit.
     limit: Option<(Instant, Duration)>,
-    /// Time at the end of the budget that phases must leave unused.
+    /// Time at the end of the budget that phases must not use.
     pub(super) reserve: Duration,
-    /// Whether phases run regardless of the time, as in the first iteration of a solve.
+    /// Whether phases run regardless of the time limit, as in the first iteration of a solve.
     guaranteed: bool,
     recent: [Recent; 3],
 }
 
 impl Clock {
-    /// Starts a solve with the time limit `budget`. The first iteration runs regardless of the time, unless the budget
-    /// is zero.
+    /// Starts the clock of a solve with the time limit `budget`. The first iteration runs regardless of the time limit,
+    /// unless the limit is zero.
     pub(super) fn start(&mut self, begin: Instant, budget: Option<Duration>) {
         self.limit = budget.map(|budget| (begin, budget));
         (self.reserve, self.guaranteed) = (Duration::ZERO, budget != Some(Duration::ZERO));
     }
 
-    /// Ends the iteration that runs regardless of the time.
+    /// Applies the time limit from now on: called after the first iteration, which runs regardless of the limit.
     pub(super) fn end_guarantee(&mut self) {
         self.guaranteed = false;
     }
@@ -154,7 +154,7 @@ impl Clock {
         self.limit.is_some_and(|(begin, budget)| begin.elapsed() >= budget)
     }
 
-    /// Returns `Ok` if there is time for the phases, one after the other, and the observer wants to continue. Otherwise
+    /// Returns `Ok` if enough time remains for the phases in sequence and the observer wants to continue. Otherwise
     /// returns the reason to stop.
     pub(super) fn allows(&mut self, phases: &[Phase], watch: &mut Watch<'_>) -> Result<(), Status> {
         let now = Instant::now();

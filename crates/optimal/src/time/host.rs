@@ -1,4 +1,4 @@
-//! Clock that the host of a WebAssembly module provides, for example a browser.
+//! Clock of a WebAssembly module, which its host provides, for example a browser.
 
 use core::ops::Add;
 use std::sync::OnceLock;
@@ -6,17 +6,17 @@ use std::time::Duration;
 
 static CLOCK: OnceLock<fn() -> Duration> = OnceLock::new();
 
-/// Sets the clock of solves. Its time must never go back; in a browser it is `performance.now()`. Only the first call
-/// has an effect.
+/// Sets the clock of all solves. The time of this clock must never decrease; in a browser it is `performance.now()`.
+/// Only the first call has an effect.
 ///
-/// Before this call, time stands still: all [`Timings`](crate::Timings) are 0, a
-/// [`time_budget`](crate::Settings::time_budget) is never used up, and an [`Observer`](crate::Observer) is called only
-/// after iterations.
+/// Before the first call, the time is always zero. All [`Timings`](crate::Timings) are then 0, a
+/// [`time_budget`](crate::Settings::time_budget) never ends a solve, and an [`Observer`](crate::Observer) is called
+/// only after iterations.
 pub fn set_clock(now: fn() -> Duration) {
     let _ = CLOCK.set(now);
 }
 
-/// Time of the host's clock.
+/// Point in time of the host's clock.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct Instant(Duration);
 

@@ -1,6 +1,6 @@
-//! Actions without a robot, for tests.
+//! Actions without a robot, for all tests of this crate.
 #![allow(dead_code)] // each test file uses only some of the items
-#![allow(non_snake_case)] // A, B, T, E
+#![allow(non_snake_case)] // names follow the literature: A, B, T, E
 
 use condyle_optimal::{ActionModel, GroupModel, LqKnot, Problem};
 use nalgebra::DMatrix;
@@ -32,8 +32,8 @@ pub(crate) fn random_knot(random: &mut impl Rng, ndx: usize, nu: usize) -> LqKno
     knot
 }
 
-/// Returns a knot like [`random_knot`], but with A and B of semi-implicit Euler. q and v have nv entries each. T and E
-/// are the identity, except for random blocks over `blocks`.
+/// Returns a knot like [`random_knot`], but with the matrices A and B of a semi-implicit Euler step. q and v have nv
+/// entries each. T and E are the identity, except for random blocks at `blocks`.
 pub(crate) fn random_euler_knot(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqKnot {
     let (mut knot, dt) = (random_knot(random, 2 * nv, nu), 0.05);
     let (mut T, mut E) = (DMatrix::identity(nv, nv), DMatrix::identity(nv, nv));
@@ -51,7 +51,7 @@ pub(crate) fn random_euler_knot(random: &mut impl Rng, nv: usize, nu: usize, blo
     knot
 }
 
-/// LQ knot as an action: x⁺ = A x + B u + f with a quadratic cost.
+/// Action with the fields of an LQ knot: x⁺ = A x + B u + f with a quadratic cost.
 pub(crate) struct Linear(pub(crate) LqKnot);
 
 impl ActionModel for Linear {
@@ -81,8 +81,8 @@ impl ActionModel for Linear {
     }
 }
 
-/// Unicycle with x = (x, y, θ), u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖² + ‖u‖²). The terminal
-/// knot has no u.
+/// Unicycle with the state x = (x, y, θ) and the control u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖²
+/// + ‖u‖²). The terminal knot has no u.
 pub(crate) struct Unicycle {
     pub(crate) nu: usize,
     pub(crate) lanes: usize,
@@ -134,7 +134,7 @@ impl ActionModel for Unicycle {
     }
 }
 
-/// Action with the same bounds on its controls at every knot.
+/// Action that adds the same control bounds to another action at every knot.
 pub(crate) struct Limited<A> {
     pub(crate) action: A,
     pub(crate) lower: Vec<f64>,
@@ -168,7 +168,7 @@ impl<A: GroupModel> ActionModel for Limited<A> {
     }
 }
 
-/// Creates a problem whose knots are all the same.
+/// Creates a problem whose knots all have the same action.
 fn horizon_of<A: GroupModel>(
     x0: &[f64],
     horizon: usize,
@@ -191,7 +191,8 @@ pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_unicycle(x0, horizon, lanes, None)
 }
 
-/// Cart with a pole. θ = 0 is upright, x = (y, θ, ẏ, θ̇), u = (f). Semi-implicit Euler steps of Δt = 0.03 s:
+/// Cart-pole, with the angle θ = 0 at the upright pole, the state x = (y, θ, ẏ, θ̇) and the force u = (f) on the cart.
+/// It makes semi-implicit Euler steps of Δt = 0.03 s:
 ///
 /// ```text
 /// μ = m₁ + m₂ sin²θ
@@ -265,7 +266,7 @@ impl ActionModel for Cartpole {
             let cart = (f + POLE * c * s * GRAVITY - POLE * LENGTH * s * rate * rate) / mu;
             let pole = (c * f / LENGTH + (CART + POLE) * GRAVITY * s / LENGTH - POLE * c * s * rate * rate) / mu;
             let d_mu = 2.0 * POLE * s * c;
-            // ∂ÿ/∂θ, ∂θ̈/∂θ, ∂ÿ/∂θ̇, ∂θ̈/∂θ̇, ∂ÿ/∂f, ∂θ̈/∂f
+            // derivatives ∂ÿ/∂θ, ∂θ̈/∂θ, ∂ÿ/∂θ̇, ∂θ̈/∂θ̇, ∂ÿ/∂f, ∂θ̈/∂f, in this order
             let cart_angle = (POLE * GRAVITY * double - POLE * LENGTH * c * rate * rate - cart * d_mu) / mu;
             let pole_angle =
                 (-s * f / LENGTH + (CART + POLE) * GRAVITY * c / LENGTH - POLE * double * rate * rate - pole * d_mu)
@@ -289,15 +290,15 @@ impl ActionModel for Cartpole {
     }
 }
 
-/// Initial state of the swing-up in Crocoddyl's examples.
-#[allow(clippy::approx_constant)] // the pole hangs nearly straight down; the number is not meant to be π
+/// Initial state of the pole's swing-up in Crocoddyl's examples.
+#[allow(clippy::approx_constant)] // the pole hangs nearly straight down; 3.14 is not meant to be π
 pub(crate) const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
 
 pub(crate) fn cartpole(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_cartpole(x0, horizon, lanes, None)
 }
 
-/// Returns the action of a knot of the swing-up.
+/// Returns the action of the knots in the pole's swing-up.
 pub(crate) fn cartpole_action() -> Cartpole {
     Cartpole { nu: 1, lanes: 1, weights: [1.0, 0.1, 0.1, 0.1, 0.3] }
 }
@@ -308,7 +309,7 @@ pub(crate) fn limited_cartpole(x0: &[f64], horizon: usize, lanes: usize, bounds:
     horizon_of(x0, horizon, running, bounds, terminal)
 }
 
-/// Returns `horizon` + 1 states on the straight line from `first` to `last`, flat.
+/// Returns `horizon` + 1 states on the straight line from `first` to `last`, in one flat list.
 pub(crate) fn straight(first: &[f64], last: &[f64], horizon: usize) -> Vec<f64> {
     let at = |t: usize| {
         let s = t as f64 / horizon as f64;
@@ -317,8 +318,8 @@ pub(crate) fn straight(first: &[f64], last: &[f64], horizon: usize) -> Vec<f64> 
     (0..=horizon).flat_map(at).collect()
 }
 
-/// State on a unit circle as a manifold: x = (cos φ, sin φ), nx = 2, ndx = 1. The control u turns the state; ℓ = ½ (φ²
-/// + 0.1 u²).
+/// Action with states on a unit circle: x = (cos φ, sin φ), nx = 2, ndx = 1. The control u turns the state, and the
+/// cost is ℓ = ½ (φ² + 0.1 u²).
 pub(crate) struct Circle {
     pub(crate) nu: usize,
 }

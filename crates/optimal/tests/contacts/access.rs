@@ -1,4 +1,4 @@
-//! Access to the costs of a problem by name, and copies of problems.
+//! Access by name to the costs of a problem, and copies of problems.
 
 use super::*;
 use condyle_dynamics::Se3;
@@ -14,7 +14,7 @@ fn plain(name: &str, residual: Residual) -> Cost {
     Cost::new(name, 1.0, residual, Activation::Quadratic)
 }
 
-/// Constraint that the second joint's speed is at most 3.
+/// Constraint that limits the second joint's speed to 3.
 #[derive(Clone)]
 struct Slow;
 
@@ -30,7 +30,7 @@ impl GenericConstraint for Slow {
     }
 }
 
-/// Creates a problem of an arm with different models: two that one action represents, one with a constraint, and one
+/// Creates a problem of an arm with four models: two models that one action represents, one with a constraint, and one
 /// with accelerations as controls.
 fn mixed() -> Problem {
     let arm = Arc::new(robots::arm7());
@@ -107,7 +107,7 @@ fn a_change_is_that_of_its_knots_alone() {
     assert_eq!(changed(&all), [0, 1, 2, 3, 4, 5, 6, 7]);
     let some = |p: &mut Problem| assert!(p.change_costs("rest", |cost| cost.set_target(&[0.3; 14])).unwrap());
     assert_eq!(changed(&some), [0, 1, 2, 4, 5, 6]);
-    // a problem with a changed target equals a problem created with that target
+    // a problem whose target was changed equals a problem created with that target
     let mut problem = mixed();
     problem.cost_mut(0, "reach").unwrap().set_target(Vec3::new(0.2, 0.2, 0.5)).unwrap();
     problem.cost_mut(1, "reach").unwrap().set_target(Vec3::new(0.1, 0.2, 0.5)).unwrap();
@@ -173,7 +173,7 @@ fn what_is_no_target_is_refused_and_changes_nothing() {
     let error = cost.set_activation(Activation::Weighted(vec![1.0; 2])).unwrap_err().to_string();
     assert_eq!(error, "cost `com`: its weighting has 2 numbers, expected 3");
     assert_eq!(*cost.get(), plain("com", Residual::CenterOfMass { target: Vec3::zero() }));
-    // targets of all kinds can be set
+    // targets of all kinds can be changed
     let turned = rotation(&mut rng);
     problem.cost_mut(0, "turn").unwrap().set_target(turned).unwrap();
     problem.cost_mut(0, "pose").unwrap().set_target(Se3::new(turned, Vec3::zero())).unwrap();
@@ -270,7 +270,7 @@ fn an_action_without_a_copy_is_named() {
     assert_eq!(problem.try_clone().unwrap_err(), Error::NoCopy { model: None });
 }
 
-/// Problems of quadrupeds with impacts, and with contact forces as controls, can be copied, too.
+/// Checks that problems of quadrupeds with impacts, and with contact forces as controls, can be copied too.
 #[test]
 fn a_copy_of_a_quadrupeds_problem_has_the_same_derivatives() {
     let (model, mut rng) = (Arc::new(robots::quadruped()), StdRng::seed_from_u64(52));

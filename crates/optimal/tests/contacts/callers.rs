@@ -1,5 +1,5 @@
-//! A caller's mistake panics at the caller's line; the message has the argument, the expected number and the number
-//! found. Other tests check printed names, and sharing between threads.
+//! Panics for mistakes of a caller. A panic occurs at the caller's line, and its message has the argument, the expected
+//! number and the number found. Other tests check printed names, and sharing between threads.
 
 use super::*;
 use condyle_optimal::robot::{OwnResidual, RobotProblem};
@@ -8,7 +8,7 @@ use condyle_optimal::{AugmentedLagrangian, DdpMethod, GroupModel, Hessian, Lqr, 
 #[path = "../../../../tests/common/panics.rs"]
 mod panics;
 
-/// Returns the message of the panic of `call`, which must occur at the given line of this file.
+/// Returns the panic message of `call`. The panic must occur at the given line of this file.
 fn said(what: &str, line: u32, call: impl FnOnce()) -> String {
     let panic = panics::panic_of(call).expect(what);
     assert!(panic.file.ends_with("callers.rs") && panic.line == line, "{what}, line {line}: {panic:?}");
@@ -23,7 +23,7 @@ macro_rules! panics {
 }
 
 #[test]
-#[rustfmt::skip] // each check must stay on one line, because the line of its panic is compared
+#[rustfmt::skip] // each check must stay on one line, because its panic's line is compared
 #[allow(clippy::drop_non_drop, dropping_copy_types, clippy::unit_arg)]
 fn a_panic_is_at_the_callers_line() {
     let arm = Arc::new(robots::arm7());
@@ -90,7 +90,7 @@ fn statuses_and_methods_are_printed() {
     assert_eq!(format!("[{:>10}]", Status::Converged), "[ converged]");
     assert_eq!((DdpMethod::Fddp.to_string(), DdpMethod::Ddp.to_string()), ("FDDP".to_owned(), "DDP".to_owned()));
     assert_eq!(Integrator::RungeKutta4.to_string(), "Runge–Kutta 4");
-    // names in the program equal the names in files
+    // the printed names equal the names in files
     for status in [
         Status::Converged,
         Status::MaxIterations,
@@ -116,7 +116,7 @@ fn statuses_and_methods_are_printed() {
 
 fn shared<T: Send + Sync + 'static>() {}
 
-/// This test compiles only if problems and solvers are `Send` and `Sync`.
+/// Checks that problems and solvers are `Send` and `Sync`: the test does not compile otherwise.
 #[test]
 fn problems_and_solvers_are_shared_by_threads() {
     shared::<Problem>();

@@ -1,4 +1,4 @@
-//! Problems in files.
+//! Problems that are written to files and read again.
 
 use super::{DT, contact_costs, feet, random, random_state, rotation};
 use condyle_dynamics::{ConstraintKind, ReferenceFrame, Vec3, robots};
@@ -9,7 +9,7 @@ use condyle_optimal::robot::{
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
-/// Creates a problem with every kind of knot, residual and activation, as data.
+/// Creates a problem as data, with every kind of knot, residual and activation.
 fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let model = robots::humanoid();
     let nv = model.nv();

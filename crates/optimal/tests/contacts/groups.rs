@@ -1,4 +1,4 @@
-//! Knots that are computed at once, in the lanes of a vector, have the same bits as single knots.
+//! Knots that are computed together in SIMD lanes, whose results have the same bits as the results of single knots.
 
 use super::{DT, contact_costs, feet, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Vec3, robots};
@@ -9,12 +9,12 @@ use condyle_optimal::{GroupModel, LqKnot};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// A group of knots, computed in the lanes of a vector register, has the same bits as single calls. This also holds for
-/// the last knots, which do not fill a register.
+/// Checks that a group of knots, computed in SIMD lanes, has the same bits as single calls. This includes the last
+/// knots, which do not fill a register.
 #[test]
 fn knots_side_by_side_are_single_knots() {
     let mut rng = StdRng::seed_from_u64(18);
-    let model = Arc::new(robots::quadruped().with_limbs(false)); // with parallel branches, sums have another order
+    let model = Arc::new(robots::quadruped().with_limbs(false)); // parallel branches change the order of sums
     let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
     let costs = contact_costs(&model, &contacts, 12, &mut rng);
     let free = costs.iter().filter(|cost| !["force", "cone"].contains(&cost.name.as_str())).cloned().collect();
@@ -32,8 +32,8 @@ fn knots_side_by_side_are_single_knots() {
     check_group(FreeInverseDynamics::running(model.clone(), DT, given).unwrap(), &model, &mut rng);
 }
 
-/// A group has the same bits as single calls even if its knots differ in targets, in weights, and in their sets of
-/// costs.
+/// Checks that a group has the same bits as single calls if its knots differ in targets, in weights, and in their sets
+/// of costs.
 #[test]
 fn knots_with_costs_of_their_own_are_single_knots() {
     let mut rng = StdRng::seed_from_u64(19);

@@ -1,4 +1,4 @@
-//! Knots in implicit form give the same gains and steps as knots in explicit form.
+//! Knots in inverse-dynamics form, which give the same gains and steps as knots given by A and B.
 
 use super::{DT, contact_costs, largest_difference, random, random_state};
 use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, robots};
@@ -10,14 +10,14 @@ use condyle_optimal::{ActionModel, Fddp, Problem};
 use rand::{SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance of gains, for eleven consecutive knots at random states with very badly conditioned contacts; most cases
-/// agree to 1e-10.
+/// Tolerance of gains, for eleven consecutive knots at random states with very badly conditioned contacts. In most
+/// cases the gains agree to 1e-10.
 const GAINS: f64 = 1e-6;
 
-/// Number of knots: more than the eight lanes of a vector, so a second group does not fill its vector.
+/// Number of knots. It exceeds the eight lanes of a SIMD register, so the second group does not fill its register.
 const KNOTS: usize = 11;
 
-/// Compares the first sweep with the implicit form and without it, from random states with gaps.
+/// Compares the first sweep with and without inverse-dynamics form, from random states with gaps.
 pub(super) fn compare(
     what: &str,
     model: &Arc<Model>,
@@ -59,15 +59,15 @@ pub(super) fn compare(
         }
     }
     println!("{what}: gains differ by at most {worst:.1e}");
-    // on a processor with vectors, the implicit form gives other bits; equal bits would mean that the explicit form was
-    // used twice
+    // on a processor with SIMD, inverse-dynamics form gives different bits; equal bits would mean that both sweeps used
+    // A and B
     assert!(
         exact < 2 * KNOTS || condyle_dynamics::level::level() == condyle_dynamics::level::Level::Baseline,
         "{what}"
     );
 }
 
-/// Returns costs of contacts and a cost of the controls; the latter makes Quu positive definite.
+/// Returns costs of contacts and a cost of the controls. The cost of the controls makes Quu positive definite.
 fn costs(model: &Model, contacts: &[Contact], rng: &mut StdRng) -> Vec<Cost> {
     let nu = Actuation::joints(model).nu();
     let (first, last) = (contacts[0].clone(), contacts[contacts.len() - 1].clone());
@@ -93,12 +93,12 @@ fn implicit_knots_have_the_gains_of_explicit_ones() {
     let stances = [
         (&quadruped, contacts(&quadruped, ContactConstraint::point, &feet)),
         (&quadruped, contacts(&quadruped, ContactConstraint::point, &feet[..3])),
-        // two points: there is no moment about the line through both
+        // two points: no moment is possible about the line through both points
         (&quadruped, contacts(&quadruped, ContactConstraint::point, &[feet[0], feet[3]])),
         (&quadruped, contacts(&quadruped, ContactConstraint::point, &feet[1..2])),
         (&humanoid, contacts(&humanoid, ContactConstraint::rigid, &["left_foot", "right_foot"])),
         (&humanoid, contacts(&humanoid, ContactConstraint::rigid, &["right_foot"])),
-        // legs have six joints, contacts only three rows
+        // legs have six joints, but contacts only three rows
         (&humanoid, contacts(&humanoid, ContactConstraint::point, &["left_foot", "right_foot"])),
     ];
     for (model, contacts) in stances {
@@ -113,7 +113,8 @@ fn implicit_knots_have_the_gains_of_explicit_ones() {
     }
 }
 
-/// With straight legs, joint accelerations cannot be eliminated; accelerations of bodies are eliminated instead.
+/// Checks knots with straight legs, whose joint accelerations cannot be eliminated. Accelerations of bodies are
+/// eliminated instead.
 #[test]
 fn implicit_knots_stand_on_straight_legs() {
     let mut rng = StdRng::seed_from_u64(4);

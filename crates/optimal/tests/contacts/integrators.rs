@@ -1,4 +1,4 @@
-//! Integrators and polynomial controls: exact derivatives, and orders of convergence.
+//! Integrators and control polynomials: exact derivatives, and orders of convergence.
 
 use super::{DT, ROUNDING, check_derivatives, largest_difference, random, random_state};
 use condyle_dynamics::{Vec3, robots};
@@ -46,7 +46,8 @@ fn derivatives_of_integrators_are_those_of_the_action() {
     }
 }
 
-/// A polynomial with equal controls at all nodes gives the same step, cost and derivatives as constant controls.
+/// Checks that a polynomial with equal controls at all nodes gives the same step, cost and derivatives as constant
+/// controls.
 #[test]
 fn equal_controls_of_a_polynomial_are_constant() {
     let mut rng = StdRng::seed_from_u64(23);
@@ -85,7 +86,8 @@ fn equal_controls_of_a_polynomial_are_constant() {
     }
 }
 
-/// One step of Δt is compared with many small steps: halving Δt divides the error by 2^(order + 1).
+/// Checks orders of convergence by comparing one step of Δt with many small steps. Halving Δt divides the error by
+/// 2^(order + 1).
 #[test]
 fn runge_kutta_methods_have_their_order() {
     let mut rng = StdRng::seed_from_u64(15);

@@ -1,4 +1,4 @@
-//! Inverse dynamics in contact: exact derivatives, the same motions and optima as forward dynamics, and errors.
+//! Inverse dynamics in contact: exact derivatives, the same motions and optima as with forward dynamics, and errors.
 
 use super::limits::check_gradient;
 use super::{DT, check_derivatives, contact_costs, feet, largest_difference, random, random_state, rotation};
@@ -16,16 +16,16 @@ use rand::{SeedableRng, rngs::StdRng};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Tolerance of a solve with M followed by a product with M. The condition number of M is up to 1e4.
+/// Tolerance after a solution with M and a product with M. The condition number of M is up to 1e4.
 const BACK: f64 = 1e-9;
-/// Tolerance for two sums of the same products (a few dozen) in different order.
+/// Tolerance for two sums of the same products (a few dozen) that are added in different orders.
 const ROUNDING: f64 = 1e-12;
-/// Maximum violation of the equations in a solution (N, m/s²). `FORCES` is the resulting error of forces of a few
-/// hundred newtons.
+/// Maximum violation of the equations in a solution (N, m/s²). The next constant is the resulting error of forces of a
+/// few hundred newtons.
 const HELD: f64 = 1e-6;
 const FORCES: f64 = 1e-2;
 
-/// Returns a contact of each kind, with gains: line, plane, point and whole frame.
+/// Returns four contacts with gains, one of each kind: line, plane, point and whole frame.
 fn all_kinds(model: &Model, reference: ReferenceFrame, rng: &mut StdRng) -> Vec<Contact> {
     let kinds: [fn(usize) -> ContactConstraint; 4] =
         [ContactConstraint::line, ContactConstraint::plane, ContactConstraint::point, ContactConstraint::rigid];
@@ -38,7 +38,7 @@ fn all_kinds(model: &Model, reference: ReferenceFrame, rng: &mut StdRng) -> Vec<
     frames.into_iter().zip(kinds).map(contact).collect()
 }
 
-/// Returns the equations of a knot as weighted costs, so that comparisons of derivatives include the equations.
+/// Returns the equations of a knot as weighted costs. Comparisons of derivatives then include the equations.
 fn equations(contacts: &[Contact], driven: bool) -> Vec<Cost> {
     let undriven = driven.then(|| Cost::new("undriven", 1e-3, Residual::UndrivenEffort, Activation::Quadratic));
     let holds = contacts.iter().map(|contact| {
@@ -75,7 +75,8 @@ fn derivatives_are_those_of_the_action() {
     }
 }
 
-/// A fully driven arm has no undriven efforts. Without contacts, a knot equals a knot of `FreeInverseDynamics`.
+/// Checks an arm with a motor at every joint, which has no undriven efforts. Without contacts, a knot equals a knot of
+/// `FreeInverseDynamics`.
 #[test]
 fn derivatives_of_an_arm_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(42);
@@ -120,9 +121,10 @@ fn outputs_of_all(problem: &mut Problem, xs: &[f64], us: &[f64]) -> Vec<BTreeMap
     (0..horizon).map(of).collect()
 }
 
-/// Inverse dynamics receives the accelerations and forces that forward dynamics computes from some controls. The next
-/// state and the costs are then the same, the efforts equal the controls, and the equations hold. This is tested for an
-/// actuation with one control for each joint, and for an actuation that mixes all coordinates.
+/// Compares inverse dynamics with forward dynamics. Inverse dynamics receives the accelerations and forces that forward
+/// dynamics computes from some controls. The next state and the costs must be the same, the efforts must equal the
+/// controls, and the equations must hold. One actuation has one control for each joint; another actuation mixes all
+/// coordinates.
 #[test]
 fn it_is_forward_dynamics_backwards() {
     let mut rng = StdRng::seed_from_u64(43);
@@ -154,7 +156,7 @@ fn it_is_forward_dynamics_backwards() {
             let cost = [forward.calc(0, &x, &u, &mut next), inverse.calc(0, &x, &controls, &mut back)];
             assert!((cost[0] - cost[1]).abs() < BACK * (1.0 + cost[0].abs()), "{cost:?}");
             assert!(largest_difference(&back, &next) < ROUNDING);
-            // a violated equation adds to the cost
+            // a violated equation increases the cost
             controls[2] += 1.0; // lifts the trunk
             assert!(inverse.calc(0, &x, &controls, &mut back) > cost[0] + 1.0);
         }
@@ -169,8 +171,8 @@ pub(super) fn standing(model: &Model) -> Vec<f64> {
     x
 }
 
-/// Quasi-static contact forces hold the robot still: the undriven efforts of the base are 0, and the joint efforts
-/// equal the efforts of forward dynamics.
+/// Checks that quasi-static contact forces hold the robot still. The undriven efforts of the base are 0, and the joint
+/// efforts equal the efforts of forward dynamics.
 #[test]
 fn forces_hold_the_robot_still() {
     let model = Arc::new(robots::quadruped());
@@ -206,8 +208,9 @@ fn knots_in_lanes_are_single_knots() {
     assert!(largest_difference(&costs, &single) < ROUNDING && largest_difference(&next, &alone) < ROUNDING);
 }
 
-/// A quadruped moves its trunk over its feet, with costs of efforts, forces, accelerations and a friction cone. The
-/// problem is solved with forward dynamics by FDDP, and with inverse dynamics by the augmented Lagrangian.
+/// Compares optima of a quadruped that moves its trunk over its feet. The costs include efforts, forces, accelerations
+/// and a friction cone. FDDP solves the problem with forward dynamics, and the augmented Lagrangian with inverse
+/// dynamics.
 #[test]
 fn forward_and_inverse_dynamics_have_one_optimum() {
     let model = Arc::new(robots::quadruped());
@@ -283,8 +286,8 @@ fn forward_and_inverse_dynamics_have_one_optimum() {
     }
 }
 
-/// Redundant contacts are valid with inverse dynamics: the contacts share the forces such that the efforts are
-/// smallest.
+/// Checks that inverse dynamics supports redundant contacts. The contacts share the forces in such proportions that the
+/// efforts are smallest.
 #[test]
 fn contacts_may_be_redundant() {
     let model = Arc::new(robots::humanoid());
@@ -296,7 +299,7 @@ fn contacts_may_be_redundant() {
     let x = [neutral(&model), vec![0.0; model.nv()]].concat();
     let u = knot.quasi_static(&x);
     let (sole, point) = u[model.nv()..].split_at(6);
-    assert!(largest_difference(&sole[..3], point) < 1e-8 && point[2] > 1.0); // each contact bears half of the force
+    assert!(largest_difference(&sole[..3], point) < 1e-8 && point[2] > 1.0); // each contact carries half of the force
 }
 
 #[test]

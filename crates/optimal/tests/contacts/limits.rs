@@ -1,4 +1,4 @@
-//! Limits: the values of the terms that limits add to the cost of a knot, and exact derivatives of these terms.
+//! Limits of a knot: the values of the terms that limits add to the cost, and the exact derivatives of these terms.
 
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
@@ -12,14 +12,14 @@ use std::sync::Arc;
 
 /// Default penalty 1/μ, used until a constrained solver sets another penalty.
 const PENALTY: f64 = 10.0;
-/// Step of central differences. The error is about the square of the step, plus the rounding error of the cost divided
-/// by the step.
+/// Step of central differences. Their error is about the square of the step, plus the rounding error of the cost
+/// divided by the step.
 const STEP: f64 = 1e-5;
 /// Tolerance of a sum of a few dozen squares.
 const ROUNDING: f64 = 1e-12;
 
-/// Returns the number of entries of a residual of `contact_costs`; `rows` is the number of rows of the residual's
-/// contact.
+/// Returns the number of entries of a residual of `contact_costs`. The argument `rows` is the number of rows of the
+/// residual's contact.
 fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     match residual {
         Residual::State { .. } => 2 * model.nv(),
@@ -34,7 +34,7 @@ fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     }
 }
 
-/// Returns a limit for each kind of residual. Some entries of a limit must be zero, some have bounds, and some are
+/// Returns a limit for each kind of residual. In each limit, some entries must be zero, some have bounds, and some are
 /// free.
 fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
     let contacts = feet(model, ReferenceFrame::LocalWorldAligned);
@@ -85,8 +85,8 @@ pub(super) fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &
     }
 }
 
-/// Checks the derivatives of an action with each single limit that the action accepts, and with all these limits
-/// together. Returns the number of accepted limits.
+/// Checks the derivatives of an action with each limit that the action accepts, and with all these limits together.
+/// Returns the number of accepted limits.
 fn check<A: ActionModel>(
     what: &str,
     model: &Model,
@@ -150,8 +150,8 @@ fn derivatives_of_limits_of_other_steps_are_those_of_the_terms() {
     assert_eq!(check("inverse dynamics", &model, &all, inverse, 1.0, &mut rng), all.len() - 3);
 }
 
-/// The term of a limit on controls has a closed form; the term is not multiplied by Δt or by the weight of an
-/// integrator's stage.
+/// Compares the limit term of the controls with its closed form. The term is not multiplied by Δt or by the weight of
+/// an integrator's stage.
 #[test]
 fn a_limit_costs_what_it_should() {
     let mut rng = StdRng::seed_from_u64(33);
@@ -181,7 +181,7 @@ fn a_limit_costs_what_it_should() {
     }
 }
 
-/// Knots in the lanes of a vector give the same results as single knots.
+/// Checks that knots in SIMD lanes give the same results as single knots.
 #[test]
 fn limits_in_lanes_are_those_of_single_knots() {
     let mut rng = StdRng::seed_from_u64(34);

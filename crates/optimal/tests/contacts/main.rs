@@ -1,5 +1,5 @@
-//! Robots in contact, at impacts, and with other actuations: exact derivatives, and errors.
-#![allow(non_snake_case)] // names of matrices follow the literature
+//! Robots in contact, at impacts, and with various actuations: exact derivatives, and errors.
+#![allow(non_snake_case)] // names follow the literature
 
 mod access;
 mod callers;
@@ -25,18 +25,18 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Tolerance of central differences. For a function with values and derivatives of order one, central differences are
-/// accurate to about 1e-9. Contact forces are a few hundred times larger than the arguments.
+/// Tolerance of central differences, which are accurate to about 1e-9 for a function with values and derivatives of
+/// order one. Contact forces are a few hundred times larger than the arguments.
 const DIFFERENCES: f64 = 1e-6;
-/// Tolerance of optima: both solves stop where the expected decrease of the cost is below 1e-9.
+/// Tolerance of optima. The compared solves stop where the expected decrease of the cost is below 1e-9.
 const OPTIMUM: f64 = 1e-7;
-/// Tolerance for two sums of the same products (a few dozen) in different order.
+/// Tolerance for two sums of the same products (a few dozen) that are added in different orders.
 const ROUNDING: f64 = 1e-13;
-/// Tolerance for results of a factorisation whose sums were added in different order.
+/// Tolerance for two results of a factorisation whose sums were added in different orders.
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
-/// Returns n random numbers from 0 to 1, for weights.
+/// Returns n random weights from 0 to 1.
 fn magnitudes(n: usize, rng: &mut StdRng) -> Vec<f64> {
     random(n, 1.0, rng).iter().map(|x| x.abs()).collect()
 }
@@ -45,7 +45,7 @@ fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
     (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
 }
 
-/// Returns a random state around neutral; no joint is near a singularity of its group.
+/// Returns a random state near the neutral state, where no joint is near a singularity.
 fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
@@ -85,7 +85,8 @@ fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &
     }
 }
 
-/// Returns contacts at two feet of the quadruped as points, or at both feet of the humanoid as whole frames.
+/// Returns contacts at the robot's feet: points at two feet of the quadruped, or whole frames at both feet of the
+/// humanoid.
 fn feet(model: &Model, reference: ReferenceFrame) -> Vec<Contact> {
     let make: fn(usize) -> ContactConstraint = match model.name() {
         "quadruped" => ContactConstraint::point,
@@ -186,7 +187,7 @@ fn derivatives_in_contact_are_those_of_the_action() {
     }
 }
 
-/// Tests contacts of the kinds line and plane, also two line contacts on the same body.
+/// Checks line and plane contacts, including two line contacts on the same body.
 #[test]
 fn derivatives_in_contact_along_axes_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(29);
@@ -206,7 +207,7 @@ fn derivatives_in_contact_along_axes_are_those_of_the_action() {
             let mut costs = contact_costs(&model, &contacts, 12, &mut rng);
             let at_frame =
                 |cost: &Cost| !matches!(cost.residual, Residual::FrameRotation { .. } | Residual::FrameVelocity { .. });
-            costs.retain(at_frame); // the frame of contacts[0] has another name than the contact
+            costs.retain(at_frame); // the frame and the contact have different names
             let what = format!("{:?} {reference:?}", contacts[1].constraint.kind);
             let action = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
             check_derivatives(&what, action, &model, 5.0, &mut rng);
@@ -266,7 +267,7 @@ fn derivatives_of_inverse_dynamics_are_those_of_the_action() {
     }
 }
 
-/// Reaching a point with torques as controls and with accelerations as controls has the same optimum.
+/// Checks that an arm which reaches for a point has the same optimum with torques and with accelerations as controls.
 #[test]
 fn inverse_and_forward_dynamics_have_one_optimum() {
     let arm = Arc::new(robots::arm7());
@@ -417,8 +418,8 @@ fn what_does_not_fit_is_refused_by_name() {
     assert!(matches!(end, Error::Cost { .. }));
 }
 
-/// Contact points on a line of the same body constrain only five of six directions. With damping, these contacts share
-/// the forces, and a solve converges.
+/// Checks contact points on a line of the same body, which constrain only five of six directions. With damping, these
+/// contacts share the forces, and a solve converges.
 #[test]
 fn a_line_of_contacts_on_one_body_needs_damping() {
     let arm = robots::arm7();
@@ -447,8 +448,8 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     assert!(solution.xs.iter().all(|x| x.is_finite()));
 }
 
-/// Knots in contact and impacts report the structure of A and B correctly: a sweep that ignores the structure gives the
-/// same result.
+/// Checks the structure of A and B that knots in contact and impacts report. A sweep that ignores the structure gives
+/// the same result.
 #[test]
 fn derivatives_have_the_form_of_euler_steps() {
     let mut rng = StdRng::seed_from_u64(9);

@@ -1,4 +1,5 @@
-//! Accelerations, efforts and contact forces of a solution satisfy the equations of motion, in the documented frames.
+//! Accelerations, efforts and contact forces of a solution, which must satisfy the equations of motion in the
+//! documented frames.
 
 use super::*;
 use condyle_dynamics::{
@@ -13,7 +14,7 @@ use nalgebra::DVector;
 /// Tolerance of the equation of motion after a factorisation, with forces of a few hundred newtons.
 const BALANCE: f64 = 1e-8;
 
-/// Constraint without rows.
+/// Path constraint without rows.
 struct Nothing;
 
 impl PathConstraint for Nothing {
@@ -26,14 +27,14 @@ impl PathConstraint for Nothing {
     fn calc(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut [f64]) {}
 }
 
-/// Creates a problem with one knot and a terminal knot.
+/// Creates a problem with one knot and a terminal action.
 fn single(knot: Box<dyn ActionModel>, model: &Arc<Model>, x: &[f64]) -> Problem {
     let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
     Problem::new(x.to_vec(), vec![knot], vec![0], Box::new(end)).unwrap()
 }
 
-/// Computes Σ Jᵀ f from the forces along the world's axes at the origins of the frames. Checks that the local forces
-/// are the same vectors.
+/// Computes Σ Jᵀ f from the contact forces along the world's axes at the origins of the frames. Also checks that the
+/// local forces are the same vectors.
 fn generalised(model: &Model, q: &[f64], motion: &KnotMotion) -> DVector<f64> {
     let (mut data, mut sum) = (Data::new(model), DVector::zeros(model.nv()));
     for contact in &motion.contacts {
@@ -99,7 +100,7 @@ fn motion_of_an_arm_is_that_of_its_dynamics() {
         assert_eq!(motion.effort, u);
         assert!(motion.contacts.is_empty() && !motion.is_impact() && motion.contact("none").is_none());
     }
-    // the same motion results with accelerations as controls
+    // with accelerations as controls, the motion is the same
     let knot = FreeInverseDynamics::running(arm.clone(), DT, vec![]).unwrap();
     let motion = single(Box::new(knot), &arm, &x).motion_at(0, &x, &a).unwrap();
     assert_eq!(motion.acceleration, a);
@@ -115,7 +116,7 @@ fn no_robot() -> Problem {
     Problem::new(vec![0.0; 3], vec![Box::new(unicycle)], vec![0; 2], end).unwrap()
 }
 
-/// Mass with one coordinate: q̈ = u.
+/// User-defined dynamics of a mass with one coordinate: q̈ = u.
 struct Mass {
     zero: DMatrix<f64>,
 }
@@ -170,11 +171,11 @@ fn forces_of_contacts_balance_the_robot() {
         let names: Vec<_> = motion.contacts.iter().map(|contact| &*contact.name).collect();
         assert_eq!(names, contacts.iter().map(|contact| &*contact.name).collect::<Vec<_>>());
         assert_eq!(motion.contact("contact 1").unwrap().frame, contacts[1].constraint.frame);
-        // M q̈ + h = τ + Σ Jᵀ f
+        // equation of motion: M q̈ + h = τ + Σ Jᵀ f
         let needed = DVector::from_row_slice(rnea(&model, &mut data, q, v, &motion.acceleration, &[]));
         let found = DVector::from_row_slice(&tau) + generalised(&model, q, &motion);
         assert!(largest_difference(found.as_slice(), needed.as_slice()) < BALANCE);
-        // the efforts and forces are the same with accelerations and forces as controls
+        // with accelerations and forces as controls, the efforts and forces are the same
         let knot = ContactInverseDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
         let mut inverse = single(Box::new(knot), &model, &x);
         let again = inverse.motion_at(0, &x, &[a, lambda].concat()).unwrap();
@@ -200,7 +201,7 @@ fn impulses_change_velocities() {
         let motion = single(Box::new(impact.clone()), &model, &x).motion_at(0, &x, &[]).unwrap();
         assert!(motion.is_impact() && motion.acceleration.is_empty() && motion.effort.is_empty());
         assert!(largest_difference(&motion.velocity_change, &change) < SAME);
-        // M (v⁺ − v) = Σ Jᵀ Λ
+        // equation of the impact: M (v⁺ − v) = Σ Jᵀ Λ
         let M = DMatrix::from_column_slice(v.len(), v.len(), crba(&model, &mut data, q).as_slice());
         let needed = M.symmetric_part() * DVector::from_row_slice(&motion.velocity_change);
         let found = generalised(&model, q, &motion);
@@ -212,7 +213,7 @@ fn impulses_change_velocities() {
     }
 }
 
-/// In a solution of a trot, each knot has contacts at the standing feet, and the forces of these contacts carry the
+/// Checks the motions in a solution of a trot. Each knot has contacts at the standing feet, whose forces carry the
 /// robot.
 #[test]
 fn a_solution_of_a_trot_has_forces_at_the_feet_that_stand() {

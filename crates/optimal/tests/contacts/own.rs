@@ -1,4 +1,5 @@
-//! User-defined residuals, written for any scalar, have exact Jacobians and can be costs, limits and path constraints.
+//! User-defined residuals that are generic over the scalar type. They have exact Jacobians and can be costs, limits and
+//! path constraints.
 
 use super::*;
 use condyle_optimal::robot::{
@@ -7,7 +8,7 @@ use condyle_optimal::robot::{
 use condyle_optimal::{AugmentedLagrangian, Constrained, GroupModel, PathConstraint};
 use condyle_spatial::Scalar;
 
-/// Tolerance for the same formulas, evaluated in different order.
+/// Tolerance for the same formulas, evaluated in different orders.
 const EXACT: f64 = 1e-11;
 
 /// Residual p − p_ref of the position of a frame.
@@ -30,7 +31,7 @@ impl GenericResidual for Place {
     }
 }
 
-/// Velocity of a frame along the axes of the frame.
+/// Residual: the velocity of a frame along the axes of the frame.
 struct Speed(usize);
 
 impl GenericResidual for Speed {
@@ -59,7 +60,7 @@ impl GenericResidual for Drive {
     }
 }
 
-/// Residual with one entry that depends on all arguments and on the knot's index t: (1 + t) z Σ v + z Σ u.
+/// Residual with one entry, (1 + t) z Σ v + z Σ u, which depends on all arguments and on the knot's index t.
 struct Mixed(usize);
 
 impl GenericResidual for Mixed {
@@ -160,7 +161,8 @@ fn derivatives_of_an_own_residual_are_those_of_the_action() {
     }
 }
 
-/// Creates the problem of an arm that reaches for a point. The point is a limit of the terminal knot or a cost.
+/// Creates the problem of an arm that reaches for a point. If `limit`, the point is a limit of the terminal knot;
+/// otherwise it is a cost.
 fn reach(residual: Residual, limit: bool) -> Problem {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Writes crocoddyl.json next to this file: the iterations of each solver on small problems.
+"""Writes crocoddyl.json next to this file: the iterations of Crocoddyl's solvers on small problems.
 
 pip install crocoddyl==3.2.1 pin==4.0.0 && python make_crocoddyl.py
 
@@ -11,7 +11,7 @@ import crocoddyl
 
 
 class Cartpole(crocoddyl.DifferentialActionModelAbstract):
-    """Cart-pole: x = (y, theta, y', theta'), theta = 0 upright; cost 1/2 |w (theta, y, y', theta', f)|^2."""
+    """Cart-pole with x = (y, theta, y', theta'), upright at theta = 0; cost 1/2 |w (theta, y, y', theta', f)|^2."""
 
     m1, m2, l, g = 1.0, 0.1, 0.5, 9.81
 

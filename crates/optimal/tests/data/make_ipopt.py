@@ -32,7 +32,7 @@ def cartpole(x, u, dt=0.03):
 def solve(step, nu, x0, horizon, cost, end, constraints, end_constraints, guess):
     """Solves a problem by multiple shooting.
 
-    constraints(x, u) and end_constraints(x) return lists of (lower, g, upper)."""
+    The functions constraints(x, u) and end_constraints(x) return lists of tuples (lower, g, upper)."""
     opti = casadi.Opti()
     xs, us = opti.variable(len(x0), horizon + 1), opti.variable(nu, horizon)
     total = end(xs[:, horizon])
@@ -86,7 +86,7 @@ def rotation(axis, angle):
 
 
 class Arm:
-    """Chain of revolute joints from a URDF, by Newton–Euler with classical accelerations in the world's axes."""
+    """Chain of revolute joints from a URDF; Newton–Euler equations with classical accelerations in the world's axes."""
 
     def __init__(self, path, tip):
         root = xml.etree.ElementTree.parse(path).getroot()
@@ -185,14 +185,14 @@ def main():
     disc = [-0.55, -0.6, 0.2]
 
     def around(side):
-        """Returns a path that passes the disc on one side."""
+        """Returns a warm start of states that passes the disc on one side."""
         way = line(start, [0.0, 0.0, 0.0], n)
         return [[x - side * 4 * x * (1 + x) * 0.4, y + side * 4 * y * (1 + y) * 0.4, a] for x, y, a in way]
 
     ways = [park_on(start, n, disc, guess) for guess in (line(start, [0.0, 0.0, 0.0], n), around(1), around(-1))]
     park = min(ways, key=lambda found: found["cost"])
 
-    # a leaning pole is caught on a short track: cart and force are bounded, the pole ends upright and at rest
+    # a leaning pole on a cart ends upright and at rest; the position of the cart and the force are bounded
     start, n = [0.0, 0.3, 0.0, 0.0], 60
     w, h = [0.01, 1.0, 0.01, 0.01, 0.09], 0.03
     catch = solve(

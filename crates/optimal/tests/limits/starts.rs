@@ -1,5 +1,5 @@
-//! Warm starts outside the bounds, or far from any solution: the result is within the bounds, or the status reports a
-//! failure.
+//! Warm starts outside the bounds, or far from any solution. The result must be within the bounds, or the status must
+//! report a failure.
 
 use super::{ARM, quadratic};
 use condyle_dynamics::{ContactConstraint as Held, Model, ReferenceFrame, Vec3, neutral, robots};
@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// Maximum effort of each joint (N m). To hold the initial posture, the second joint needs 29.6 N m.
 const WEAK: f64 = 20.0;
 const HORIZON: usize = 15;
-/// Cost of the optimum, computed with IPOPT; `DIGITS` is the accuracy of this cost.
+/// Cost of the optimum, computed with IPOPT; the next constant is the accuracy of this cost.
 const IPOPT: f64 = 0.7869;
 const DIGITS: f64 = 2e-4;
 
@@ -19,8 +19,8 @@ fn control() -> Residual {
     Residual::Control { reference: vec![0.0; 7] }
 }
 
-/// Creates the problem of an arm with the terminal action `end`. Efforts are bounded by limits if `limits` is set,
-/// otherwise by control bounds. Also returns the efforts that hold the arm still.
+/// Creates the problem of an arm with the terminal action `end`. Efforts are bounded by limits if `limits` is set, else
+/// by control bounds. Also returns the efforts that hold the arm still.
 fn arm(limits: bool, end: FreeDynamics) -> (Problem, Vec<f64>) {
     let costs =
         vec![quadratic("rest", 0.1, Residual::State { reference: ARM.to_vec() }), quadratic("effort", 1e-3, control())];
@@ -38,7 +38,7 @@ fn point() -> Residual {
     Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.35, 0.2, 0.6) }
 }
 
-/// Returns a terminal action that requires the tool at a point and the arm at rest, exactly.
+/// Returns a terminal action with two exact constraints: the tool is at a point, and the arm is at rest.
 fn exact() -> FreeDynamics {
     let infinite = f64::INFINITY;
     let [lower, upper] = [-infinite, infinite].map(|q| [vec![q; 7], vec![0.0; 7]].concat());
@@ -69,7 +69,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     for (limits, start) in [(false, still.clone()), (false, clipped(&still, WEAK)), (true, still.clone())] {
         let (mut problem, _) = arm(limits, exact());
         let mut solver = AugmentedLagrangian::new(&problem);
-        solver.inner.project_warm_start = false; // the start is projected nevertheless
+        solver.inner.project_warm_start = false; // the augmented Lagrangian projects the start with either value
         let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &start).unwrap();
         assert!(solution.status == Status::Converged && most(&solution.us) <= WEAK + 1e-6);
         let cost = solver.outcome().cost;
@@ -82,11 +82,11 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert!(solution.status == Status::MaxIterations || solution.status == Status::Converged);
     assert!(most(&solution.us) <= WEAK);
-    // as in Crocoddyl, the start is kept, no step from this start is accepted, and the status reports this
+    // as in Crocoddyl, the start is not moved, no step from this start is accepted, and the status reports this
     solver.settings.project_warm_start = false;
     let kept = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert!(kept.status != Status::Converged && kept.us == still);
-    // from then on the setting also applies to resumed and shifted trajectories
+    // the setting then also applies to resumed and shifted trajectories
     solver.settings.project_warm_start = true;
     solver.settings.max_iterations = 0;
     assert!(most(&solver.resume(&mut problem).unwrap().us) <= WEAK);
@@ -98,7 +98,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     assert!(most(solver.solution().u(HORIZON - 1)) <= WEAK && most(solver.solution().u(0)) > WEAK);
 }
 
-/// If bounds become narrower between two solves, they also apply to the resumed trajectory.
+/// Checks that bounds which become narrower between two solves also apply to the resumed trajectory.
 #[test]
 fn bounds_may_change_between_solves() {
     let (mut problem, still) = arm(false, exact());
@@ -110,7 +110,7 @@ fn bounds_may_change_between_solves() {
     assert!(solution.status == Status::Converged && most(&solution.us) <= 19.0);
 }
 
-/// Asserts two properties of any solution. A solution that violates a bound or a constraint is not converged, and a
+/// Asserts two properties of any solution: a solution that violates a bound or a constraint is not converged, and a
 /// feasible problem is never reported as infeasible.
 fn assert_honest(solution: &Solution, primal: f64, bound: f64, case: &str) {
     assert_ne!(solution.status, Status::Infeasible, "{case}");
@@ -120,8 +120,8 @@ fn assert_honest(solution: &Solution, primal: f64, bound: f64, case: &str) {
     }
 }
 
-/// Starts have controls of ±1 to ±200. Their states are all the initial state, or the rollout of the controls. Many
-/// starts exceed all bounds or diverge.
+/// Checks starts with controls of ±1 to ±200. Their states all equal the initial state, or are the rollout of the
+/// controls. Many of these starts exceed all bounds or diverge.
 #[test]
 fn any_start_leads_somewhere() {
     let (mut solved, mut count) = (0, 0);
@@ -146,7 +146,7 @@ fn any_start_leads_somewhere() {
     assert!(count >= 16 && 4 * solved >= 3 * count, "{solved} of {count}");
 }
 
-/// A quadruped that stands on four feet shifts its trunk forwards with bounded efforts, from many different starts.
+/// Checks many starts of a quadruped that stands on four feet and moves its trunk forwards with bounded efforts.
 #[test]
 fn a_stance_starts_anywhere() {
     let model: Arc<Model> = Arc::new(robots::quadruped());
@@ -187,7 +187,8 @@ fn a_stance_starts_anywhere() {
     assert!(costs.iter().all(|cost| (cost - costs[0]).abs() < 1e-4 * costs[0]), "{costs:?}");
 }
 
-/// If FDDP alone reports convergence, the solution is within the bounds, with projection of the start and without.
+/// Checks solutions of FDDP alone. If the status is converged, the solution is within the bounds, with and without
+/// projection of the start.
 #[test]
 fn fddp_never_converges_outside_of_the_bounds() {
     let reach = vec![quadratic("reach", 100.0, point())];
@@ -203,7 +204,7 @@ fn fddp_never_converges_outside_of_the_bounds() {
                 let case = format!("±{size}, seed {seed}, projected {project}");
                 assert_honest(solution, 0.0, WEAK, &case);
                 assert!(!project || most(&solution.us) <= WEAK, "{case}");
-                // an iterate within the bounds is preferred to a start outside them
+                // an iterate within the bounds is better than a start outside the bounds
                 let stepped = solution.trace.iter().any(|iteration| iteration.accepted);
                 if stepped && solution.status != Status::NotFinite {
                     assert!(most(&solution.us) <= WEAK, "{case}: {:?}", solution.status);
@@ -213,7 +214,8 @@ fn fddp_never_converges_outside_of_the_bounds() {
     }
 }
 
-/// A limit that the initial state x̂₀ violates proves infeasibility; all other constraints are still satisfied.
+/// Checks that a limit which the initial state x̂₀ violates proves infeasibility. All other constraints are still
+/// satisfied.
 #[test]
 fn a_proof_names_the_limit() {
     let mut lower = vec![f64::NEG_INFINITY; 14];
@@ -235,7 +237,7 @@ fn a_proof_names_the_limit() {
     // the 7 rows of `weak` precede the rows of `bent`
     assert_eq!((worst.kind, worst.knot, worst.row, worst.entry), (ViolationKind::Constraint, 0, 10, 3));
     assert_eq!((worst.name.as_deref(), worst.amount), (Some("bent"), 0.5));
-    // the tool reaches its target, and no restart was made
+    // the tool reaches its target, and the solve was not repeated from another start
     assert!(solver.outcome().penalty < 1e8);
     let mut placements = condyle_dynamics::Data::new(&robots::arm7());
     let arm = robots::arm7();
@@ -244,7 +246,7 @@ fn a_proof_names_the_limit() {
     assert!((tool.translation - Vec3::new(0.35, 0.2, 0.6)).norm_squared().sqrt() < 1e-5);
 }
 
-/// In a solve without iterations, a gap can also be the reported violation.
+/// Checks that the reported violation can be a gap, in a solve without iterations.
 #[test]
 fn a_gap_is_named() {
     let (mut problem, still) = arm(true, exact());

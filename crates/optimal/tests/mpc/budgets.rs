@@ -1,21 +1,21 @@
-//! Time budgets: the effect of a delay on a controller, and its recovery.
+//! Time budgets: the effect of a delay on a controller, and the recovery of the controller.
 
 use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqKnot, Problem, Solution, Status};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Budget of each solve, and duration of the delay (ms). Both are long compared with an iteration of a few µs and with
-/// disturbances by other processes.
+/// Budget of each solve; the next constant is the duration of the delay (ms). Both are long compared with an iteration
+/// of a few µs and with disturbances by other processes.
 const BUDGET: Duration = Duration::from_millis(400);
 const DELAY: u64 = 900;
-/// Horizon of the problem; it is so long that a solve takes several iterations from a new initial state.
+/// Horizon of the problem, long enough that a solve from a new initial state takes several iterations.
 const HORIZON: usize = 30;
 /// Bound on |x| in the closed loop; a diverging rollout exceeds it by orders of magnitude.
 const SANE: f64 = 50.0;
 
 /// Unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1 s. Under a constant control, its state triples in 6
-/// knots. On request, its derivatives sleep or become NaN.
+/// knots. The fields `delay` and `broken` make its derivatives sleep or become NaN.
 #[derive(Clone)]
 struct Unstable {
     nu: usize,
@@ -57,7 +57,7 @@ impl ActionModel for Unstable {
     }
 }
 
-/// Either of the two solvers.
+/// Solver of the tests: FDDP or the augmented Lagrangian.
 enum Solver {
     Fddp(Box<Fddp>),
     Constrained(Box<AugmentedLagrangian>),
@@ -102,7 +102,7 @@ impl Solver {
             Self::Constrained(solver) => solver.solution(),
         }
     }
-    /// Returns the number of iterations of all inner solves.
+    /// Returns the number of iterations, summed over all inner solves.
     fn iterations(&self) -> usize {
         match self {
             Self::Fddp(solver) => solver.solution().trace.len(),
@@ -111,7 +111,7 @@ impl Solver {
     }
 }
 
-/// Controller that has solved once without a budget: plant, problem, solver.
+/// Closed loop of a plant, a problem and a solver, which has solved the problem once without a budget.
 struct Loop {
     plant: Unstable,
     problem: Problem,
@@ -135,14 +135,14 @@ impl Loop {
         })
     }
 
-    /// Simulates one control period: the plant follows the plan, the horizon moves by one knot, and the next plan is
-    /// computed.
+    /// Simulates one control period: the plant follows the plan, the horizon moves by one knot, and the solver computes
+    /// the next plan.
     fn step(&mut self) -> Solution {
         let plan = self.solver.solution();
         let u = plan.u(0)[0] + (0..2).map(|i| plan.K[0][(0, i)] * (self.x[i] - plan.x(0)[i])).sum::<f64>();
         let mut next = vec![0.0; 2];
         self.plant.calc(0, &self.x, &[u], &mut next);
-        next[1] += 0.02; // a disturbance
+        next[1] += 0.02; // disturbs the plant
         self.x = next;
         self.solver.shift(&mut self.problem).unwrap();
         self.problem.set_x0(&self.x).unwrap();
@@ -155,7 +155,7 @@ fn size(solution: &Solution) -> f64 {
     solution.xs.iter().chain(&solution.us).fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// A delay makes one solve late, which reports an overrun; the following solves are normal.
+/// Checks that a delay makes one solve late, which reports an overrun, and that the following solves are normal.
 #[test]
 fn a_controller_recovers_from_a_delay() {
     for mut now in Loop::all() {
@@ -176,7 +176,7 @@ fn a_controller_recovers_from_a_delay() {
     }
 }
 
-/// With a budget that is always too short, each solve still makes one iteration, which controls the plant.
+/// Checks a budget that is always too short. Each solve still makes one iteration, which suffices to control the plant.
 #[test]
 fn a_budget_below_an_iteration_is_overrun() {
     for mut now in Loop::all() {
@@ -190,8 +190,8 @@ fn a_budget_below_an_iteration_is_overrun() {
     }
 }
 
-/// With a budget of zero no iteration is made. Horizons that are only shifted end in copies of their last state. A
-/// later solve with time gives the same result as a solve that starts from scratch.
+/// Checks that no iteration is made with a budget of zero. A horizon that is only shifted ends in copies of its last
+/// state. A later solve with enough time gives the same result as a solve from a new start.
 #[test]
 fn horizons_stay_sane_without_iterations() {
     for mut now in Loop::all() {
@@ -203,7 +203,7 @@ fn horizons_stay_sane_without_iterations() {
             now.solver.shift(&mut now.problem).unwrap();
             assert!(size(now.solver.solution()) < SANE);
         }
-        // x_N follows from the last control once, and is copied at later shifts
+        // the first shift computes x_N from the last control, and later shifts copy it
         let xs = &now.solver.solution().xs;
         assert_eq!(xs[..2].repeat(HORIZON), xs[2..]);
         now.solver.settings().time_budget = None;
@@ -214,7 +214,8 @@ fn horizons_stay_sane_without_iterations() {
     }
 }
 
-/// At several shifts in a row, the first shift computes the last state from the last control, and the others copy it.
+/// Checks several shifts in a row: the first shift computes the last state from the last control, and the other shifts
+/// copy it.
 #[test]
 fn only_a_new_trajectory_is_rolled_out() {
     for mut now in Loop::all() {
@@ -229,7 +230,7 @@ fn only_a_new_trajectory_is_rolled_out() {
     }
 }
 
-/// After solves that end as not finite, shifts do not make the horizon diverge either.
+/// Checks that shifts do not make the horizon diverge after solves that are not finite.
 #[test]
 fn horizons_stay_sane_when_nothing_is_finite() {
     for mut now in Loop::all() {

@@ -9,11 +9,11 @@ use std::time::Duration;
 /// State of the arm at rest: positions, then velocities.
 const REST: [f64; 14] = [0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 const HORIZON: usize = 15;
-/// Bound on the costs in the closed loop. A solve from x̂₀ held still costs less than 2 at each of the states.
+/// Bound on the costs in the closed loop. A solve from the quasi-static start costs less than 2 at each of the states.
 const SANE: f64 = 20.0;
 
-/// Creates the problem of an arm that reaches for a point. The arm may have any velocity at the end, so a rollout with
-/// a repeated last control diverges.
+/// Creates the problem of an arm that reaches for a point. The problem allows any velocity at the end, so a rollout
+/// that repeats the last control diverges.
 fn reach(bound: f64) -> Problem {
     let arm = Arc::new(robots::arm7());
     let rest = Cost::new("rest", 0.1, Residual::State { reference: REST.to_vec() }, Activation::Quadratic);
@@ -53,7 +53,7 @@ fn a_horizon_whose_end_runs_away_is_replaced() {
     }
 }
 
-/// Each solve makes one iteration, and its steps are rejected until the regularisation is large enough.
+/// Checks solves of one iteration each. Their steps are rejected until the regularisation is large enough.
 #[test]
 fn short_budgets_make_progress() {
     let mut problem = reach(20.0);

@@ -1,5 +1,5 @@
-//! Elimination of controls, some of which may lie at a bound.
-#![allow(non_snake_case)] // the names of the literature: K, Quu
+//! Elimination of the controls from a knot's quadratic form; controls at a bound are not eliminated.
+#![allow(non_snake_case)] // names follow the literature: K, Quu
 
 use super::super::box_qp::BoxQp;
 use super::super::feedback::KnotFeedback;
@@ -7,13 +7,13 @@ use super::super::knot::LqKnot;
 use super::super::workspace::Workspace;
 use condyle_linalg::{SLACK, View, copy_symmetric, dot, eliminate, solve_right, transpose_negated};
 
-/// Elimination of controls, with its scratch.
+/// Elimination of the controls, with its scratch.
 #[derive(Debug, Clone)]
 pub(super) struct Controls {
     qp: BoxQp,
-    /// Lᵀ, for the back substitution.
+    /// Transpose of the factor L, for the back substitution.
     upper: Vec<f64>,
-    /// Number of controls eliminated last.
+    /// Number of controls that the last elimination eliminated.
     free: usize,
 }
 
@@ -23,12 +23,12 @@ impl Controls {
         Self { qp: BoxQp::new(m), upper: vec![0.0; (m + SLACK) * m], free: 0 }
     }
 
-    /// Computes L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a
-    /// bound. Stores Qu and Quu in the feedback and, if there are bounds, k in the scratch. Returns the number of
-    /// eliminated controls.
+    /// Eliminates the controls that are not at a bound: L Lᵀ = Quu, X = Qxu L⁻ᵀ, Vxx = Qxx − X Xᵀ, Vx = Qx − X y.
+    /// Stores Qu and Quu in the feedback and, if there are bounds, k in the scratch. Returns the number of eliminated
+    /// controls.
     ///
     /// # Errors
-    /// The control and its pivot, if the pivot is not positive.
+    /// Index of the control and its pivot, if the pivot is not positive.
     pub(super) fn eliminate(
         &mut self,
         work: &mut Workspace,
@@ -56,7 +56,8 @@ impl Controls {
         Ok(self.free)
     }
 
-    /// Computes the gains [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination, whose states are rotated by `turn`.
+    /// Computes the gains [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination, in which the states are rotated by
+    /// `turn`.
     pub(super) fn write_gains(
         &mut self,
         work: &mut Workspace,
@@ -98,8 +99,8 @@ impl Controls {
     }
 }
 
-/// Moves the rows and columns of the free controls, whose indices among m are `free`, to the front of H. The states
-/// follow.
+/// Moves the rows and columns of the free controls to the front of H, and the rows and columns of the states after
+/// them. `free` contains the indices of the free controls among m.
 fn keep_free(H: &mut [f64], stride: usize, m: usize, n: usize, free: &[usize]) {
     let (kept, rows) = (free.len(), m + n + 1);
     for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {

@@ -1,5 +1,5 @@
 //! Quadratic form of a knot whose A and B have no known structure.
-#![allow(non_snake_case)] // the names of the literature: A, B, Q, …
+#![allow(non_snake_case)] // names follow the literature: A, B, Q, …
 
 use super::super::feedback::KnotFeedback;
 use super::super::knot::{Hessian, LqKnot};
@@ -8,7 +8,7 @@ use super::controls::Controls;
 use super::{Curvature, KnotForm};
 use condyle_linalg::{SLACK, View, add_product_lower, copy_lower, copy_matrix, product, transpose};
 
-/// Form with full matrices, and with the states in their original order.
+/// Form with full matrices A and B, and with the states in their original order.
 #[derive(Debug, Clone)]
 pub(super) struct Dense {
     controls: Controls,
@@ -26,7 +26,7 @@ impl KnotForm for Dense {
         0
     }
 
-    /// Writes H = [R + ϱ 1 ·; S Q; rᵀ qᵀ] + W [B A],   W = [P B, P A, P f + p]ᵀ.
+    /// Writes H = [R + ϱ 1 ·; S Q; rᵀ qᵀ] + W [B A], W = [P B, P A, P f + p]ᵀ. The term ϱ 1 is the regularisation.
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>) {
         let (n, m) = (knot.ndx(), knot.nu());
         let (ld, rows) = (work.stride(m), m + n);
@@ -43,7 +43,7 @@ impl KnotForm for Dense {
         add_to_diagonal(H, ld, m, regularisation);
     }
 
-    /// Writes Θ [B A] below H.
+    /// Writes the product Θ [B A] to the rows below H.
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
@@ -66,8 +66,8 @@ impl KnotForm for Dense {
     }
 }
 
-/// Writes the lower triangle of H = [R ·; S Q; rᵀ qᵀ] + [ψuu ·; ψxu ψxx; 0 0], with the states rotated by `turn`. ψ is
-/// the curvature of the dynamics.
+/// Writes the lower triangle of H = [R ·; S Q; rᵀ qᵀ] + [ψuu ·; ψxu ψxx; 0 0], with the states rotated by `turn`. The
+/// second matrix is the Hessian of the dynamics' curvature ψ.
 pub(super) fn write_cost(work: &mut Workspace, knot: &LqKnot, turn: usize, curvature: &mut Curvature<'_>) {
     let (n, m) = (knot.ndx(), knot.nu());
     let (ld, split) = (work.stride(m), n - turn); // `split`: number of states before the rotated order wraps around
@@ -93,7 +93,7 @@ pub(super) fn write_cost(work: &mut Workspace, knot: &LqKnot, turn: usize, curva
     }
 }
 
-/// Adds [ψuu ·; ψxu ψxx] to H, with the states rotated by `turn`.
+/// Adds the Hessian [ψuu ·; ψxu ψxx] of the dynamics' curvature ψ to H, with the states rotated by `turn`.
 fn add_hessian(H: &mut [f64], ld: usize, Hessian { xx, xu, uu }: &Hessian, turn: usize) {
     let (n, m) = xu.shape();
     let state = |i: usize| (i + turn) % n;

@@ -1,4 +1,5 @@
-//! Knots as equations of inverse dynamics, for small arms: all coordinates are driven, and they form a vector space.
+//! Knots as equations of inverse dynamics, for small arms. Every coordinate has a motor, and the configurations are a
+//! vector space.
 //!
 //! This is the form of [`inverse_dynamics`](super::inverse_dynamics) in which every coordinate is an unknown, y = δv +
 //! w, and T = E = 1:
@@ -9,9 +10,9 @@
 //!     ⎣ Nᵀ Nᵀ P₁₁    ⎦
 //! ```
 //!
-//! The elimination scales the rows of U and G by the square roots of their weights, and adds their outer products to H
-//! tile by tile.
-#![allow(non_snake_case)] // the names of the literature, and N, Π, U
+//! The elimination multiplies each row of U and G by the square root of its weight. It adds the outer products of these
+//! rows to H in tiles.
+#![allow(non_snake_case)] // names follow the literature; also N, Π, U
 
 use super::super::feedback::{KnotFeedback, take_gains};
 use super::super::knot::LqKnot;
@@ -23,19 +24,19 @@ use condyle_linalg::{
     transpose_block,
 };
 
-/// Maximum number of coordinates. For more coordinates, the form that skips the zeros of rows is faster.
+/// Maximum number of coordinates. For more coordinates, the form that skips zeros in the rows is faster.
 const MOST: usize = 16;
-/// Maximum number of rows of costs.
+/// Maximum number of residual rows in G.
 const MOST_COSTS: usize = 16;
 
-/// Form of driven robots, with its scratch.
+/// Form of knots of small arms in which every coordinate has a motor, with its scratch.
 #[derive(Debug, Clone)]
 pub(in crate::lq) struct Driven {
-    /// Scaled rows of U and G with columns for (w, δv, δq), each followed by its entry of the gradient and by zeros.
-    /// Shape: `stride` × MOST + MOST_COSTS; empty for larger robots.
+    /// Scaled rows of U and G with columns for (w, δv, δq). Each row ends with its entry of the gradient and with
+    /// zeros. Shape: `stride` × (MOST + MOST_COSTS); empty for larger robots.
     rows: Vec<f64>,
     stride: usize,
-    /// Number of scaled rows.
+    /// Number of rows in use in `rows`.
     count: usize,
     /// Scratch of [`take_gains`].
     y: Vec<f64>,
@@ -49,12 +50,13 @@ impl Driven {
         Self { rows: vec![0.0; stride * (nv + MOST_COSTS)], stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
     }
 
-    /// Returns the number of rows that the form stores below H.
+    /// Returns the number of rows that this form needs below H.
     pub(in crate::lq) fn rows_below(n: usize, m: usize) -> usize {
         if n <= 2 * MOST { m } else { 0 }
     }
 
-    /// Returns whether the form applies to a knot, if `regularisation` is added to the diagonal of R.
+    /// Returns whether this form applies to a knot. `regularisation` is the number that the sweep adds to the diagonal
+    /// of R.
     pub(super) fn takes(knot: &LqKnot, regularisation: f64) -> bool {
         let (nv, InverseDynamicsForm { own, slopes, diagonal, .. }) = (knot.ndx() / 2, &knot.inverse_dynamics);
         nv <= MOST
@@ -72,7 +74,7 @@ impl KnotForm for Driven {
         n / 2
     }
 
-    /// Writes H without the terms of U and G, and writes U below H.
+    /// Writes H without the terms of U and G, and writes U to the rows below H.
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, _: &mut Curvature<'_>) {
         self.count = knot.nu() + knot.inverse_dynamics.slopes.len();
         at_narrow_level(Write { rows: &mut self.rows, stride: self.stride, work, knot, regularisation });
@@ -82,8 +84,8 @@ impl KnotForm for Driven {
         unreachable!("segments of a horizon take the form for all robots");
     }
 
-    /// Adds the terms of U and G to H, and eliminates the unknowns. With U below H, the result is [L ·; X Hₓₓ − X Xᵀ;
-    /// yᵀ ·; Y K], as in [`Gains`](super::super::feedback::Gains).
+    /// Adds the terms of U and G to H, and eliminates the unknowns. With the rows of U below H, the result is [L ·; X
+    /// Hₓₓ − X Xᵀ; yᵀ ·; Y K], as in [`Gains`](super::super::feedback::Gains).
     fn eliminate(&mut self, work: &mut Workspace, knot: &LqKnot, _: &mut KnotFeedback) -> Result<usize, (usize, f64)> {
         let (n, m, ld) = (knot.ndx(), knot.nu(), work.stride(knot.nu()));
         let shape = [m + n + 1 + m, m + n, m];
@@ -116,9 +118,9 @@ impl Vectorized for Write<'_> {
         let (dt, _) = knot.structure.euler().expect("the form is that of Euler steps");
         let Workspace { P, p, H, .. } = work;
         let (P, Q) = (View::new(P, n + SLACK), View::new(knot.Q.as_slice(), n));
-        let (v, q) = (nv * ld, n * ld); // first elements of the columns of δv and δq
+        let (v, q) = (nv * ld, n * ld); // offsets of the columns of δv and δq in H
 
-        // Nᵀ = Δt P₁₁ + P₁₂,   Π = Δt (Nᵀ + P₂₁) + P₂₂,   and Q + P₁₁ for δq
+        // writes Nᵀ = Δt P₁₁ + P₁₂, Π = Δt (Nᵀ + P₂₁) + P₂₂, and Q + P₁₁ in the block of δq
         let places = ([n, v + n], [0, nv, v + nv]);
         add_in_turn::<V, 2, 3>(H, ld, places, P.at(0, nv), P, dt, [nv, nv]);
         add_blocks::<V>(&mut H[q + n..], ld, Q, P, [nv, nv]);
@@ -132,7 +134,7 @@ impl Vectorized for Write<'_> {
         }
         transpose_block::<V>(&mut H[all + 1..], ld, View::new(&form.efforts.numbers, size), [all, nv]);
 
-        // each row is scaled to √a″ x, and its entry of the gradient to a′ / √a″
+        // scales each row x to √a″ x, and its entry of the gradient to a′ / √a″
         let (efforts, costs) = (form.efforts.numbers.chunks_exact(size), form.costs.numbers.chunks_exact(size));
         for (k, (x, row)) in efforts.chain(costs).zip(rows.chunks_exact_mut(stride)).enumerate() {
             let [d, dd] =

@@ -1,5 +1,6 @@
-//! Quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
-#![allow(non_snake_case)] // the names of the literature, and N, Π, T, E
+//! Quadratic form of a knot with semi-implicit Euler steps. The blocks of A and B that are the identity or Δt are never
+//! multiplied.
+#![allow(non_snake_case)] // names follow the literature; also N, Π, T, E
 
 use super::super::feedback::KnotFeedback;
 use super::super::knot::LqKnot;
@@ -13,11 +14,11 @@ use condyle_linalg::{
     at_narrow_level, product, transpose,
 };
 
-/// Form of Euler steps with the controls as unknowns, and with the states in the order (v, q).
+/// Form of semi-implicit Euler steps with the controls as unknowns, and with the states in the order (v, q).
 #[derive(Debug, Clone)]
 pub(super) struct Euler {
     steps: Steps,
-    /// Scratch for the upper triangle of NᵀF_q, with the stride of Nᵀ and Π.
+    /// Scratch for the upper triangle of NᵀF_q, with the same stride as Nᵀ and Π.
     M: Vec<f64>,
     controls: Controls,
 }
@@ -34,7 +35,7 @@ impl KnotForm for Euler {
         n / 2
     }
 
-    /// Writes H. With the rows [G F_v F_q] of [B A] for velocities:
+    /// Writes H. Let [G F_v F_q] be the rows of [B A] for the velocities:
     ///
     /// ```text
     /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
@@ -68,7 +69,7 @@ impl KnotForm for Euler {
         add_to_diagonal(&mut work.H, ld, m, regularisation);
     }
 
-    /// Writes Θ B = Ψ G and Θ A = Ψ [F_q F_v] + [Θ_q T  0] below H, with Ψ = Δt Θ_q E + Θ_v.
+    /// Writes Θ B = Ψ G and Θ A = Ψ [F_q F_v] + [Θ_q T 0] to the rows below H, with Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m) = (knot.ndx(), knot.nu());
         let ld = work.stride(m);
@@ -93,15 +94,15 @@ impl KnotForm for Euler {
     }
 }
 
-/// Value function of the next state, in terms of the change y of the next velocity and the change of positions δq.
-/// Matrices are column-major with padding rows and the stride nv + SLACK.
+/// Value function of the next state, written with the change y of the next velocity and the change δq of the positions
+/// as variables. Matrices are column-major with padding rows and the stride nv + SLACK.
 #[derive(Debug, Clone)]
 pub(super) struct Steps {
-    /// Matrices Nᵀ and Π, one after the other.
+    /// Matrices Nᵀ and Π, one after the other in one buffer.
     both: Vec<f64>,
     /// Gradient with respect to y: Δt Eᵀp_q + p_v.
     pub(super) py: Vec<f64>,
-    /// Columns of P E or P T that differ from the columns of P, with the stride of P.
+    /// Products P E or P T, computed only in the columns of blocks; with the stride of P.
     PB: Vec<f64>,
 }
 
@@ -118,7 +119,7 @@ impl Steps {
         self.both.split_at(self.both.len() / 2)
     }
 
-    /// Writes Π, N and Δt Eᵀp_q + p_v: the terms of the value function that contain the next velocity.
+    /// Computes Π, N and Δt Eᵀp_q + p_v: the terms of the value function that contain the next velocity.
     pub(super) fn write(&mut self, work: &Workspace, knot: &LqKnot) {
         let (dt, blocks) = steps_of(knot);
         let n = knot.ndx();
@@ -126,7 +127,7 @@ impl Steps {
         at_narrow_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
     }
 
-    /// Adds TᵀP₁₁T to H_qq and Tᵀp_q to Qx_q.
+    /// Adds TᵀP₁₁T to the block H_qq of H, and Tᵀp_q to its gradient Qx_q.
     pub(super) fn add_positions(&mut self, work: &mut Workspace, knot: &LqKnot) {
         let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
         let (nv, ld) = (n / 2, work.stride(m));
@@ -150,7 +151,7 @@ impl Steps {
         }
     }
 
-    /// Adds Θ_q T to the columns of δq below H.
+    /// Adds Θ_q T to the columns of δq, in the rows below H.
     pub(super) fn add_positions_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let ((_, blocks), n, m) = (steps_of(knot), knot.ndx(), knot.nu());
         let (nv, ld, ldt, at) = (n / 2, work.stride(m), n + SLACK, m + n + 1);
@@ -185,8 +186,8 @@ impl Vectorized for WriteSteps<'_> {
         let Self { steps: Steps { both, py, PB }, P, p, dt, blocks } = self;
         let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
 
-        // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂.  The left factors Tᵀ and Eᵀ are omitted
-        // here.
+        // writes Nᵀ = Tᵀ(Δt P₁₁E + P₁₂) and Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂, but without the left factors Tᵀ
+        // and Eᵀ
         let by_velocity = |k: usize| View::new(&P[(nv + k) * ldp..], ldp);
         add_in_turn::<V, 1, 1>(both, ldn, ([0], [nv * ldn]), by_velocity(0), View::new(P, ldp), dt, [nv, nv]);
         for block in blocks {
@@ -199,7 +200,7 @@ impl Vectorized for WriteSteps<'_> {
         for ((y, q), v) in py.iter_mut().zip(p_q).zip(p_v) {
             *y = dt * q + v;
         }
-        // apply the omitted left factors Tᵀ and Eᵀ, block by block
+        // applies the left factors Tᵀ and Eᵀ, block by block
         for block in blocks {
             let (T, E) = (beyond_identity(&block.T, 1.0), beyond_identity(&block.E, dt));
             for k in 0..nv {
@@ -216,7 +217,7 @@ impl Vectorized for WriteSteps<'_> {
     }
 }
 
-/// Inner loops of [`Steps::add_positions`], compiled for each SIMD level; `H` starts at the diagonal of δq.
+/// Inner loops of [`Steps::add_positions`], compiled for each SIMD level. `H` starts at the diagonal block of δq.
 struct AddPositions<'a> {
     steps: &'a Steps,
     P: &'a [f64],
@@ -256,7 +257,8 @@ impl Vectorized for AddPositions<'_> {
     }
 }
 
-/// Computes the columns of the blocks of P B, in `rows` rows, for a matrix B that is the identity except for blocks.
+/// Computes the product P B, for a matrix B that is the identity except for blocks. Only the columns of these blocks
+/// and the first `rows` rows are computed.
 fn times_blocks(
     PB: &mut [f64],
     P: &[f64],
@@ -272,14 +274,14 @@ fn times_blocks(
     }
 }
 
-/// Returns a column of P B. It equals the column of P, unless the column belongs to a block.
+/// Returns column k of P B: a computed column if k is in a block, else the column of P.
 #[inline(always)]
 fn column<'a>(k: usize, blocks: &[EulerBlock], P: &'a [f64], PB: &'a [f64], ldp: usize) -> &'a [f64] {
     let in_block = blocks.iter().any(|block| block.range().contains(&k));
     &(if in_block { PB } else { P })[k * ldp..]
 }
 
-/// Returns the rows of a block, padded with zeros to a whole register.
+/// Returns the rows of a block, each padded with zeros to eight entries.
 #[inline(always)]
 fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
     let mut rows = [[0.0; 8]; LARGEST_BLOCK];
@@ -304,7 +306,7 @@ fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLO
     rows
 }
 
-/// Computes the eight numbers of Bᵀx from the rows of B.
+/// Computes the eight entries of Bᵀx from the rows of B.
 #[inline(always)]
 fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
     let mut sums = [V::splat(0.0); 4];
@@ -316,7 +318,7 @@ fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
     sums
 }
 
-/// Adds x to the first eight numbers of y.
+/// Adds x to the first eight entries of y.
 #[inline(always)]
 fn add<V: Vector>(y: &mut [f64], x: [V; 4]) {
     let y = &mut y[..8];

@@ -1,10 +1,10 @@
 //! Knots as equations of inverse dynamics: accelerations and forces replace the controls.
 //!
-//! Inverse dynamics is cheap, and its matrices are sparse where the matrices of forward dynamics are full. Unknowns w
-//! replace δu. They are changes of accelerations and contact forces, and w has the same length as δu. All other changes
-//! follow from w and δx by the equations without controls (contacts stay, the base is not driven). Let y be the change
-//! of the velocity after the step, v⁺ = v + Δt a:
-//!
+//! The matrices of inverse dynamics are sparse, whereas the matrices of forward dynamics are full. Inverse dynamics is
+//! also cheaper to compute. The unknowns δu are therefore replaced by unknowns w of the same length: changes of
+//! accelerations and contact forces. All other changes follow from w and δx by the equations that contain no control:
+//! contact points do not accelerate, and the base has no motor. Let y be the change of the velocity after the step, v⁺
+//! = v + Δt a:
 //! ```text
 //! δu = U (w, δv, δq)
 //! y_c = δv_c + w_k                for a coordinate c that is an unknown
@@ -12,19 +12,18 @@
 //! δq⁺ = T δq + Δt E y,    δv⁺ = y:        ½ δx⁺ᵀ P δx⁺ = ½ yᵀ Π y + yᵀ N δq + ½ δqᵀ Tᵀ P₁₁ T δq
 //! ```
 //!
-//! where Π and N are the matrices of Euler steps ([`Sweep`](crate::Sweep)). The quadratic form of the knot thus
-//! consists of copies of Π and N, and of few outer products: U with the cost of controls, and D with Z = (Π y + N δq)_d
-//! − ½ Π_dd D:
-//!
+//! where Π and N are the matrices of Euler steps ([`Sweep`](crate::Sweep)). The quadratic form H of the knot then
+//! consists of copies of Π and N, and of a few outer products. These contain U with the cost R of controls, and D with
+//! Z = (Π y + N δq)_d − ½ Π_dd D:
 //! ```text
 //! H = [Π and N on w, δv, δq] + Uᵀ (R + ϱ 1) U + DᵀZ + ZᵀD + Gᵀ a″ G
 //! ```
 //!
-//! The rows of G are the gradients of residuals that depend on more than δq. All rows have zeros where the robot's
-//! kinematic tree implies them; these zeros are skipped in blocks. Then w is eliminated. The results P, p, K = U_x +
-//! U_w K_w and k = U_w k_w equal the results with controls as unknowns, because for any δx the map from w to δu is
+//! The rows of G are the gradients of residuals that depend on more than δq. All rows have zeros that follow from the
+//! robot's kinematic tree; these zeros are skipped in blocks. Then w is eliminated. The results P, p, K = U_x + U_w K_w
+//! and k = U_w k_w are the same as with the controls as unknowns, because for any δx the map from w to δu is
 //! invertible.
-#![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
+#![allow(non_snake_case)] // names follow the literature; also N, Π, D, U, Z
 
 use super::super::feedback::{Gains, KnotFeedback};
 use super::super::knot::LqKnot;
@@ -41,17 +40,18 @@ use condyle_linalg::{
 #[derive(Debug, Clone)]
 pub(super) struct InverseDynamics {
     steps: Steps,
-    /// Outer products, whose rows have columns for (w, δv, δq).
+    /// Outer products that are added to H. Their rows have columns for (w, δv, δq).
     products: OuterProducts,
-    /// Matrix ½ Π_dd. Shape: dependent × dependent, with padding rows.
+    /// Half of the block Π_dd of the dependent coordinates. Shape: dependent × dependent, with padding rows.
     half: Vec<f64>,
-    /// Columns of Ψ for dependent coordinates. Shape: n × dependent, with padding rows.
+    /// Scratch: columns of Ψ for dependent coordinates. Shape: n × dependent, with padding rows.
     below: Vec<f64>,
     gains: Gains,
 }
 
 impl InverseDynamics {
-    /// Returns the largest sizes of scratch that the knots need: numbers in rows, products, dependent coordinates.
+    /// Returns the largest sizes of scratch that the knots need: number of entries in rows, of products, and of
+    /// dependent coordinates.
     pub(super) fn room(knots: &[LqKnot]) -> [usize; 3] {
         let rooms = knots.iter().map(|LqKnot { inverse_dynamics: form, .. }| {
             let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
@@ -77,7 +77,7 @@ impl KnotForm for InverseDynamics {
         n / 2
     }
 
-    /// Writes H in the order (w, δv, δq).
+    /// Writes H with its rows and columns in the order (w, δv, δq).
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, _: &mut Curvature<'_>) {
         let (n, m, count) = (knot.ndx(), knot.nu(), knot.inverse_dynamics.dependent.len());
         let (ld, all, size) = (work.stride(m), m + n, knot.inverse_dynamics.stride);
@@ -86,14 +86,14 @@ impl KnotForm for InverseDynamics {
         let Self { steps, products, half, .. } = self;
         at_narrow_level(WriteRows { steps, products, half, knot, regularisation, H: &mut work.H, ld });
 
-        // The last rows are D and (Π y + N δq)_d; the rows (Π y + N δq)_d become Z.
+        // the last rows of `products` are D, then (Π y + N δq)_d, which is overwritten by Z
         let Z = products.count() - count;
         let D = Z - count;
         if count > 0 {
             let (D, Z) = products.rows[D * size..].split_at_mut(count * size);
             add_product(Z, size, [all, count, count], View::new(D, size), View::new(half, count + SLACK));
         }
-        // DᵀZ + ZᵀD
+        // adds the products DᵀZ + ZᵀD
         let masks = &knot.inverse_dynamics.steps.masks;
         for (k, &mask) in masks.iter().enumerate() {
             products.multiply([Z + k, D + k], [u64::MAX, mask]);
@@ -105,7 +105,7 @@ impl KnotForm for InverseDynamics {
         steps.add_positions(work, knot);
     }
 
-    /// Writes Ψ y + Θ_q T δq below H, with Ψ = Δt Θ_q E + Θ_v.
+    /// Writes Ψ y + Θ_q T δq to the rows below H, with Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]) {
         let (n, m, InverseDynamicsForm { own, dependent, steps: D, stride, .. }) =
             (knot.ndx(), knot.nu(), &knot.inverse_dynamics);
@@ -147,8 +147,8 @@ impl KnotForm for InverseDynamics {
     }
 }
 
-/// Writes the part of H that consists of Π and N, and the rows of the outer products: first the rows of
-/// Uᵀ (R + ϱ 1) U + Gᵀ a″ G, then D and (Π y + N δq)_d.
+/// Computation of the blocks of H that consist of Π and N, and of the rows of the outer products. The rows of Uᵀ (R + ϱ
+/// 1) U + Gᵀ a″ G come first, then the rows of D and of (Π y + N δq)_d.
 struct WriteRows<'a> {
     steps: &'a Steps,
     products: &'a mut OuterProducts,
@@ -168,7 +168,7 @@ impl Vectorized for WriteRows<'_> {
         let (nv, all, size) = (n / 2, m + n, imp.stride);
         let ldn = nv + SLACK;
 
-        // Π and N for the unknowns and δv; unknowns with index `forces` or above are forces
+        // copies Π and N for the unknowns and δv; unknowns with index `forces` or above are forces
         let forces = imp.own.last().map_or(0, |own| own[1] + own[2]);
         for &[c, k, length] in &imp.own {
             for &[cc, kk, rows] in imp.own.iter().filter(|own| own[1] >= k) {
@@ -200,7 +200,7 @@ impl Vectorized for WriteRows<'_> {
             H[(m + nv + j) * ld + all] = q[j];
         }
 
-        // Uᵀ (R + ϱ 1) U and Gᵀ a″ G
+        // appends the rows of Uᵀ (R + ϱ 1) U and Gᵀ a″ G
         products.clear(all, size);
         for (k, row) in imp.efforts.numbers.chunks_exact(size).enumerate() {
             products.square::<V>(row, mask(row), [knot.r[k], imp.diagonal[nv + k] + regularisation]);
@@ -208,14 +208,14 @@ impl Vectorized for WriteRows<'_> {
         for ((row, &mask), &slopes) in imp.costs.numbers.chunks_exact(size).zip(&imp.costs.masks).zip(&imp.slopes) {
             products.square::<V>(row, mask, slopes);
         }
-        // D and (Π y + N δq)_d
+        // appends the rows of D and of (Π y + N δq)_d
         let count = imp.dependent.len();
         let first = products.add_rows(count) * size;
         copy_block::<V>(&mut products.rows[first..], size, View::new(&imp.steps.numbers, size), [size, count]);
         let first = products.add_rows(count);
         let (mut j, zero) = (0, V::splat(0.0));
         while j < count {
-            // copies the rows of consecutive coordinates together
+            // copies the rows of consecutive coordinates in one call
             let (d, together) = (imp.dependent[j], run(&imp.dependent[j..]));
             let rows = &mut products.rows[(first + j) * size..];
             let (own, others) = (View::new(&Pi[d * ldn..], ldn), View::new(&N[d * ldn..], ldn));
@@ -225,7 +225,7 @@ impl Vectorized for WriteRows<'_> {
             for i in 0..together {
                 let row = &mut rows[i * size..][..size];
                 for zeros in row[forces..].chunks_exact_mut(V::N).take((m - forces).div_ceil(V::N)) {
-                    zero.store(zeros); // may overwrite elements that are written next
+                    zero.store(zeros); // may also clear elements after the forces, which are written next
                 }
                 row[all] = py[d + i];
                 let mut at = 0;
@@ -243,7 +243,7 @@ impl Vectorized for WriteRows<'_> {
     }
 }
 
-/// Returns the number of indices at the beginning that are consecutive; at least 1.
+/// Returns the length of the run of consecutive indices at the beginning of `numbers`; at least 1.
 #[inline(always)]
 fn run(numbers: &[usize]) -> usize {
     let mut length = 1;

@@ -1,9 +1,9 @@
-//! Forms of a knot. A form determines how the sweep receives the knot, and which unknowns the sweep eliminates.
+//! Forms of a knot. A form decides how A and B of a knot enter the sweep, and which unknowns the sweep eliminates.
 //!
-//! Each knot is a quadratic form H in some unknowns and in the change of its state; the unknowns are eliminated. The
-//! forms differ in how A and B enter H, in whether the unknowns are the controls, and in the order of the states. Only
+//! Each knot is a quadratic form H in some unknowns and in the change of its state; the sweep eliminates the unknowns.
+//! The forms differ in how A and B enter H, in whether the unknowns are the controls, and in the order of the states.
 //! [`Forms::of`] selects the form of a knot.
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // names follow the literature
 
 mod controls;
 mod dense;
@@ -19,25 +19,26 @@ use driven::Driven;
 use euler::Euler;
 use inverse_dynamics::InverseDynamics;
 
-/// Smallest ndx for which the form of Euler steps is faster than the dense form, as measured by `benches/riccati.rs`.
+/// Smallest ndx for which the form of Euler steps is faster than the dense form, measured with `benches/riccati.rs`.
 const EULER_FROM: usize = 16;
 
-/// Form of a knot. The matrices that it reads and writes belong to the [`Workspace`].
+/// Form of a knot. The matrices that a form reads and writes belong to the [`Workspace`].
 pub(super) trait KnotForm {
     /// Returns the rotation of the n states in H: state i of H is state (i + turn) mod n of x.
     fn turn(&self, n: usize) -> usize;
 
-    /// Writes H, including ϱ, from the knot, from P, and from p at the predicted state.
+    /// Writes H, including the regularisation ϱ, from the knot, from P, and from the gradient p at the predicted state.
     fn write(&mut self, work: &mut Workspace, knot: &LqKnot, regularisation: f64, curvature: &mut Curvature<'_>);
 
-    /// Writes the product of Θ and the map from the unknowns and δx to δx⁺ below H, after `write` has been called. Θ
-    /// has n rows (stride n + SLACK).
+    /// Writes a product to the rows below H, after `write` has been called. The product is Θ times the map from the
+    /// unknowns and δx to δx⁺. Θ has n rows (stride n + SLACK).
     fn write_below(&mut self, work: &mut Workspace, knot: &LqKnot, Theta: &[f64]);
 
-    /// Eliminates the unknowns: H becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated unknowns.
+    /// Eliminates the unknowns from H, which becomes [L ·; X Hₓₓ − X Xᵀ; yᵀ ·]. Returns the number of eliminated
+    /// unknowns.
     ///
     /// # Errors
-    /// The row and its pivot, if the pivot is not positive.
+    /// Index of the row and its pivot, if the pivot is not positive.
     fn eliminate(
         &mut self,
         work: &mut Workspace,
@@ -45,12 +46,12 @@ pub(super) trait KnotForm {
         feedback: &mut KnotFeedback,
     ) -> Result<usize, (usize, f64)>;
 
-    /// Writes the gains of the knot, from the result of `eliminate` in H. If `defers`, a form may instead store the
-    /// factors from which [`Gains::finish`](super::feedback::Gains::finish) computes them.
+    /// Writes the gains of the knot, from the result of `eliminate` in H. If `defers`, a form may store factors
+    /// instead; [`Gains::finish`](super::feedback::Gains::finish) computes the gains from these factors.
     fn write_gains(&mut self, work: &mut Workspace, knot: &LqKnot, feedback: &mut KnotFeedback, defers: bool);
 }
 
-/// Sizes for which the workspace of a sweep is allocated.
+/// Sizes from which a sweep allocates its workspace.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
     /// Number of states.
@@ -62,7 +63,7 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    /// Returns the sizes that a sweep over `knots` needs.
+    /// Returns the sizes for a sweep over `knots`.
     pub(super) fn of(knots: &[LqKnot]) -> Self {
         let (n, m) = (knots.last().map_or(0, LqKnot::ndx), knots.iter().map(LqKnot::nu).max().unwrap_or(0));
         Self { n, m, room: InverseDynamics::room(knots) }
@@ -73,7 +74,7 @@ impl Sizes {
         if self.room[0] > 0 { self.m } else { 0 }
     }
 
-    /// Returns the number of rows that the forms need below H.
+    /// Returns the number of rows below H that the forms need.
     pub(super) fn rows_below(self) -> usize {
         Driven::rows_below(self.n, self.m)
     }
@@ -100,7 +101,7 @@ impl Forms {
         }
     }
 
-    /// Returns the form for a step at a knot, among all forms.
+    /// Returns the form for a step at a knot. All forms are candidates.
     pub(super) fn of_step(&mut self, knot: &LqKnot, regularisation: f64) -> &mut dyn KnotForm {
         match knot.structure.is_inverse_dynamics() && Driven::takes(knot, regularisation) {
             true => &mut self.driven,
@@ -108,7 +109,7 @@ impl Forms {
         }
     }
 
-    /// Returns the form of a knot, among the forms that support rows below H.
+    /// Returns the form of a knot, if rows below H are needed. Only the forms that support such rows are candidates.
     pub(super) fn of(&mut self, knot: &LqKnot) -> &mut dyn KnotForm {
         if knot.structure.is_inverse_dynamics() {
             &mut self.inverse_dynamics
@@ -123,13 +124,14 @@ impl Forms {
 /// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it wrote them.
 pub(super) type CurvatureFn<'a> = dyn FnMut(usize, &[f64], &mut Hessian) -> bool + 'a;
 
-/// Request for the curvature of a knot's dynamics; see [`Sweep::run_with`](crate::Sweep::run_with).
+/// Arguments with which a form obtains the curvature of a knot's dynamics; see
+/// [`Sweep::run_with`](crate::Sweep::run_with).
 pub(super) struct Curvature<'a> {
     /// Index of the knot.
     pub(super) knot: usize,
     /// Function that computes the curvature; `None` if the dynamics count as linear.
     pub(super) ask: Option<&'a mut CurvatureFn<'a>>,
-    /// Storage for the curvature: one Hessian for each number of controls.
+    /// Storage for the curvature: one Hessian for each number of controls that occurs.
     pub(super) hessians: &'a mut [Hessian],
 }
 

@@ -4,13 +4,13 @@ use super::ActionModel;
 use crate::lq::LqKnot;
 use nalgebra::DMatrix;
 
-/// Step h of first differences, about ε^⅓, which balances the truncation error h² and the rounding error ε/h.
+/// Step h of first differences, about ε^⅓. This step balances the truncation error h² and the rounding error ε/h.
 pub(crate) const FIRST: f64 = 6e-6;
 
-/// Step h of second differences, about ε^¼, which balances the truncation error h² and the rounding error ε/h².
+/// Step h of second differences, about ε^¼. This step balances the truncation error h² and the rounding error ε/h².
 pub(crate) const SECOND: f64 = 1.2e-4;
 
-/// Computes the next state and the cost ℓ at (x ⊕ δx, u + δu), with z = (δx, δu).
+/// Computes the next state and the cost ℓ at (x ⊕ δx, u + δu). The argument z contains the changes (δx, δu).
 pub(crate) fn at<A: ActionModel + ?Sized>(
     action: &mut A,
     t: usize,
@@ -26,10 +26,10 @@ pub(crate) fn at<A: ActionModel + ?Sized>(
     action.calc(t, &moved, &u, next)
 }
 
-/// Computes [`calc_diff`](ActionModel::calc_diff) by central differences of [`calc`](ActionModel::calc).
+/// Computes the outputs of [`calc_diff`](ActionModel::calc_diff) by central differences of [`calc`](ActionModel::calc).
 pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
     let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
-    // A terminal action does not write `next`: start from x, which is a valid state on any manifold.
+    // a terminal action does not write the next state: initialise it with x, which is a valid state on any manifold
     let (mut centre, mut plus, mut minus) = (x.to_vec(), x.to_vec(), x.to_vec());
     let (mut up, mut down) = (vec![0.0; ndx], vec![0.0; ndx]);
     let mut z = vec![0.0; ndx + nu];
@@ -42,7 +42,7 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
         z[j] = -FIRST;
         let below = at(action, t, x, u, &z, &mut minus);
         z[j] = 0.0;
-        // ∂x⁺/∂zⱼ = ((x⁺(h) ⊖ x⁺) − (x⁺(−h) ⊖ x⁺)) / 2h,   ∂ℓ/∂zⱼ = (ℓ(h) − ℓ(−h)) / 2h
+        // ∂x⁺/∂zⱼ = ((x⁺(h) ⊖ x⁺) − (x⁺(−h) ⊖ x⁺)) / 2h, ∂ℓ/∂zⱼ = (ℓ(h) − ℓ(−h)) / 2h, with ±h added to zⱼ
         action.difference(&centre, &plus, &mut up);
         action.difference(&centre, &minus, &mut down);
         for i in 0..ndx {
@@ -55,7 +55,7 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
 
     for i in 0..ndx + nu {
         for j in 0..=i {
-            // ∂²ℓ/∂zᵢ∂zⱼ = (ℓ(h, h) − ℓ(h, −h) − ℓ(−h, h) + ℓ(−h, −h)) / 4h²
+            // ∂²ℓ/∂zᵢ∂zⱼ = (ℓ(h, h) − ℓ(h, −h) − ℓ(−h, h) + ℓ(−h, −h)) / 4h², with ±h added to zᵢ and zⱼ
             let mut sum = 0.0;
             for (si, sj) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
                 z[i] += si * SECOND;
@@ -70,8 +70,8 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
     }
 }
 
-/// Writes the second derivative with respect to entries i ≥ j of z = (δx, δu) to its block of the Hessian: xx if both
-/// entries belong to δx, xu if one of them does, else uu.
+/// Writes the second derivative with respect to entries i ≥ j of z = (δx, δu) to its block of the Hessian. The block is
+/// xx if both entries belong to δx, uu if both belong to δu, and xu otherwise.
 pub(crate) fn write_curvature(
     [xx, xu, uu]: [&mut DMatrix<f64>; 3],
     ndx: usize,

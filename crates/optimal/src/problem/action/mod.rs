@@ -1,4 +1,4 @@
-//! Dynamics and cost of one knot.
+//! Action: dynamics and cost of one knot.
 
 pub(crate) mod differences;
 pub(crate) mod quasi_static;
@@ -7,22 +7,23 @@ use super::group::{GroupModel, KnotGroup};
 use crate::lq::{Hessian, LqKnot};
 use std::any::Any;
 
-/// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of the knots t that the action serves.
+/// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of the knots t that use this action.
 ///
-/// Only the sizes and [`calc`](Self::calc) must be written; derivatives by hand are faster than the default ones. Each
-/// knot is given by its index t in the horizon. One model can therefore serve all knots that differ only in a reference
-/// (a foot's path, a tracked posture). An action that computes several knots in one call also implements
-/// [`GroupModel`].
+/// An implementation must write the sizes and [`calc`](Self::calc). It may write [`calc_diff`](Self::calc_diff) as
+/// well, which is faster than the default derivatives. Each method receives the index t of its knot in the horizon. One
+/// model can therefore serve all knots that differ only in a reference (a foot's trajectory, a tracked posture). An
+/// action that computes several knots in one call also implements [`GroupModel`].
 ///
 /// # The terminal knot
-/// A terminal action has nu = 0 and only a cost. It is called like any other action, but its outputs `next` and `A` are
-/// never read and need not be written.
+/// A terminal action has nu = 0 and only a cost. It is called like any other action, but the solver never reads its
+/// outputs `next` and `A`, so it need not write them.
 ///
 /// # Rules for implementations
-/// - The result depends on the arguments only, not on earlier calls.
-/// - Each method writes its outputs completely, whatever they contained, including entries that are always zero.
-/// - No method panics on an extreme state: let the result be infinite or NaN, and the solver tries a shorter step.
-/// - No method allocates, so that a solve does not allocate either.
+/// - The results depend only on the arguments, not on earlier calls.
+/// - Each method writes all entries of its outputs, including entries that are always zero. The outputs may contain any
+///   old values.
+/// - No method panics on an extreme state. The result may be infinite or NaN; the solver then tries a shorter step.
+/// - No method allocates, so that a solve does not allocate.
 ///
 /// # Examples
 /// The double integrator x⁺ = x + Δt (v, u) with the cost ½ Δt (‖x‖² + u²):
@@ -58,89 +59,89 @@ pub trait ActionModel: Any + Send + Sync {
     /// Returns the number of entries of a state x.
     fn nx(&self) -> usize;
 
-    /// Returns the number of entries of a change of state δx; nx unless the state lives on a manifold.
+    /// Returns the number of entries of a change of state δx. The default is nx, for states in a vector space.
     fn ndx(&self) -> usize {
         self.nx()
     }
 
-    /// Returns the number of entries of a control u; zero at a terminal knot and at an impact, where the state only
-    /// jumps.
+    /// Returns the number of entries of a control u. It is zero at a terminal knot and at an impact, where only the
+    /// state jumps.
     fn nu(&self) -> usize;
 
-    /// Returns whether the action has no next state, so that it may only serve the end of a horizon. By default false:
-    /// the action may serve any knot.
+    /// Returns whether the action has no next state. Such an action may serve only the terminal knot. The default is
+    /// false: the action may serve any knot.
     fn is_terminal(&self) -> bool {
         false
     }
 
-    /// Returns the smallest and largest allowed controls of knot t, nu numbers each, infinite for an unbounded control;
-    /// `None` if no control is bounded. The bounds must not change during a solve.
+    /// Returns the lower and upper bounds of the controls of knot t, nu entries each, infinite for an unbounded
+    /// control. Returns `None` if no control is bounded. The bounds must not change during a solve.
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
         None
     }
 
-    /// Returns the wrapped action, if this action wraps another one and adds something to it. Typed access to a robot's
-    /// costs and forces ([`Problem::cost_mut`](crate::Problem::cost_mut), [`Problem::motion`](crate::Problem::motion))
-    /// looks inside the wrapped action. `None` by default.
+    /// Returns the wrapped action, if this action adds something to another one that it wraps. Typed access to a
+    /// robot's costs and forces ([`Problem::cost_mut`](crate::Problem::cost_mut),
+    /// [`Problem::motion`](crate::Problem::motion)) uses the wrapped action. The default is `None`.
     fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
         None
     }
 
-    /// Computes x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
+    /// Computes the next state x⁺ = φₜ(x, u) into `next` (nx), and returns the cost ℓₜ(x, u).
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64;
 
-    /// Computes the derivatives of dynamics and cost at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B =
-    /// ∂x⁺/∂u, q = ∂ℓ/∂x, r = ∂ℓ/∂u, and Q, S, R. These are the blocks of the Hessian of ℓ, or of its Gauss–Newton
+    /// Computes the derivatives of dynamics and cost at (x, u), in the tangent space of the state. They are A = ∂x⁺/∂x,
+    /// B = ∂x⁺/∂u, q = ∂ℓ/∂x, r = ∂ℓ/∂u, and the blocks Q, S, R of the Hessian of ℓ or of its Gauss–Newton
     /// approximation. The solver writes the gap f.
     ///
     /// The default takes central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff) does. Differences
-    /// are slow, allocate, and are accurate to about 1e-9 (the Hessian to 1e-7). [`AutoDiff`](crate::AutoDiff) computes
-    /// exact derivatives of functions that are written for any scalar.
+    /// are slow and allocate. Their first derivatives are accurate to about 1e-9, their Hessian to about 1e-7.
+    /// [`AutoDiff`](crate::AutoDiff) computes exact derivatives of functions that are generic over the scalar type.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
         differences::calc_diff(self, t, x, u, knot);
     }
 
     /// Computes the second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for
-    /// `lambda` of length ndx. Returns whether it computed them. If not, the dynamics count as linear around each
-    /// iterate (Gauss–Newton). Without [`second_order`](crate::Settings::second_order), the dynamics always count as
-    /// linear.
+    /// `lambda` of length ndx. Returns whether they were computed. If not, the dynamics count as linear around each
+    /// iterate (Gauss–Newton). Without [`second_order`](crate::Settings::second_order), this method is not called and
+    /// the dynamics count as linear.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let _ = (t, x, u, lambda, hessian);
         false
     }
 
-    /// Returns this action as a [`GroupModel`], if it is one; `None` by default.
+    /// Returns this action as a [`GroupModel`], if its type implements that trait; `None` by default.
     fn group_model(&mut self) -> Option<&mut dyn GroupModel> {
         None
     }
 
-    /// Returns this action as a group of knots of this crate, if it is one.
+    /// Returns this action as a `KnotGroup`, a trait that only actions of this crate implement; `None` by default.
     #[doc(hidden)]
     fn knot_group(&self) -> Option<&dyn KnotGroup> {
         None
     }
 
-    /// Returns the same group as [`knot_group`](Self::knot_group), mutable for computing.
+    /// Returns the same group as [`knot_group`](Self::knot_group), as a mutable reference.
     #[doc(hidden)]
     fn knot_group_mut(&mut self) -> Option<&mut dyn KnotGroup> {
         None
     }
 
-    /// Returns the controls that hold the state x of knot t still, if the state can stand still: φ(x, u) = x, as nearly
-    /// as controls can reach. The default makes at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as Crocoddyl does.
-    /// The controls of a robot are computed by statics. Allocates.
+    /// Returns the controls that hold the state x of knot t still: φ(x, u) = x, as nearly as controls can achieve. The
+    /// default makes at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as Crocoddyl does. A robot's action computes
+    /// them by statics. Allocates.
     fn quasi_static(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
         quasi_static::newton(self, t, x)
     }
 
-    /// Notifies the action that the horizon has [moved](crate::Problem::shift) by one knot: data of knot t now belong
-    /// to knot t − 1. Does nothing by default. Must not allocate.
+    /// Notifies the action that the horizon has [moved](crate::Problem::shift) by one knot: the data of knot t now
+    /// belong to knot t − 1. Does nothing by default. Must not allocate.
     fn shift(&mut self) {}
 
-    /// Returns a copy that computes the same results, for another thread or another problem; `None` by default. An
-    /// action without a copy is differentiated on one thread, whatever the setting
-    /// [`threads`](crate::Settings::threads). A problem with such an action cannot be copied
+    /// Returns a copy that computes the same results, for another thread or another problem; `None` by default. Without
+    /// a copy, the derivatives of the action are computed on one thread, whatever the setting
+    /// [`threads`](crate::Settings::threads). Without a copy, a problem with this action cannot be copied either
     /// ([`Problem::try_clone`](crate::Problem::try_clone)).
     fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         None
@@ -150,7 +151,7 @@ pub trait ActionModel: Any + Send + Sync {
     /// initial state, and a solver checks the states of its warm start.
     ///
     /// # Errors
-    /// A text about the fault of an invalid state, with the numbers.
+    /// A text that describes the fault of an invalid state and contains the invalid numbers.
     fn check_state(&self, x: &[f64]) -> Result<(), String> {
         let _ = x;
         Ok(())

@@ -1,15 +1,15 @@
 //! Controls that hold a state still, computed by Newton steps.
-#![allow(non_snake_case)] // B
+#![allow(non_snake_case)] // names follow the literature: B
 
 use super::ActionModel;
 use crate::lq::LqKnot;
 use nalgebra::DVector;
 
-/// Maximum number of steps, and largest change of the state that counts as standing still.
+/// Maximum number of Newton steps; the next constant is the largest change of a state that counts as still.
 const MOST: usize = 100;
 const STILL: f64 = 1e-9;
 
-/// Computes [`quasi_static`](ActionModel::quasi_static) of any action by Newton steps.
+/// Computes the controls of [`quasi_static`](ActionModel::quasi_static) for any action, by Newton steps.
 pub(crate) fn newton<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64]) -> Vec<f64> {
     let (ndx, nu) = (action.ndx(), action.nu());
     let (mut u, mut next, mut change) = (vec![0.0; nu], x.to_vec(), DVector::zeros(ndx));
@@ -18,7 +18,7 @@ pub(crate) fn newton<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64
         action.calc(t, x, &u, &mut next);
         action.difference(x, &next, change.as_mut_slice());
         action.calc_diff(t, x, &u, &mut knot);
-        // the singular value decomposition of a matrix that is not finite would not terminate
+        // stops here, because the singular value decomposition of a matrix that is not finite would not terminate
         if !(knot.B.iter().chain(&change).all(|x| x.is_finite())) {
             break;
         }

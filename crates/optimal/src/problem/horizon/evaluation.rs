@@ -10,8 +10,8 @@ use crate::problem::threads::Knots;
 use std::ops::{ControlFlow, Range};
 
 impl Problem {
-    /// Returns the states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates
-    /// the states.
+    /// Returns the states x₀ … x_N that follow from x̂₀ under the controls `us`. They are a warm start without gaps.
+    /// Allocates the states.
     ///
     /// # Errors
     /// [`Error`] if `us` has a wrong length or an entry that is not finite, or if a state becomes infinite.
@@ -19,11 +19,11 @@ impl Problem {
         self.rollout_while(us, || ControlFlow::Continue(()))
     }
 
-    /// Computes as [`rollout`](Self::rollout) does. At each knot, calls `go_on`, which returns whether to continue. The
-    /// states of knots that were not reached are zeros.
+    /// Computes the states as [`rollout`](Self::rollout) does. `go_on` is called at each knot and returns whether to
+    /// continue. The states of knots that were not reached are zeros.
     ///
     /// # Errors
-    /// As [`rollout`](Self::rollout).
+    /// The same errors as [`rollout`](Self::rollout).
     #[doc(hidden)]
     pub fn rollout_while(&mut self, us: &[f64], mut go_on: impl FnMut() -> ControlFlow<()>) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
@@ -41,8 +41,8 @@ impl Problem {
         Ok(xs)
     }
 
-    /// Computes the next states φₜ(xₜ, uₜ) into `next` (N·nx) and the costs ℓₜ(xₜ, uₜ) into `costs` (N + 1, the
-    /// terminal one last), for all knots of a trajectory. Allocates nothing.
+    /// Computes the next states and the costs of all knots of a trajectory. `next` (N·nx) receives φₜ(xₜ, uₜ). `costs`
+    /// (N + 1, the terminal cost last) receives ℓₜ(xₜ, uₜ). Allocates nothing.
     ///
     /// # Panics
     /// If a length is wrong.
@@ -51,8 +51,8 @@ impl Problem {
         self.calc_with_motions(xs, us, next, costs, &mut []);
     }
 
-    /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`. This consists of N
-    /// equal parts, which are empty or have [`motion_size`](Self::motion_size) numbers each.
+    /// Computes as [`calc`](Self::calc) does, and also writes the motion of each knot to `motions`. `motions` is empty,
+    /// or consists of N equal parts of [`motion_size`](Self::motion_size) entries.
     #[track_caller]
     pub(crate) fn calc_with_motions(
         &mut self,
@@ -79,7 +79,7 @@ impl Problem {
         evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Values, &mut results);
     }
 
-    /// Computes the derivatives at all knots of a trajectory into `lq_knots` (N + 1, the terminal one last). Allocates
+    /// Computes the derivatives at all knots of a trajectory into `lq_knots` (N + 1, the terminal knot last). Allocates
     /// nothing.
     ///
     /// # Panics
@@ -89,7 +89,7 @@ impl Problem {
         self.calc_diff_as(Evaluation::Derivatives, xs, us, lq_knots);
     }
 
-    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics where knots
+    /// Computes derivatives as [`calc_diff`](Self::calc_diff) does, or equations of inverse dynamics at knots that
     /// support them.
     #[track_caller]
     pub(crate) fn calc_diff_as(&mut self, what: Evaluation<'_>, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
@@ -105,10 +105,11 @@ impl Problem {
         evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Derivatives, &mut results);
     }
 
-    /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool in which it is called,
-    /// or else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
-    /// group (model, first index, knots, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
-    /// are written afterwards. Models that cannot be [copied](ActionModel::try_clone) are evaluated on the calling
+    /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool from which it is
+    /// called, or else of the global pool. The result is the same to the last bit. `sweep` is called on the calling
+    /// thread for each finished group, from the end of the horizon to its beginning. Its arguments are the model, the
+    /// index of the first knot, the knots, and the part of `found` for these knots. Deferred gains are written after
+    /// the sweep of their group. Models that cannot be [copied](ActionModel::try_clone) are evaluated on the calling
     /// thread.
     ///
     /// # Panics
@@ -139,7 +140,7 @@ impl Problem {
         self.copies.share_multipliers(&mut self.models.actions, &self.runs);
     }
 
-    /// Checks the lengths, and resets the structures of A and B, which the actions set again.
+    /// Checks the lengths, and clears the structures of A and B, which the actions then set again.
     #[track_caller]
     fn begin_derivatives(&self, xs: &[f64], us: &[f64], lq_knots: &mut [LqKnot]) {
         self.assert_trajectory(xs, us);
@@ -150,8 +151,8 @@ impl Problem {
         }
     }
 
-    /// Returns for each knot the controls that hold its state still, as far as that is possible: see
-    /// [`quasi_static`](ActionModel::quasi_static). Each knot is treated alone. Allocates.
+    /// Returns for each knot the controls that hold its state still, as nearly as controls can achieve: see
+    /// [`quasi_static`](ActionModel::quasi_static). Each knot is computed independently of the others. Allocates.
     ///
     /// # Errors
     /// [`Error`] if the length of `xs` is not (N + 1)·nx, or an entry is not finite.
@@ -164,10 +165,10 @@ impl Problem {
         Ok(us)
     }
 
-    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute at (x, u) besides the next
-    /// state. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of each
-    /// contact. The force of a contact is expressed in the axes of the contact's rows; at an impact it is an impulse.
-    /// User-defined accelerations have `acceleration`; other actions have no such vectors.
+    /// Calls `show` for each vector that the dynamics of knot t compute at (x, u) in addition to the next state, with
+    /// its name. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of
+    /// each contact. The force of a contact is expressed in the axes of the contact's rows; at an impact it is an
+    /// impulse. User-defined accelerations have the vector `acceleration`; other actions have no such vectors.
     ///
     /// # Panics
     /// If t > N or a length is wrong.
@@ -180,7 +181,7 @@ impl Problem {
         }
     }
 
-    /// Returns the ranges of the states and controls of a run of knots in flat trajectories.
+    /// Returns the index ranges of the states and of the controls of a run of knots, in flat trajectories.
     fn places(&self, knots: &Range<usize>) -> (Range<usize>, Range<usize>) {
         let Shape { nx, offsets, .. } = &self.shape;
         (knots.start * nx..knots.end * nx, offsets[knots.start]..offsets[knots.end])

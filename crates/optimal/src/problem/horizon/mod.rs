@@ -20,12 +20,12 @@ use std::ops::Range;
 /// ```
 ///
 /// A problem contains action models, and for each knot the index of its model. Consecutive knots with the same model
-/// are evaluated as one group. This includes models of a robot that differ only in costs, references and weights, so
-/// one action per knot costs no more than one action for all knots. All models share nx and ndx; nu may differ from
-/// model to model.
+/// are evaluated as one group. Models of a robot that differ only in costs, references and weights belong to the same
+/// group. One model per knot therefore takes no more time than one model for all knots. All models have the same nx and
+/// ndx; nu may differ from model to model.
 ///
-/// Trajectories are flat: `xs` contains x₀ … x_N one after the other, (N + 1)·nx numbers. `us` contains u₀ … u_{N−1},
-/// each with the nu of its knot.
+/// Trajectories are flat: `xs` contains x₀ … x_N one after the other, (N + 1)·nx entries. `us` contains u₀ … u_{N−1},
+/// each with the nu entries of its knot.
 ///
 /// # Examples
 /// ```
@@ -61,27 +61,27 @@ pub struct Problem {
     knot_models: Vec<usize>,
     terminal: Box<dyn ActionModel>,
     shape: Shape,
-    /// Maximal runs of knots with one action: (action, knots).
+    /// Runs of consecutive knots with the same action, as long as possible: (index of the action, knots).
     runs: Vec<(usize, Range<usize>)>,
-    /// Indices 0, 1, …, N; the knots of a group are a slice of this vector.
+    /// Indices 0, 1, …, N of the knots. A group passes a slice of this vector as its indices.
     knots: Vec<usize>,
     /// Copies of the models, for other threads.
     copies: Copies,
-    /// Output buffer for the next state of the terminal action.
+    /// Output buffer for the next state of the terminal action, which is never read.
     unread: Vec<f64>,
 }
 
 impl Problem {
-    /// Creates a problem that starts at x̂₀. Knot t is served by `models[knot_models[t]]`, t = 0 … N − 1, and the
-    /// terminal knot by `terminal`.
+    /// Creates a problem that starts at x̂₀. Knot t has the model `models[knot_models[t]]`, t = 0 … N − 1, and the
+    /// terminal knot has the model `terminal`.
     ///
     /// # Errors
     /// [`Error`] if
-    /// - the horizon or the state is empty, an index has no model, or nx or ndx differ,
+    /// - the horizon or the state is empty, an index in `knot_models` has no model, or nx or ndx differ between models,
     /// - the terminal model has controls, or a model that has [no next state](ActionModel::is_terminal) serves a knot,
     /// - x̂₀ has a wrong length, has an entry that is not finite, or is an invalid state,
     /// - a state or the controls of a knot have more than 4096 entries, or
-    /// - there are more than 2²⁰ knots, or 2²⁸ numbers in the matrices \[A B\] of all knots.
+    /// - there are more than 2²⁰ knots, or the matrices \[A B\] of all knots have more than 2²⁸ entries.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -101,7 +101,8 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Computes the offsets of the controls, and the runs of knots with one action, from `knot_models`.
+    /// Computes the offsets of the controls, and the runs of consecutive knots with the same action, from
+    /// `knot_models`.
     fn arrange(&mut self) {
         let Self { models, knot_models, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
@@ -121,16 +122,16 @@ impl Problem {
         }
     }
 
-    /// Moves the horizon by one knot, as an MPC does after each step. Knot t becomes knot t − 1 and keeps the costs and
-    /// limits that belong to this single knot. The new last knot is served by the model `last`, with the costs that
-    /// this model has for all knots. The models are [notified](ActionModel::shift), and are assigned their knots by the
-    /// new indices. Allocates nothing.
+    /// Moves the horizon by one knot, as model predictive control (MPC) does after each step. Knot t becomes knot t − 1
+    /// and keeps the costs and limits that belong to this single knot. The new last knot has the model `last`, with the
+    /// costs that this model has for all knots. The models are [notified](ActionModel::shift) of the shift and of the
+    /// new indices of their knots. Allocates nothing.
     ///
-    /// [`Fddp::shift`](crate::Fddp::shift) moves the solver's trajectory accordingly.
+    /// The solver's trajectory is moved by [`Fddp::shift`](crate::Fddp::shift).
     ///
     /// # Errors
-    /// [`Error::UnknownModel`] if the model does not exist, [`Error::NoNextState`] if the model is only made for the
-    /// terminal knot; the problem is then unchanged.
+    /// [`Error::UnknownModel`] if the model does not exist, [`Error::NoNextState`] if the model may serve only the
+    /// terminal knot. The problem is then unchanged.
     pub fn shift(&mut self, last: usize) -> Result<(), Error> {
         let horizon = self.horizon();
         if last >= self.models.len() {
@@ -147,11 +148,12 @@ impl Problem {
         Ok(())
     }
 
-    /// Replaces the model of knot t, as an MPC does when a contact begins earlier than planned. The solver needs no
-    /// other changes, and its next iterations do not allocate. This function allocates. A model that an earlier call
-    /// gave to knot t is dropped. The models given to [`new`](Self::new) are kept for [`shift`](Self::shift).
+    /// Replaces the model of knot t, as model predictive control does when a contact begins earlier than planned. The
+    /// solver can continue without changes, and its next iterations do not allocate. This function allocates. If an
+    /// earlier call gave a model to knot t, that model is dropped. The models given to [`new`](Self::new) are kept for
+    /// [`shift`](Self::shift).
     ///
-    /// Costs and limits that the model has for a single knot keep the index of that knot.
+    /// If the model has costs and limits for a single knot, these keep the index of that knot.
     ///
     /// # Errors
     /// [`Error::Dimension`] if nx, ndx or nu differ from the sizes of the old model, [`Error::NoNextState`] for a
@@ -180,7 +182,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Sets the duration Δt (s) of knot t, whose model keeps its duration at all other knots. The solver's next
+    /// Sets the duration Δt (s) of knot t. The model of knot t keeps its duration at all other knots. The solver's next
     /// iterations do not allocate.
     ///
     /// # Errors
@@ -202,13 +204,13 @@ impl Problem {
         }
     }
 
-    /// Returns the index of the model of each knot. Models that [`set_knot`](Self::set_knot) added have the indices
-    /// after the models with which the problem was created.
+    /// Returns the index of the model of each knot. Models added by [`set_knot`](Self::set_knot) have the indices after
+    /// the models with which the problem was created.
     pub fn knot_models(&self) -> &[usize] {
         &self.knot_models
     }
 
-    /// Returns the number of knots before the terminal one, N.
+    /// Returns the number N of knots before the terminal one.
     pub fn horizon(&self) -> usize {
         self.knot_models.len()
     }
@@ -233,7 +235,7 @@ impl Problem {
         self.shape.nu(t)
     }
 
-    /// Returns the range of uₜ in the flat controls.
+    /// Returns the index range of uₜ in the flat controls.
     ///
     /// # Panics
     /// If t > N.
@@ -248,7 +250,7 @@ impl Problem {
         &self.x0
     }
 
-    /// Sets the initial state, as an MPC does before each solve.
+    /// Sets the initial state, as model predictive control does before each solve.
     ///
     /// # Errors
     /// [`Error`] if the length of `x0` is not nx, an entry is not finite, or the state is invalid; the old state is
@@ -260,15 +262,15 @@ impl Problem {
         Ok(())
     }
 
-    /// Returns the action model `index` as a `T`, if it exists and has that type, so that a reference can be changed
-    /// between solves. The dimensions of the model must not change. If one action represents several models, only this
-    /// model is changed.
+    /// Returns the action model `index` as a `T`, so that a reference can be changed between solves. Returns `None` if
+    /// the model does not exist or has another type. The dimensions of the model must not change. If one action
+    /// represents several models, only this model is changed.
     pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
         let model: &mut dyn Any = self.chosen(index)?;
         model.downcast_mut()
     }
 
-    /// Returns the action that represents model `index`, with this model selected for changes.
+    /// Returns the action that represents model `index`. Later changes of the action affect only this model.
     pub(crate) fn chosen(&mut self, index: usize) -> Option<&mut dyn ActionModel> {
         if index < self.models.len() {
             self.copies.forget(self.models.place(index)[0]);
@@ -281,13 +283,13 @@ impl Problem {
         self.models.len()
     }
 
-    /// Copies the problem, with all current costs, limits, references and weights, so that another thread can solve it.
-    /// The robot's [`Model`](condyle_dynamics::Model) and user-defined functions are shared. Allocates.
+    /// Copies the problem, with all current costs, limits, references and weights, so that another thread can solve the
+    /// copy. The copies share the robot's [`Model`](condyle_dynamics::Model) and the user-defined functions. Allocates.
     ///
-    /// A problem is not [`Clone`]: a user-defined action can be copied only if its
+    /// A problem does not implement [`Clone`], because a user-defined action can be copied only if its
     /// [`try_clone`](ActionModel::try_clone) returns a copy. All actions of this crate can be copied, except
     /// [`NumDiff`](crate::NumDiff). [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied
-    /// if the actions and constraints in them can.
+    /// if the actions and constraints in them can be copied.
     ///
     /// # Errors
     /// [`Error::NoCopy`] for an action that cannot be copied.
@@ -296,7 +298,7 @@ impl Problem {
         let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
         let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
         reserve(&mut *terminal);
-        let mut runs = Vec::with_capacity(knot_models.len()); // a shift may need this capacity
+        let mut runs = Vec::with_capacity(knot_models.len()); // `shift` may need this capacity and must not allocate
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
         Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread })
@@ -308,7 +310,7 @@ impl Problem {
         model.downcast_mut()
     }
 
-    /// Computes x₁ ⊖ x₀ of two states into `out` (ndx).
+    /// Computes the difference x₁ ⊖ x₀ of two states into `out` (ndx).
     ///
     /// # Panics
     /// If a length is wrong.
@@ -327,18 +329,19 @@ impl Problem {
         (0..=self.horizon()).map(|t| LqKnot::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
-    /// Returns the maximum number of entries of a knot's motion that a rollout stores for the derivatives.
+    /// Returns the maximum length of a knot's motion: the accelerations and forces that a rollout stores for the
+    /// derivatives.
     pub(crate) fn motion_size(&self) -> usize {
         self.inverse_dynamics().map(|(size, _)| size).max().unwrap_or(0)
     }
 
-    /// Returns the sizes of the equations of inverse dynamics of all actions that support them.
+    /// Returns the sizes of the equations of inverse dynamics, for all actions that support these equations.
     fn inverse_dynamics(&self) -> impl Iterator<Item = (usize, [usize; 2])> {
         self.models.actions.iter().filter_map(|action| action.knot_group()?.inverse_dynamics())
     }
 
-    /// Allocates memory in LQ knots for the equations of inverse dynamics; it suffices for any order of the actions in
-    /// the horizon. Returns whether an action supports these equations.
+    /// Allocates memory in LQ knots for the equations of inverse dynamics. The memory suffices for any order of the
+    /// actions in the horizon. Returns whether an action supports these equations.
     pub(crate) fn reserve_inverse_dynamics(&self, lq_knots: &mut [LqKnot]) -> bool {
         let sizes = self.inverse_dynamics().map(|(_, sizes)| sizes);
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
@@ -359,7 +362,7 @@ impl Problem {
         self.knot_models.get(t).map_or(&*self.terminal, |&model| self.models.of(model))
     }
 
-    /// Returns the model of knot t, mutable for computing.
+    /// Returns the model of knot t, as a mutable reference for evaluations.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         self.knot_models.get(t).map_or(&mut *self.terminal, |&model| self.models.of_mut(model))
     }
@@ -371,8 +374,9 @@ impl Problem {
         ActionView { x0, knot_models, places, actions: Actions::Own(actions, &mut **terminal) }
     }
 
-    /// Returns the actions of all knots, and copies of all actions but the terminal one, which compute the same results
-    /// on another thread. Returns `None` if an action cannot be copied, or no copies exist yet.
+    /// Returns two views of the actions, for two threads: the actions of all knots, and copies of all actions except
+    /// the terminal one. The copies compute the same results. Returns `None` if an action cannot be copied, or no
+    /// copies exist yet.
     pub(crate) fn two(&mut self) -> Option<[ActionView<'_>; 2]> {
         let Self { x0, models, knot_models, terminal, copies, .. } = self;
         let copies = copies.first().filter(|copies| copies.iter().all(Option::is_some))?;
@@ -381,7 +385,7 @@ impl Problem {
         Some([with(Actions::Own(actions, &mut **terminal)), with(Actions::Copied(copies))])
     }
 
-    /// Returns whether some knot's controls are bounded.
+    /// Returns whether the controls of any knot are bounded.
     ///
     /// # Errors
     /// [`Error`] if the bounds of a knot have a wrong length or no control satisfies them.
@@ -396,7 +400,7 @@ impl Problem {
                 }
             }
             for (control, (&lower, &upper)) in lower.iter().zip(upper).enumerate() {
-                // written so that NaN is an error
+                // the negated condition is true for NaN, so NaN is an error
                 if !(lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY) {
                     return Err(Error::Bounds { knot, control, lower, upper });
                 }
@@ -406,7 +410,7 @@ impl Problem {
         Ok(bounded)
     }
 
-    /// Returns the largest number of lanes of all models.
+    /// Returns the largest number of lanes among all models.
     pub(crate) fn lanes(&self) -> usize {
         self.models.lanes.iter().copied().max().unwrap_or(1)
     }

@@ -1,4 +1,4 @@
-//! Accelerations of a robot, and the methods that all kinds of a robot's knots share.
+//! Accelerations of a robot, and the methods that a robot's knots have for all kinds of dynamics.
 
 use super::batch::Group;
 use super::robot::RobotDynamics;
@@ -31,7 +31,7 @@ pub struct RobotAcceleration<K> {
 /// Kind of a robot's dynamics.
 pub trait RobotKind: Clone + Debug + Send + Sync + 'static {}
 
-/// Defines kinds of a robot's dynamics.
+/// Defines the types of the kinds of a robot's dynamics.
 macro_rules! kinds {
     ($($(#[$doc:meta])+ $kind:ident;)+) => {$(
         $(#[$doc])+
@@ -42,27 +42,27 @@ macro_rules! kinds {
     )+};
 }
 kinds! {
-    /// Robot that moves freely.
+    /// Kind of a robot that moves freely.
     Free;
-    /// Robot in contact.
+    /// Kind of a robot in contact.
     InContact;
-    /// Robot whose controls are its accelerations.
+    /// Kind of a robot whose controls are its accelerations.
     Controlled;
-    /// Robot in contact whose controls are its accelerations and contact forces.
+    /// Kind of a robot in contact whose controls are its accelerations and contact forces.
     ControlledInContact;
-    /// Robot at an impact.
+    /// Kind of a robot at an impact.
     InImpact;
 }
 
 impl<K> RobotAcceleration<K> {
-    /// Wraps a robot's dynamics, which must be of the kind `K`.
+    /// Wraps the dynamics of a robot. Their kind must be `K`.
     pub(super) fn of(robot: RobotDynamics) -> Self {
         Self { robot, kind: PhantomData }
     }
 }
 
 impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
-    /// Returns the costs and limits.
+    /// Returns the costs and limits of all knots.
     pub(crate) fn terms_mut(&mut self) -> &mut HorizonTerms {
         &mut self.inner_mut().robot.terms
     }
@@ -72,7 +72,8 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         &self.inner().robot.model
     }
 
-    /// Returns the common costs of all knots without separate costs, to change weights and targets between solves.
+    /// Returns the common costs of all knots without separate costs. Their weights and targets may be changed between
+    /// solves.
     pub fn costs_mut(&mut self) -> &mut Costs {
         self.terms_mut().costs_mut(None)
     }
@@ -90,19 +91,19 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         self.terms_mut().set_weight(name, weight)
     }
 
-    /// Sets separate costs for knot t of the horizon, so that one action can have a different target at each knot. When
+    /// Sets separate costs for knot t of the horizon. One action can thus have a different target at each knot. When
     /// the horizon is [shifted](crate::Problem::shift), the costs move with their knot. Allocates.
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit; [`Error::Size`] for a knot beyond 2²⁰.
+    /// [`Error::Cost`] for a cost term that does not fit the robot; [`Error::Size`] for a knot beyond 2²⁰.
     pub fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<(), Error> {
         self.terms_mut().set_costs(t, costs)
     }
 
-    /// Returns the same action with common limits for all knots without separate limits.
+    /// Returns the same action with common limits for all knots that have no separate limits.
     ///
     /// # Errors
-    /// [`Error::Limit`] for a limit that does not fit.
+    /// [`Error::Limit`] for a limit that does not fit the robot.
     pub fn with_limits(mut self, limits: Vec<Limit>) -> Result<Self, Error> {
         self.terms_mut().set_limits(None, limits)?;
         Ok(self)
@@ -112,17 +113,17 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
     /// with their knot. Allocates.
     ///
     /// # Errors
-    /// [`Error::Limit`] for a limit that does not fit; [`Error::Size`] for a knot beyond 2²⁰.
+    /// [`Error::Limit`] for a limit that does not fit the robot; [`Error::Size`] for a knot beyond 2²⁰.
     pub fn set_limits(&mut self, t: usize, limits: Vec<Limit>) -> Result<(), Error> {
         self.terms_mut().set_limits(Some(t), limits)
     }
 
-    /// Returns the smallest controls u that hold the robot still at the state `x`, as nearly as possible. With
-    /// contacts, u and the contact forces λ are computed together: (u, λ) = [S Jᵀ]⁺ g(q). Controls that are
-    /// accelerations are zero; if contact forces are controls too, the result is zeros, then λ. Allocates.
+    /// Returns the controls u of smallest norm that hold the robot still at the state `x`, as nearly as possible. With
+    /// contacts, u and the contact forces λ are computed together: (u, λ) = [S Jᵀ]⁺ g(q). If accelerations are
+    /// controls, they are zero; if contact forces are also controls, the result is these zeros, then λ. Allocates.
     ///
     /// # Panics
-    /// If `x` does not have nq + nv numbers.
+    /// If `x` does not have nq + nv entries.
     #[track_caller]
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         self.inner_mut().robot.quasi_static(x)

@@ -1,10 +1,9 @@
-//! Dynamics of one knot, or of several knots in the lanes of a vector register, with the quantities that residuals
-//! read.
+//! Dynamics of one knot, or of several knots in the lanes of a SIMD register, with the quantities that residuals read.
 //!
-//! The coordinates of knots are packed so that each number has a lane for each knot; the passes of dynamics then run
-//! once for all these knots. The results are unpacked into the data of each knot, because costs and the sweep process
-//! one knot after the other.
-#![allow(non_snake_case)] // J, M
+//! The coordinates of the knots are packed: each scalar has one lane per knot. The passes of the dynamics then run once
+//! for all these knots. The results are unpacked into the data of each knot, because costs and the sweep process knot
+//! by knot.
+#![allow(non_snake_case)] // names follow the literature: J, M
 
 use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
@@ -28,14 +27,14 @@ use condyle_spatial::{Matrix, matrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Equations that determine the accelerations.
+/// Kind of dynamics: the equations that determine the accelerations.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum DynamicsKind {
-    /// No accelerations: a terminal knot.
+    /// Terminal knot, without accelerations.
     None,
     /// Free motion, q̈ = M⁻¹ (τ − h).
     Free,
-    /// Motion in contact, M q̈ + h = τ + Jᵀλ and J q̈ + γ = 0: contacts and the damping μ.
+    /// Motion in contact, M q̈ + h = τ + Jᵀλ and J q̈ + γ = 0. Fields: the contacts, and the damping μ.
     Contact(Vec<Contact>, f64),
     /// Impact, v⁺ − v = −M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v.
     Impact {
@@ -47,32 +46,32 @@ pub(crate) enum DynamicsKind {
     },
     /// Inverse dynamics of free motion: the controls are q̈ = u; the efforts are τ = M q̈ + h.
     Inverse,
-    /// Inverse dynamics in contact: the controls are (q̈, λ) = u; the efforts are τ = M q̈ + h − Jᵀλ. Fields: contacts
-    /// and actuation.
+    /// Inverse dynamics in contact: the controls are (q̈, λ) = u; the efforts are τ = M q̈ + h − Jᵀλ. Fields: the
+    /// contacts, and the actuation.
     ContactInverse(Vec<Contact>, Actuation),
 }
 
-/// Knots with their states and controls, and the quantities that are computed for these knots.
+/// Group of knots with their states and controls, and the kind of quantities to compute for them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Group<'a> {
     /// Indices of the knots.
     pub knots: &'a [usize],
-    /// States of the knots, one after the other; `us` has the controls of the knots.
+    /// States of the knots, one after the other; the next field contains the controls of the knots.
     pub xs: &'a [f64],
     pub us: &'a [f64],
     pub what: Evaluation<'a>,
-    /// Whether limits count; they do not at later stages of an integration step.
+    /// Whether limits are evaluated, as at the first stage of an integration step.
     pub limited: bool,
 }
 
 impl<'a> Group<'a> {
-    /// Returns the group of one knot.
+    /// Returns the group that consists of one knot.
     pub(crate) fn one(input: &'a KnotInput<'a>, what: Evaluation<'a>, limited: bool) -> Self {
         Self { knots: core::slice::from_ref(&input.t), xs: input.x, us: input.u, what, limited }
     }
 }
 
-/// Kind of dynamics with its workspace.
+/// Workspace of each kind of dynamics.
 #[derive(Debug)]
 pub(crate) enum Pass<S> {
     None,
@@ -93,17 +92,17 @@ pub(crate) struct KnotBatch<S> {
     residuals: ResidualKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
-    /// Output that the controls drive: the efforts τ, or the accelerations q̈ if accelerations are controls.
+    /// Quantity that the controls drive: the efforts τ, or the accelerations q̈ if accelerations are controls.
     tau: Vec<S>,
     a: Vec<S>,
     lambda: Vec<S>,
     linear: LinearEquations<S>,
-    /// Whether the last pass was computed at the position `q`.
+    /// Whether the last kinematic pass was computed at the position `q`.
     visited: bool,
 }
 
 impl<S: Block<Number = f64>> KnotBatch<S> {
-    /// Allocates the workspace for a robot; the contacts of `kind` have been checked before.
+    /// Allocates the workspace for a robot. The contacts of `kind` must have been checked before.
     #[inline(never)]
     pub(crate) fn new(model: &Model, kind: &DynamicsKind) -> Self {
         let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
@@ -135,9 +134,9 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.linear = LinearEquations::new(tableau, eliminations);
     }
 
-    /// Computes the dynamics of the knots of `group` from the efforts or accelerations in the data of each knot. Also
-    /// computes the quantities that residuals read, at the knots whose residuals differ from the first knot's only in
-    /// targets.
+    /// Computes the dynamics of the knots of `group`, from the efforts or accelerations in the data of each knot. Also
+    /// computes the quantities that residuals read. This is limited to knots whose residuals differ only in their
+    /// targets from the residuals of the first knot.
     pub(crate) fn run(&mut self, model: &Model, group: Group<'_>, terms: &HorizonTerms, to: &mut [KnotData]) {
         self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
@@ -156,7 +155,8 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = false;
     }
 
-    /// Computes accelerations and forces, and their derivatives; derivatives of forces only if a residual needs them.
+    /// Computes accelerations and forces, and if requested their derivatives. Derivatives of forces are computed only
+    /// if `forces` is set.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
         let Self { data, pass, q, v, tau, a, lambda, .. } = self;
         match pass {
@@ -214,15 +214,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// Computes the equations of motion of the knots at the states `xs`, for the accelerations and forces in the data
+    /// Computes the equations of motion of the knots at the states `xs`. The accelerations and forces are in the data
     /// of each knot.
     pub(crate) fn run_equations_at(&mut self, model: &Model, xs: &[f64], to: &mut [KnotData]) {
         self.pack(model, xs, to);
         self.run_equations(model, to);
     }
 
-    /// Computes the equations that the known accelerations and forces satisfy, and eliminates the limbs and the base
-    /// from them.
+    /// Computes the equations of motion at the known accelerations and forces, and eliminates the limbs and the base
+    /// from the equations.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
         let Self { data, pass, q, v, a, lambda, linear, .. } = self;
         pack(to.len(), |k| &to[k].a, a);
@@ -260,8 +260,8 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.run_residuals(model, group, terms, to);
     }
 
-    /// Computes the quantities that residuals read, at the knots whose residuals differ from the first knot's only in
-    /// targets.
+    /// Computes the quantities that residuals read, at the knots whose residuals differ only in their targets from the
+    /// residuals of the first knot.
     fn run_residuals(
         &mut self,
         model: &Model,
@@ -293,16 +293,16 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     }
 }
 
-/// Linear equations of several knots, with one lane for each knot.
+/// Linear equations of motion of several knots, with one lane for each knot.
 #[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
-    /// Eliminations in order: first of the limbs, then of the base.
+    /// Eliminations in their order: of the limbs, then of the base.
     eliminations: Vec<Arc<LimbElimination>>,
     tableau: Vec<S>,
-    /// Tableau before an elimination.
+    /// Copy of the tableau before an elimination.
     before: Vec<S>,
-    /// Inverses B⁻¹ of all blocks of an elimination; `Y` is the matrix Y = B⁻¹ J of one block.
+    /// Inverses B⁻¹ of all blocks of an elimination; the next field is the matrix Y = B⁻¹ J of one block.
     inverses: Vec<S>,
     Y: Vec<S>,
 }
@@ -317,8 +317,8 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
         Self { size, eliminations, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
     }
 
-    /// Eliminates the limbs and the base of each knot where this is possible, and writes the equations to the knot's
-    /// data.
+    /// Eliminates the limbs and the base of each knot where the pivots are large enough, and writes the equations to
+    /// the knot's data.
     fn solve(&mut self, to: &mut [KnotData]) {
         let Self { size, eliminations, tableau, before, inverses, Y } = self;
         let mut singular = S::zero();
@@ -342,7 +342,7 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
     }
 }
 
-/// Copies the numbers of `count` knots into the lanes of `to`, one lane for each knot.
+/// Copies the slices of `count` knots into the lanes of `to`, one lane for each knot.
 fn pack<'a, S: Block<Number = f64>>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
     let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| of(k.min(count - 1)));
     gather_rows(&rows[..count], to);

@@ -12,18 +12,20 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Forward dynamics and costs of a robot in contact: q̈ and λ solve M q̈ + h = S u + Jᵀλ and J q̈ + γ = 0.
+/// Forward dynamics and costs of a robot in contact: q̈ and λ are the solution of M q̈ + h = S u + Jᵀλ and J q̈ + γ =
+/// 0.
 pub type ContactAcceleration = RobotAcceleration<InContact>;
 
-/// Knot of a robot in contact, by default with joint efforts as controls and with semi-implicit Euler:
+/// Knot of a robot in contact. By default, the controls are joint efforts and the integrator is semi-implicit Euler:
 ///
 /// ```text
 /// [ M  Jᵀ ] [  q̈ ]   [ S u − h ]
 /// [ J  −μ ] [ −λ ] = [ −γ      ],   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
-/// Any set of point and rigid contacts is allowed, also an empty set. The damping μ makes J M⁻¹ Jᵀ + μ 1 regular if
-/// contacts are redundant. The equations are the same as in Crocoddyl's `DifferentialActionModelContactFwdDynamics`.
+/// Any set of point and rigid contacts is allowed, also an empty set. If contacts are redundant, a damping μ above 0
+/// makes the matrix J M⁻¹ Jᵀ + μ 1 regular. The equations are the same as in Crocoddyl's
+/// `DifferentialActionModelContactFwdDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -47,9 +49,10 @@ impl ContactAcceleration {
     /// Creates the dynamics of a robot in contact, with an actuation and the damping μ.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, whose name another contact has, or that is singular with
-    /// another contact on the same body without damping; [`Error::Cost`] for a term that does not fit;
-    /// [`Error::Actuation`] for the actuation of another robot, or a robot with joints that move no mass.
+    /// - [`Error::Contact`] for a contact that does not fit the robot, or has the name of another contact. Without
+    ///   damping, also for a contact that is singular with another contact on the same body.
+    /// - [`Error::Cost`] for a cost term that does not fit the robot.
+    /// - [`Error::Actuation`] for the actuation of another robot, or a robot with joints that move no mass.
     pub fn new(
         model: Arc<Model>,
         actuation: Actuation,
@@ -65,7 +68,7 @@ impl ContactAcceleration {
 }
 
 impl ContactDynamics {
-    /// Creates a knot of Δt seconds with semi-implicit Euler and without damping. All joints are driven, except a
+    /// Creates a knot of Δt seconds with semi-implicit Euler and without damping. All joints have motors, except a
     /// free-flyer at the root. For other actuations, integrators and damping see [`ContactAcceleration::new`] and
     /// [`Integrated::new`].
     ///

@@ -11,10 +11,11 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Forward dynamics q̈ = aba(q, v, S u) and costs of a robot without contacts.
+/// Forward dynamics q̈ = aba(q, v, S u) and costs of a robot without contacts (aba: articulated-body algorithm).
 pub type FreeAcceleration = RobotAcceleration<Free>;
 
-/// Knot of a robot that moves freely, by default with joint efforts as controls and with semi-implicit Euler:
+/// Knot of a robot that moves freely. By default, the controls are joint efforts and the integrator is semi-implicit
+/// Euler:
 ///
 /// ```text
 /// q̈ = aba(q, v, S u),   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
@@ -42,8 +43,8 @@ impl FreeAcceleration {
     /// Creates the dynamics of a robot with an actuation.
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for the actuation of another robot, or a
-    /// robot with joints that move no mass.
+    /// [`Error::Cost`] for a cost term that does not fit the robot; [`Error::Actuation`] for the actuation of another
+    /// robot, or a robot with joints that move no mass.
     pub fn new(model: Arc<Model>, actuation: Actuation, costs: Vec<Cost>) -> Result<Self, Error> {
         let capabilities = Capabilities { nu: actuation.nu(), effort: true, ..Capabilities::default() };
         RobotDynamics::new(model, actuation, capabilities, DynamicsKind::Free, costs).map(Self::of)
@@ -51,22 +52,22 @@ impl FreeAcceleration {
 }
 
 impl FreeDynamics {
-    /// Creates a knot of Δt seconds with semi-implicit Euler. All joints are driven, except a free-flyer at the root.
+    /// Creates a knot of Δt seconds with semi-implicit Euler. All joints have motors, except a free-flyer at the root.
     /// For other actuations or integrators see [`FreeAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0, [`Error::Actuation`] for
-    /// a robot with joints that move no mass.
+    /// [`Error::Cost`] for a cost term that does not fit the robot, [`Error::TimeStep`] if Δt is not above 0,
+    /// [`Error::Actuation`] for a robot with joints that move no mass.
     pub fn running(model: Arc<Model>, dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
         let actuation = Actuation::joints(&model);
         Self::new(FreeAcceleration::new(model, actuation, costs)?, Integrator::SemiImplicitEuler, dt)
     }
 
-    /// Creates the terminal knot. Terms of the control must have an empty reference, because a terminal knot has no
+    /// Creates the terminal knot. A control residual must have an empty reference, because a terminal knot has no
     /// controls.
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit.
+    /// [`Error::Cost`] for a cost term that does not fit the robot.
     pub fn terminal(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
         let none = Actuation::none(&model);
         let robot = RobotDynamics::new(model, none, Capabilities::default(), DynamicsKind::None, costs)?;

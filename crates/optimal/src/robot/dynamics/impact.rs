@@ -1,4 +1,4 @@
-//! Jump of the velocities at an impact.
+//! Velocity change of a robot at an impact.
 
 use super::batch::DynamicsKind;
 use crate::robot::contact::constraint_set;
@@ -26,8 +26,8 @@ impl Impact {
         Some(Self { set, restitution: *restitution, zero: vec![0.0; model.nv()] })
     }
 
-    /// Computes v⁺ − v and the impulses at a state, and the quantities that the terms read. If `slopes` is set, also
-    /// computes the derivatives of all these.
+    /// Computes the velocity change v⁺ − v and the impulses at a state, and the quantities that the terms read. If
+    /// `slopes` is set, also computes the derivatives of all these quantities.
     pub(super) fn run(
         &mut self,
         model: &Model,
@@ -62,7 +62,7 @@ fn write_change(v: &[f64], after: &[f64], lambda: &[f64], to: &mut KnotData) {
     to.lambda.copy_from_slice(lambda);
 }
 
-/// Writes J_c (v⁺ − v), the velocity change of the centre of mass, and its derivatives if `slopes` is set.
+/// Writes J_c (v⁺ − v), the velocity change of the centre of mass; also writes its derivatives if `slopes` is set.
 fn write_com_change(model: &Model, data: &mut Data<f64>, [q, zero]: [&[f64]; 2], slopes: bool, to: &mut KnotData) {
     let KnotData { a: change, residuals, .. } = to;
     residuals.com_change = forward_velocities(model, data, q, change).com_velocity().to_array();

@@ -1,4 +1,4 @@
-//! Impacts: knots without duration and controls, at which velocities jump.
+//! Impacts: knots without duration and without controls, at which velocities jump.
 
 use super::acceleration::{InImpact, RobotAcceleration};
 use super::batch::DynamicsKind;
@@ -12,14 +12,14 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Impact: a knot at which contacts begin, with the coefficient of restitution ε and the damping μ:
+/// Impact: a knot at which contacts begin. It has the coefficient of restitution ε and the damping μ:
 ///
 /// ```text
 /// q⁺ = q,   v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v,   ℓ = Σ w a(r)
 /// ```
 ///
-/// An impact has no duration and no controls. Residuals are functions of the state before the impact. Only the frames
-/// and axes of the contacts are used. The equations are the same as in Crocoddyl's `ActionModelImpulseFwdDynamics`.
+/// An impact has no duration and no controls. Residuals are functions of the state before the impact. Only the frame
+/// and the axes of each contact are used. The equations are the same as in Crocoddyl's `ActionModelImpulseFwdDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -42,9 +42,11 @@ impl ImpulseDynamics {
     /// Creates the knot of an impact at which `contacts` begin.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, whose name another contact has, or that is singular with
-    /// another contact on the same body without damping; also for a restitution that is not from 0 to 1;
-    /// [`Error::Cost`] for a term that does not fit; [`Error::Actuation`] for a robot with joints that move no mass.
+    /// - [`Error::Contact`] for a contact that does not fit the robot, or has the name of another contact. Without
+    ///   damping, also for a contact that is singular with another contact on the same body. Also for a restitution
+    ///   outside 0 to 1.
+    /// - [`Error::Cost`] for a cost term that does not fit the robot.
+    /// - [`Error::Actuation`] for a robot with joints that move no mass.
     pub fn instant(
         model: Arc<Model>,
         contacts: &[Contact],

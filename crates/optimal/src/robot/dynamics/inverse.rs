@@ -1,4 +1,4 @@
-//! Dynamics of a robot whose controls are its accelerations; inverse dynamics give the efforts.
+//! Dynamics of a robot whose controls are its accelerations. Inverse dynamics compute the efforts.
 
 use super::acceleration::{Controlled, RobotAcceleration};
 use super::batch::DynamicsKind;
@@ -11,20 +11,21 @@ use crate::robot::outputs::Capabilities;
 use condyle_dynamics::Model;
 use std::sync::Arc;
 
-/// Inverse dynamics q̈ = u, τ = rnea(q, v, u) and costs of a robot without contacts.
+/// Inverse dynamics q̈ = u, τ = rnea(q, v, u) and costs of a robot without contacts (rnea: recursive Newton–Euler
+/// algorithm).
 pub type ControlledAcceleration = RobotAcceleration<Controlled>;
 
-/// Knot of a robot whose nv controls are its accelerations, by default with semi-implicit Euler:
+/// Knot of a robot whose nv controls are its accelerations. The default integrator is semi-implicit Euler:
 ///
 /// ```text
 /// q̈ = u,   τ = rnea(q, v, u),   v⁺ = v + u Δt,   q⁺ = q ⊕ (v Δt + u Δt²),   ℓ = Δt Σ w a(r)
 /// ```
 ///
 /// No equation is solved, so a knot takes less time than a knot of [`FreeDynamics`](crate::robot::FreeDynamics).
-/// [`Residual::JointEffort`](crate::robot::Residual::JointEffort) reads the efforts. The efforts of an undriven
-/// floating base must be 0, which a [`Limit`](crate::robot::Limit) of
-/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) enforces. For a robot in contact, and for other
-/// actuations, see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
+/// [`Residual::JointEffort`](crate::robot::Residual::JointEffort) reads the efforts. The efforts of a floating base
+/// without motors must be 0. A [`Limit`](crate::robot::Limit) of
+/// [`Residual::UndrivenEffort`](crate::robot::Residual::UndrivenEffort) enforces this. For a robot in contact, and for
+/// other actuations, see [`ContactInverseDynamics`](crate::robot::ContactInverseDynamics).
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -45,7 +46,7 @@ impl ControlledAcceleration {
     /// Creates the dynamics of a robot whose controls are the accelerations of all coordinates.
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit.
+    /// [`Error::Cost`] for a cost term that does not fit the robot.
     pub fn new(model: Arc<Model>, costs: Vec<Cost>) -> Result<Self, Error> {
         let (nu, undriven) = (model.nv(), Actuation::joints(&model).undriven());
         let capabilities = Capabilities { nu, effort: true, inverse: true, undriven, ..Capabilities::default() };
@@ -59,7 +60,7 @@ impl FreeInverseDynamics {
     /// and [`Integrated::new`].
     ///
     /// # Errors
-    /// [`Error::Cost`] for a term that does not fit, [`Error::TimeStep`] if Δt is not above 0.
+    /// [`Error::Cost`] for a cost term that does not fit the robot, [`Error::TimeStep`] if Δt is not above 0.
     pub fn running(model: Arc<Model>, dt: f64, costs: Vec<Cost>) -> Result<Self, Error> {
         Self::new(ControlledAcceleration::new(model, costs)?, Integrator::SemiImplicitEuler, dt)
     }

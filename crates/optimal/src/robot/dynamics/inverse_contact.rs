@@ -1,4 +1,4 @@
-//! Dynamics of a robot in contact whose controls are accelerations and contact forces; inverse dynamics give the
+//! Dynamics of a robot in contact whose controls are accelerations and contact forces. Inverse dynamics compute the
 //! efforts.
 
 use super::acceleration::{ControlledInContact, RobotAcceleration};
@@ -19,22 +19,23 @@ use std::sync::Arc;
 /// and J q̈ + γ = 0.
 pub type ControlledContactAcceleration = RobotAcceleration<ControlledInContact>;
 
-/// Knot of a robot in contact whose controls are its nv accelerations and its contact forces, by default with
+/// Knot of a robot in contact whose controls are its nv accelerations and its contact forces. The default integrator is
 /// semi-implicit Euler:
 ///
 /// ```text
 /// (q̈, λ) = u,   τ = M q̈ + h − Jᵀλ,   v⁺ = v + q̈ Δt,   q⁺ = q ⊕ (v Δt + q̈ Δt²),   ℓ = Δt Σ w a(r)
-/// Nᵀτ = 0        nothing drives some coordinates     (Nᵀ S = 0: of a floating base the first 6 rows of τ)
-/// J q̈ + γ = 0    contacts hold
+/// Nᵀτ = 0        no effort without a motor (Nᵀ S = 0; for a floating base, the first 6 rows of τ)
+/// J q̈ + γ = 0    no acceleration of contacts
 /// ```
 ///
-/// The last two equations are [`Limit`]s that the knot always has, called `undriven efforts` and `contact …`. They
-/// precede the user's limits. [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces them; for
-/// [`Fddp`](crate::Fddp) alone they are costs. No matrix is inverted, so contacts may be redundant and M singular.
-/// Solutions are the same as with [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer iterations but
-/// cannot always be used. Without contacts, the knot is [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with
-/// an actuation. The equations are the same as in Crocoddyl's `DifferentialActionModelContactInvDynamics` and, without
-/// contacts, `DifferentialActionModelFreeInvDynamics`.
+/// The last two equations are [`Limit`]s, called `undriven efforts` and `contact …`. Every such knot has these limits;
+/// they precede the user's limits. [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces them; for
+/// [`Fddp`](crate::Fddp) alone they are costs. No matrix is inverted, so contacts may be redundant and M may be
+/// singular. Solutions are the same as with [`ContactDynamics`](crate::robot::ContactDynamics), which takes fewer
+/// iterations but does not support every robot. Without contacts, the knot is a
+/// [`FreeInverseDynamics`](crate::robot::FreeInverseDynamics) with an actuation. The equations are the same as in
+/// Crocoddyl's `DifferentialActionModelContactInvDynamics` and, without contacts,
+/// `DifferentialActionModelFreeInvDynamics`.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, robots};
@@ -56,8 +57,9 @@ impl ControlledContactAcceleration {
     /// Creates the dynamics of a robot in contact, with an actuation.
     ///
     /// # Errors
-    /// [`Error::Contact`] for a contact that does not fit, or whose name another contact has; [`Error::Cost`] for a
-    /// term that does not fit; [`Error::Actuation`] for the actuation of another robot.
+    /// [`Error::Contact`] for a contact that does not fit the robot, or has the name of another contact;
+    /// [`Error::Cost`] for a cost term that does not fit the robot; [`Error::Actuation`] for the actuation of another
+    /// robot.
     pub fn new(model: Arc<Model>, actuation: Actuation, contacts: &[Contact], costs: Vec<Cost>) -> Result<Self, Error> {
         actuation.check(&model)?;
         let (all, named, undriven) = (Actuation::all(&model), rows_of(contacts), actuation.undriven());
@@ -77,7 +79,7 @@ impl ControlledContactAcceleration {
 }
 
 impl ContactInverseDynamics {
-    /// Creates a knot of Δt seconds with semi-implicit Euler. All joints are driven, except a free-flyer at the root.
+    /// Creates a knot of Δt seconds with semi-implicit Euler. All joints have motors, except a free-flyer at the root.
     /// For other actuations and integrators see [`ControlledContactAcceleration::new`] and [`Integrated::new`].
     ///
     /// # Errors

@@ -1,19 +1,22 @@
-//! Elimination of the dependent unknowns from the equations of a knot in contact: see [`InverseDynamicsForm`].
+//! Elimination of the dependent unknowns from the equations of motion of a knot in contact: see
+//! [`InverseDynamicsForm`].
 //!
-//! Changes of accelerations a and forces f satisfy
+//! Changes of accelerations a and forces f satisfy the following equations. The right column names what each group of
+//! rows is solved for:
 //!
 //! ```text
-//! J δa            + c_v δv + c_q δq = 0         contacts stay            → the accelerations of the limbs in contact
-//! M_b δa − J_bᵀ δf + r_v δv + r_q δq = 0         nothing drives the base  → forces, and accelerations if these cannot
-//! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        the joints               → δu
+//! J δa            + c_v δv + c_q δq = 0         contacts do not accelerate   → accelerations of the limbs in contact
+//! M_b δa − J_bᵀ δf + r_v δv + r_q δq = 0         the base has no motor        → forces, or else accelerations
+//! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        motors drive the joints      → δu
 //! ```
 //!
-//! Gauss–Jordan elimination solves each row of the first two groups for one unknown: the one with the largest entry
-//! among the row's preferred unknowns. Rows of a contact prefer joints that move no other contact. If the entries of
-//! these joints are too small (a straight knee), any acceleration is used. Rows of the base prefer forces. A pivot is
-//! missing only if contacts are redundant; the knot then stays explicit. The limbs in contact, and then the base, are
-//! mostly eliminated before, for several knots at once: see [`limb_elimination`](super::limb_elimination).
-#![allow(non_snake_case)] // J, M, T, U, D
+//! Gauss–Jordan elimination solves each row of the first two groups for one unknown. It chooses the unknown with the
+//! largest entry among the row's preferred unknowns. Rows of a contact prefer joints that move no other contact. If the
+//! entries of these joints are too small (a straight knee), any acceleration may be chosen. Rows of the base prefer
+//! forces. A pivot is missing only if contacts are redundant; the knot is then not written in inverse-dynamics form. In
+//! most cases, the limbs in contact and then the base have been eliminated before, for several knots together: see
+//! [`limb_elimination`](super::limb_elimination).
+#![allow(non_snake_case)] // names follow the literature: J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
 use crate::robot::knot_data::Sensitivities;
@@ -24,22 +27,22 @@ use core::ops::Range;
 
 /// Smallest accepted pivot among the preferred unknowns, relative to the row's largest entry.
 pub(super) const PREFERENCE: f64 = 1e-2;
-/// Pivot that counts as zero, relative to the row's largest entry before the elimination.
+/// Largest pivot that counts as zero, relative to the row's largest entry before the elimination.
 const REDUNDANT: f64 = 1e-7;
 
-/// Size of the tableau of a knot. It has a row for each row of a contact and for each coordinate, and columns for (δa,
-/// δf, δv, δq).
+/// Size of the tableau of a knot. The tableau has a row for each row of a contact and for each coordinate, and columns
+/// for (δa, δf, δv, δq).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tableau {
     pub nv: usize,
-    /// Number of rows of all contacts.
+    /// Number of constraint rows of all contacts.
     pub rows: usize,
 }
 
 condyle_spatial::same_layout!(Tableau);
 
 impl Tableau {
-    /// Returns the distance from one row to the next.
+    /// Returns the stride of the tableau: the distance from one row to the next.
     pub(crate) fn stride(self) -> usize {
         3 * self.nv + self.rows + SLACK
     }
@@ -54,24 +57,24 @@ impl Tableau {
 #[derive(Debug)]
 pub(crate) struct KktElimination {
     tableau: Tableau,
-    /// Number of undriven coordinates; the first coordinates are the undriven ones.
+    /// Number of coordinates without motor, which are the first coordinates.
     passive: usize,
-    /// Coordinates that each row of a contact prefers to be solved for.
+    /// Preferred columns of each contact row: coordinates for which the row is solved if the pivot is large enough.
     preferred: Vec<Vec<usize>>,
-    /// Rows that other eliminations solve before, each with its column, in the order of these eliminations.
+    /// Rows that earlier eliminations have solved, each with its column, in the order of these eliminations.
     before: Vec<Vec<(usize, usize)>>,
     /// Column for which each row was solved.
     pivots: Vec<usize>,
-    /// Rows that this elimination solves.
+    /// Rows that remain for this elimination.
     late: Vec<usize>,
-    /// Pivots for which `place` and `runs` were computed.
+    /// Pivots for which `place` and `runs` are valid.
     laid_out: Vec<usize>,
-    /// For each column of δa and δf: the index of the unknown that the column is, or the row of D or `forces` that
-    /// gives its value.
+    /// Location of each column of δa and δf: the index of an unknown, or else a row of D or `forces`, which gives the
+    /// value.
     place: Vec<Place>,
-    /// Maps from the columns of δa, and from the columns of δf, to the indices of unknowns.
+    /// Map from the columns of δa, and map from the columns of δf, to the indices of unknowns.
     runs: [Runs; 2],
-    /// Forces that are not unknowns, as rows with respect to (w, δv, δq).
+    /// Forces that are not unknowns, as rows with columns for (w, δv, δq).
     forces: SparseRows,
 }
 
@@ -81,15 +84,15 @@ enum Place {
     Row(usize),
 }
 
-/// Returns the driven coordinates that move the contact of row r and no other contact.
+/// Returns the coordinates with motor that move the contact of row r and no other contact.
 pub(super) fn own_coordinates(moved_by: &[Vec<usize>], r: usize, passive: usize) -> Vec<usize> {
     let alone = |k: &usize| moved_by.iter().all(|other| *other == moved_by[r] || !other.contains(k));
     moved_by[r].iter().copied().filter(|k| *k >= passive && alone(k)).collect()
 }
 
 impl KktElimination {
-    /// Creates the elimination for a robot in contact whose first `passive` coordinates are undriven. `moved_by` has
-    /// the coordinates that move each row of the contacts.
+    /// Creates the elimination for a robot in contact whose first `passive` coordinates have no motor. `moved_by`
+    /// lists, for each contact row, the coordinates that move the contact.
     pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
         let rows = moved_by.len();
         let preferred = (0..rows).map(|r| {
@@ -113,13 +116,13 @@ impl KktElimination {
         elimination
     }
 
-    /// Sets the rows that other eliminations solve before: see
+    /// Sets the rows that earlier eliminations solve: see
     /// [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
     pub(crate) fn follow(&mut self, before: Vec<Vec<(usize, usize)>>) {
         self.before = before;
     }
 
-    /// Returns the best columns to solve the rows of the base for, in a tableau whose limbs have been eliminated.
+    /// Returns the best columns for solving the rows of the base, in a tableau whose limbs have been eliminated.
     pub(crate) fn base_pivots(&mut self, tableau: &mut [f64]) -> Option<Vec<usize>> {
         let (mut form, Tableau { nv, rows }) = (InverseDynamicsForm::default(), self.tableau);
         form.reserve(nv, nv - self.passive, [self.most_dependent(), 0]);
@@ -131,8 +134,8 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau in which the first eliminations have been done. Returns whether
-    /// all pivots exist. Overwrites the tableau.
+    /// Writes U and D for steps of Δt, from a tableau in which earlier eliminations have been done. Returns whether all
+    /// pivots exist. Overwrites the tableau.
     pub(crate) fn run(
         &mut self,
         tableau: &mut [f64],
@@ -145,12 +148,13 @@ impl KktElimination {
         done
     }
 
-    /// Returns the sensitivities of outputs with respect to (w, δv, δq), for a knot with U and D from `form`.
+    /// Returns the sensitivities of the outputs with respect to (w, δv, δq). The matrices U and D of the knot are in
+    /// `form`.
     pub(crate) fn sensitivities<'a>(&'a self, form: &'a InverseDynamicsForm, dt: f64) -> Unknowns<'a> {
         Unknowns { elimination: self, form, dt }
     }
 
-    /// Returns the column of the row's largest entry among `columns`, and this entry.
+    /// Returns the column with the row's largest entry among `columns`, and this entry.
     #[inline(always)]
     fn largest(&self, row: &[f64], columns: impl Iterator<Item = usize>) -> (usize, f64) {
         let mut best = (0, 0.0);
@@ -162,7 +166,7 @@ impl KktElimination {
         best
     }
 
-    /// Returns the column for which row r is solved; `None` without a pivot.
+    /// Returns the column for which row r will be solved; `None` without a pivot.
     #[inline(always)]
     fn choose(&self, r: usize, row: &[f64], scale: [f64; 2]) -> Option<usize> {
         let Tableau { nv, rows } = self.tableau;
@@ -180,11 +184,11 @@ impl KktElimination {
     }
 }
 
-/// Number of rows that are subtracted at once: the six coordinates of a free base.
+/// Number of rows that are subtracted in one call: the six coordinates of a free base.
 const TOGETHER: usize = 6;
 
 impl KktElimination {
-    /// Solves the rows that have no pivot yet. Returns whether all rows have a pivot afterwards.
+    /// Solves the rows that have no pivot yet. Returns whether all rows then have a pivot.
     #[inline(always)]
     fn eliminate<V: Vector>(&mut self, T: &mut [f64], motion: &mut [f64]) -> bool {
         let (Tableau { nv, rows }, stride) = (self.tableau, self.tableau.stride());
@@ -204,8 +208,7 @@ impl KktElimination {
             }
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
-            // a row whose pivot is small relative to `scale` depends on other rows; entries of contact rows are of
-            // order one
+            // a row whose pivot is small relative to `scale` depends on other rows; contact rows have the scale 1
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = self.choose(r, row, scale) else { return false };
             self.place[k] = Place::Row(r);
@@ -225,7 +228,7 @@ impl KktElimination {
             }
             self.late.push(r);
         }
-        // eliminates the solved unknowns from the rows of the joints, several solved rows at once
+        // eliminates the solved unknowns from the rows of the joints, several solved rows per call
         for other in motion.chunks_exact_mut(stride) {
             let (mut x, mut a, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0);
             for &r in &self.late {
@@ -246,7 +249,7 @@ impl KktElimination {
         true
     }
 
-    /// Computes `place` for each column: the columns for which no row was solved are the unknowns.
+    /// Computes `place` for each column. The unknowns are the columns for which no row was solved.
     fn lay_out(&mut self) {
         let Self { tableau: Tableau { nv, rows }, pivots, place, runs, .. } = self;
         runs.iter_mut().for_each(Runs::clear);
@@ -296,7 +299,7 @@ impl Vectorized for Run<'_> {
         let size = form.stride;
         let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive };
 
-        // writes U, then the dependent steps D, then the dependent forces
+        // writes the rows of U, then the rows of D for dependent coordinates, then the rows of dependent forces
         form.own.clear();
         form.own.extend(e.runs[0].iter());
         form.efforts.resize(gather.m, size);
@@ -320,17 +323,17 @@ impl Vectorized for Run<'_> {
     }
 }
 
-/// Map from the columns (δa, δf, δv, δq) to (w, δv, δq).
+/// Map that copies the columns (δa, δf, δv, δq) of a row to the columns (w, δv, δq).
 struct Gather<'a> {
     runs: &'a [Runs; 2],
-    /// Columns of (δv, δq).
+    /// Range of the columns of (δv, δq).
     states: Range<usize>,
     m: usize,
 }
 
 impl Gather<'_> {
-    /// Copies the unknowns and states of a row. Each copy may write beyond its end; the next copy overwrites these
-    /// numbers.
+    /// Copies the columns of the unknowns and of the states of a row. A copy may write entries beyond its end; the next
+    /// copy overwrites these entries.
     #[inline(always)]
     fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
         self.runs[0].copy_scaled::<V>(row, by_a, to);
@@ -339,7 +342,7 @@ impl Gather<'_> {
     }
 }
 
-/// Sensitivities of a knot with respect to (w, δv, δq); see [`KktElimination::sensitivities`].
+/// Sensitivities of a knot's outputs with respect to (w, δv, δq); see [`KktElimination::sensitivities`].
 pub(crate) struct Unknowns<'a> {
     elimination: &'a KktElimination,
     form: &'a InverseDynamicsForm,
@@ -347,7 +350,7 @@ pub(crate) struct Unknowns<'a> {
 }
 
 impl Unknowns<'_> {
-    /// Computes g += c times row k of `rows`.
+    /// Adds c times row k of `rows` to g.
     fn add(&self, rows: &SparseRows, k: usize, c: f64, g: &mut Row<'_>) {
         let row = &rows.numbers[k * self.form.stride..];
         let (u, x) = row.split_at(g.u.len());

@@ -1,21 +1,21 @@
-//! Elimination of unknowns from the equations of several knots in contact, with one lane for each knot: first the limb
-//! of each contact, then the base.
+//! Elimination of unknowns from the equations of motion of several knots in contact, with one lane for each knot. The
+//! limb of each contact is eliminated first, then the base.
 //!
-//! The tableau is described in [`kkt_elimination`](super::kkt_elimination). The rows of a contact have entries for the
-//! base, for the limb, and for joints between both. The joints of the limb move no other contact. Let B be the block of
-//! the limb's joints. If B is square, the rows are solved for these joints, which are then eliminated from the
-//! equations of motion:
+//! The module [`kkt_elimination`](super::kkt_elimination) describes the tableau. The rows of a contact have entries for
+//! the base, for the limb, and for joints between base and limb. The joints of the limb move no other contact. Let B be
+//! the block of the limb's joints. If B is square, the contact's rows are solved for these joints, which are then
+//! eliminated from the equations of motion:
 //!
 //! ```text
-//! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i of the equations that the limb is in
+//! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i with entries in the limb's columns l
 //! ```
 //!
-//! Then the rows of the base are solved in the same way for forces and, if forces are not enough, for accelerations.
-//! The rows and columns depend only on the robot and its contacts, so they are determined once; for the base, at one
-//! posture. The numbers are computed for as many knots as a vector has lanes. Without contacts, the rows of the base
-//! are solved for the accelerations of the base. If B is close to singular at a knot (a straight knee), this knot keeps
-//! its original equations, and its pivots are chosen one by one.
-#![allow(non_snake_case)] // B, J, M, T, Y
+//! Then the rows of the base are solved in the same way for forces. If there are not enough forces, accelerations are
+//! used too. Without contacts, the rows of the base are solved for the accelerations of the base. The rows and columns
+//! depend only on the robot and its contacts, so they are determined once; the columns of the base are determined at
+//! one posture. The entries are computed for as many knots as a SIMD register has lanes. If B is close to singular at a
+//! knot (a straight knee), this knot keeps its original equations, and the pivots of this knot are chosen one by one.
+#![allow(non_snake_case)] // names follow the literature: B, J, M, T, Y
 
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
 use crate::robot::contact::path;
@@ -24,28 +24,28 @@ use condyle_spatial::{Matrix, Scalar, kernel, same_layout};
 use core::ops::Range;
 use std::sync::Arc;
 
-/// Number of rows that are solved together: 3 for a point; 6 for a sole and for a free base.
+/// Number of rows that are solved together: 3 for a point contact; 6 for a rigid contact and for a free base.
 const SIZES: [usize; 2] = [3, 6];
 const MOST: usize = SIZES[1];
-/// Smallest accepted pivot for a base without contacts, relative to the row's largest entry. B is positive definite
-/// there, so a smaller pivot is a rounding error.
+/// Smallest accepted pivot for a base without contacts, relative to the row's largest entry. Without contacts, B is
+/// positive definite, so a smaller pivot is a rounding error.
 const DEFINITE: f64 = 1e-9;
 /// Smallest accepted pivot for a base in contact, relative to the row's largest entry. The columns were chosen at
-/// another posture; a smaller pivot would lose more digits than a pivot that is chosen at the knot.
+/// another posture. A smaller pivot would lose more digits than a pivot that is chosen at the knot itself.
 const CHOSEN_ELSEWHERE: f64 = 1e-3;
 
-/// Block of the tableau: rows that are solved for the same number of columns.
+/// Block of the tableau: a number of rows that are solved for the same number of columns.
 #[derive(Clone, Debug, PartialEq)]
 struct Block {
-    /// Rows of the block.
+    /// Range of the block's rows in the tableau.
     rows: Range<usize>,
-    /// Columns for which the rows are solved: coordinates, or forces.
+    /// Columns for which the rows are solved. They belong to coordinates or to forces.
     solved: Vec<usize>,
-    /// Other columns in which the rows have entries, as ranges.
+    /// Other columns in which the rows of the block have entries, as ranges.
     columns: Vec<Range<usize>>,
-    /// Other rows in which the solved columns have entries.
+    /// Other rows that have entries in the solved columns.
     others: Vec<usize>,
-    /// Columns among which the largest entry of a row is determined: solved and other columns.
+    /// Columns over which the largest entry of a row is determined. They are solved columns and other columns.
     compared: Vec<usize>,
     /// Smallest accepted pivot of B, relative to the row's largest entry.
     least: f64,
@@ -59,8 +59,8 @@ struct Pattern {
 }
 
 impl Pattern {
-    /// Returns the pattern for a robot in contact, with damping or without. `moved_by` has the coordinates that move
-    /// each row of the contacts.
+    /// Returns the pattern for a robot in contact, with or without damping. `moved_by` lists, for each contact row, the
+    /// coordinates that move the contact.
     fn new(model: &Model, tableau: Tableau, moved_by: &[Vec<usize>], damped: bool) -> Self {
         let (Tableau { nv, rows }, coupled) = (tableau, coupled(model));
         let width = 3 * nv + rows;
@@ -82,8 +82,8 @@ impl Pattern {
         pattern
     }
 
-    /// Returns the block that solves `rows` for the columns `solved`, and updates the pattern to the one after the
-    /// elimination.
+    /// Returns the block that solves `rows` for the columns `solved`. Also updates the pattern to the pattern after
+    /// this elimination.
     fn solve(&mut self, rows: Range<usize>, solved: Vec<usize>, compared: Range<usize>, least: f64) -> Block {
         let Self { width, has } = self;
         let mut all = vec![false; *width];
@@ -111,7 +111,7 @@ impl Pattern {
     }
 }
 
-/// Blocks of rows of a robot in contact, which are solved one after the other, with the positions of their entries.
+/// Elimination: blocks of rows that are solved one after the other, with the positions of their entries in the tableau.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LimbElimination {
     blocks: Vec<Block>,
@@ -120,8 +120,9 @@ pub(crate) struct LimbElimination {
 same_layout!(LimbElimination);
 
 impl LimbElimination {
-    /// Returns the eliminations of a robot whose first `passive` coordinates are undriven: of the limbs, then of the
-    /// base, whose columns are determined from the elimination of the limbs. An elimination without blocks is left out.
+    /// Returns the eliminations of a robot whose first `passive` coordinates have no motor: first of the limbs, then of
+    /// the base. The columns of the base are determined from the elimination of the limbs. An elimination without
+    /// blocks is left out.
     pub(crate) fn new(
         model: &Model,
         passive: usize,
@@ -156,7 +157,7 @@ impl LimbElimination {
         [limbs, base].into_iter().filter(|elimination| !elimination.blocks.is_empty()).collect()
     }
 
-    /// Returns the solved rows of a tableau, each with the column for which it is solved.
+    /// Returns the rows that this elimination solves, each with the column for which the row is solved.
     pub(crate) fn solved(&self) -> Vec<(usize, usize)> {
         self.blocks.iter().flat_map(|block| block.rows.clone().zip(block.solved.iter().copied())).collect()
     }
@@ -173,8 +174,8 @@ impl LimbElimination {
     }
 }
 
-/// Returns, for each pair of coordinates, whether both move a common body, so that M has an entry for the pair. Shape:
-/// nv × nv.
+/// Returns, for each pair of coordinates, whether both coordinates move a common body. M has a nonzero entry only for
+/// such pairs. Shape: nv × nv.
 fn coupled(model: &Model) -> Vec<bool> {
     let nv = model.nv();
     let mut coupled = vec![false; nv * nv];
@@ -187,7 +188,7 @@ fn coupled(model: &Model) -> Vec<bool> {
     coupled
 }
 
-/// Returns ranges of consecutive numbers from an increasing list.
+/// Returns the ranges of consecutive numbers in an increasing list.
 fn runs(columns: impl IntoIterator<Item = usize>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for k in columns {
@@ -200,8 +201,8 @@ fn runs(columns: impl IntoIterator<Item = usize>) -> Vec<Range<usize>> {
 }
 
 kernel! {
-    /// Writes the rows [M · r_v r_q] of the equations of motion into a tableau, except the columns of forces (·). M is
-    /// symmetric.
+    /// Writes the rows [M · r_v r_q] of the equations of motion into a tableau, without the columns of forces (the
+    /// dot). M is symmetric.
     pub(crate) fn write_motion<S>(
         tableau: Tableau, M: &Matrix<S>, dtau_dv: &Matrix<S>, dtau_dq: &Matrix<S>, T: &mut [S],
     ) {
@@ -215,7 +216,7 @@ kernel! {
 }
 
 kernel! {
-    /// Writes the rows [· μ1 c_v c_q] of the contacts into a tableau, except the columns of J (·).
+    /// Writes the rows [· μ1 c_v c_q] of the contacts into a tableau, without the columns of J (the dot).
     pub(crate) fn write_drift<S>(
         tableau: Tableau, dgamma_dv: &Matrix<S>, dgamma_dq: &Matrix<S>, mu: f64, T: &mut [S],
     ) {
@@ -230,7 +231,7 @@ kernel! {
 }
 
 kernel! {
-    /// Writes J and −Jᵀ into a tableau.
+    /// Writes the blocks J and −Jᵀ into a tableau.
     pub(crate) fn write_jacobian<S>(tableau: Tableau, J: &Matrix<S>, T: &mut [S]) {
         let (Tableau { nv, rows }, stride) = (tableau, tableau.stride());
         let (contacts, motion) = T.split_at_mut(rows * stride);
@@ -254,8 +255,8 @@ fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
 }
 
 kernel! {
-    /// Computes B⁻¹ of each block by Gauss–Jordan elimination, with row exchanges that differ from knot to knot.
-    /// `singular` becomes 1 in the lanes of knots with a pivot that is too small.
+    /// Computes B⁻¹ of each block by Gauss–Jordan elimination. The row exchanges may differ from knot to knot.
+    /// `singular` is set to 1 in the lanes of knots with a pivot that is too small.
     pub(crate) fn invert_blocks<S>(
         elimination: &LimbElimination, tableau: Tableau, T: &[S], inverses: &mut [S], singular: &mut S,
     ) {
@@ -263,7 +264,7 @@ kernel! {
         let mut rest = inverses;
         for Block { rows, solved, compared, least, .. } in &elimination.blocks {
             let n = rows.len();
-            // W = [B D], with the rows scaled by D
+            // initialises W = [D B, D], where the diagonal matrix D contains the scale factors of the rows
             let mut W = [[S::zero(); 2 * MOST]; MOST];
             for (k, r) in rows.clone().enumerate() {
                 let row = &T[r * stride..][..stride];
@@ -321,7 +322,7 @@ kernel! {
 }
 
 kernel! {
-    /// Solves the rows of each block for its columns, and eliminates these columns from the other rows.
+    /// Solves the rows of each block for the block's columns, and eliminates these columns from the other rows.
     pub(crate) fn solve_blocks<S>(
         elimination: &LimbElimination, tableau: Tableau, T: &mut [S], inverses: &[S], Y: &mut [S],
     ) {
@@ -338,7 +339,7 @@ kernel! {
     }
 }
 
-/// Solves the N rows of a block. Y is also stored column by column, for the elimination from the other rows.
+/// Solves the N rows of a block. Also stores Y column by column, for the elimination from the other rows.
 #[inline(always)]
 fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], inverse: &[S], Y: &mut [S]) {
     let Block { rows, solved, columns, others, .. } = block;

@@ -1,5 +1,5 @@
-//! Dynamics of a robot, all kinds: accelerations, costs and limits for a group of knots.
-#![allow(non_snake_case)] // J
+//! Dynamics of a robot, for all kinds of dynamics: accelerations, costs and limits for a group of knots.
+#![allow(non_snake_case)] // names follow the literature: J
 
 use super::batch::{DynamicsKind, Group, KnotBatch, Pass};
 use super::impact::Impact;
@@ -29,19 +29,20 @@ use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// Token with which this crate may name vector types.
+/// Token that allows this crate to name SIMD vector types.
 struct Gate;
 
-// SAFETY: vectors are used only by the kernels of `condyle_dynamics`, and by code that is entered as these kernels are.
+// SAFETY: SIMD vectors are used only by the kernels of `condyle_dynamics`, and by code that is called like these
+// kernels.
 #[allow(unsafe_code)]
 unsafe impl SimdToken for Gate {}
 
 type Short = <f64 as Real>::Narrow<Gate>;
 type Long = <f64 as Real>::Wide<Gate>;
 
-/// Maximum number of postures that are tried to find one that is not singular.
+/// Maximum number of postures that are tried in the search for a regular posture.
 const POSTURES: usize = 8;
-/// Smallest number of knots that are computed at once; fewer knots are computed one by one.
+/// Smallest number of knots that are computed in one batch; fewer knots are computed one by one.
 const WORTHWHILE: usize = 3;
 
 /// Robot with its actuation, the kind of its dynamics, and the costs and limits of its knots.
@@ -51,7 +52,7 @@ pub(crate) struct RobotDynamics {
     pub(crate) actuation: Actuation,
     pub(crate) terms: HorizonTerms,
     kind: DynamicsKind,
-    /// Output that the controls drive.
+    /// Output of the dynamics that the controls drive.
     given: Output,
     capabilities: Capabilities,
     /// Coordinates of each group of positions that is not a vector space.
@@ -59,12 +60,12 @@ pub(crate) struct RobotDynamics {
     work: OnDemand<Work>,
 }
 
-/// Returns the robot of an action; if the action wraps another action, the robot of the wrapped action.
+/// Returns the robot of an action. For an action that wraps another action, this is the robot of the wrapped action.
 pub(crate) fn robot_of(action: &mut dyn ActionModel) -> Option<&mut RobotDynamics> {
     innermost(action)?.dynamics()?.downcast_mut()
 }
 
-/// References to the fields of [`RobotDynamics`], with an allocated workspace.
+/// References to the fields of [`RobotDynamics`], with a workspace that has been allocated.
 struct Parts<'a> {
     model: &'a Arc<Model>,
     actuation: &'a Actuation,
@@ -89,15 +90,16 @@ struct Work {
     da_du: Vec<f64>,
 }
 
-/// Dynamics of as many knots as this processor has lanes. A few trial steps use vectors with few lanes, which are
-/// faster. Derivatives do not: short vectors would be used too rarely to stay in the caches.
+/// Dynamics of as many knots as the processor's SIMD registers have lanes. For a few trial steps, registers with few
+/// lanes are used, because they are faster. Derivatives always use the widest registers: code for short registers would
+/// run too rarely to stay in the caches.
 #[derive(Debug)]
 struct VectorBatches {
     short: KnotBatch<Short>,
     long: Option<KnotBatch<Long>>,
 }
 
-/// Returns the number of knots that are computed at once.
+/// Returns the number of knots that are computed in one batch.
 fn lanes(kind: &DynamicsKind) -> usize {
     match (kind, level()) {
         (DynamicsKind::None | DynamicsKind::Impact { .. }, _) | (_, Level::Baseline) => 1,
@@ -107,8 +109,8 @@ fn lanes(kind: &DynamicsKind) -> usize {
 }
 
 impl VectorBatches {
-    /// Allocates the workspace for the equations of knots in inverse-dynamics form, in the widest vectors, because only
-    /// derivatives use these equations.
+    /// Allocates the workspace for the equations of knots in inverse-dynamics form. Only the batch with the widest
+    /// registers needs it, because only derivatives use these equations.
     fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         match &mut self.long {
             Some(long) => long.reserve(tableau, eliminations),
@@ -116,8 +118,8 @@ impl VectorBatches {
         }
     }
 
-    /// Returns the equations of a knot at a posture at which the limbs can be eliminated; `None` if no such posture is
-    /// found.
+    /// Returns the equations of a knot at a posture at which the limbs can be eliminated. Returns `None` if the search
+    /// finds no such posture.
     fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Vec<f64>> {
         (0..POSTURES).find_map(|posture| {
             let bend: Vec<f64> = (0..model.nv()).map(|k| 0.5 * ((1 + posture + k) as f64).sin()).collect();
@@ -153,7 +155,7 @@ impl Work {
             DynamicsKind::Contact(contacts, _) => Some(moved_by(model, contacts)),
             _ => None,
         };
-        // inverse-dynamics form needs vectors, and an actuation in which each control drives one coordinate
+        // inverse-dynamics form needs SIMD registers, and an actuation in which each control drives one coordinate
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
         let mut data = KnotData::new(nv, capabilities, given);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
@@ -181,7 +183,7 @@ impl Work {
         }
     }
 
-    /// Writes a knot of Δt = `scale` seconds as equations of inverse dynamics. Returns whether this was possible.
+    /// Writes a knot of duration Δt = `scale` (s) as equations of inverse dynamics. Returns whether this was possible.
     fn write_equations(
         &mut self,
         terms: &mut HorizonTerms,
@@ -209,8 +211,8 @@ impl RobotDynamics {
     /// Creates the dynamics of a robot with an actuation and a kind of dynamics.
     ///
     /// # Errors
-    /// [`Error::Contact`] for contacts that do not fit; [`Error::Cost`] for a term that does not fit;
-    /// [`Error::Actuation`] for the actuation of another robot, and for a robot whose forward dynamics have no
+    /// [`Error::Contact`] for contacts that do not fit the robot; [`Error::Cost`] for a cost term that does not fit the
+    /// robot; [`Error::Actuation`] for the actuation of another robot, and for a robot whose forward dynamics have no
     /// solution.
     pub(crate) fn new(
         model: Arc<Model>,
@@ -242,7 +244,7 @@ impl RobotDynamics {
         Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
     }
 
-    /// Returns the contacts, in the order in which λ has their forces.
+    /// Returns the contacts, in the order of their forces in λ.
     pub(crate) fn contacts(&self) -> &[Contact] {
         match &self.kind {
             DynamicsKind::Contact(contacts, _)
@@ -262,13 +264,13 @@ impl RobotDynamics {
         self.capabilities.nu
     }
 
-    /// Allocates the workspace, unless it exists, and allocates memory for the residuals of all terms.
+    /// Allocates the workspace if it does not exist yet, and allocates memory for the residuals of all terms.
     pub(crate) fn reserve(&mut self) {
         let Parts { model, terms, work, .. } = self.parts();
         work.data.iter_mut().for_each(|data| data.residuals.reserve(model.nv(), terms.layouts()));
     }
 
-    /// Returns references to all fields, and allocates the workspace if it does not exist.
+    /// Returns references to all fields. Allocates the workspace if it does not exist.
     fn parts(&mut self) -> Parts<'_> {
         let Self { model, actuation, terms, kind, given, capabilities, groups, work } = self;
         terms.reserve();
@@ -288,13 +290,13 @@ impl RobotDynamics {
         same
     }
 
-    /// Returns the number of knots that are computed at once.
+    /// Returns the number of knots that are computed in one batch.
     pub(crate) fn lanes(&self) -> usize {
         lanes(&self.kind)
     }
 
-    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, at once if that is faster.
-    /// [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
+    /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, in one batch if that is
+    /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
         let Group { knots, xs, us, what, .. } = group;
         if let Evaluation::Equations(motions) = what {
@@ -338,7 +340,7 @@ impl RobotDynamics {
         }
     }
 
-    /// Returns the accelerations, the cost ℓ and the term of the limits at one knot of the last group in
+    /// Returns the accelerations, the cost ℓ and the limit term at one knot of the last group in
     /// [`solve`](Self::solve).
     pub(crate) fn values(&mut self, lane: usize, input: KnotInput<'_>, limited: bool) -> (&[f64], f64, f64) {
         let (KnotInput { t, x, u }, Parts { terms, work: Work { data, .. }, .. }) = (input, self.parts());
@@ -348,8 +350,8 @@ impl RobotDynamics {
     }
 
     /// Returns the derivatives of the accelerations at one knot of the last group in [`solve`](Self::solve). Writes the
-    /// derivatives of `scale` · ℓ and of the term of the limits to the LQ knot. If [`solve`](Self::solve) computed
-    /// equations, the LQ knot is written in inverse-dynamics form if possible.
+    /// derivatives of `scale` · ℓ and of the limit term to the LQ knot. If [`solve`](Self::solve) computed equations of
+    /// inverse dynamics, the LQ knot is written in inverse-dynamics form if possible.
     pub(crate) fn slopes(
         &mut self,
         lane: usize,
@@ -376,11 +378,11 @@ impl RobotDynamics {
         Derivatives { a: &data.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) } // ∂q̈/∂τ S
     }
 
-    /// Returns sizes for the equations of inverse dynamics: the number of accelerations and forces at which they are
-    /// evaluated, the maximum number of dependent coordinates, and the maximum number of rows of costs. Returns `None`
-    /// without such equations.
+    /// Returns sizes for the equations of inverse dynamics: the number of accelerations and forces of a knot, the
+    /// maximum number of dependent coordinates, and the maximum number of residual rows. Returns `None` without such
+    /// equations.
     pub(crate) fn inverse_dynamics(&self) -> Option<(usize, [usize; 2])> {
-        let layout = self.terms.layout(); // Hessians without rows are in Q, S and R, with respect to the controls
+        let layout = self.terms.layout(); // Hessians without rows are added to Q, S and R, whose controls are u
         let elimination = self.work.made()?.elimination.as_ref()?;
         let motion = self.model.nv() + self.capabilities.rows();
         (!layout.curved).then_some((motion, [elimination.most_dependent(), layout.rows[0]]))
@@ -394,8 +396,8 @@ impl RobotDynamics {
         to_lambda[..lambda.len()].copy_from_slice(lambda);
     }
 
-    /// Sets the accelerations and forces of `count` knots. `motions` has an equally long block for each knot, which
-    /// begins with these numbers.
+    /// Sets the accelerations and forces of `count` knots. `motions` has a block of equal length for each knot; the
+    /// block begins with the knot's accelerations and forces.
     fn set_motions(&mut self, count: usize, motions: &[f64]) {
         let size = motions.len() / count;
         for (KnotData { a, lambda, .. }, from) in self.parts().work.data.iter_mut().zip(motions.chunks_exact(size)) {
@@ -406,7 +408,7 @@ impl RobotDynamics {
         }
     }
 
-    /// Calls `show` with the outputs at the first knot of the last group in [`solve`](Self::solve): see
+    /// Calls `show` for each output at the first knot of the last group in [`solve`](Self::solve): see
     /// [`Problem::outputs`](crate::Problem::outputs).
     pub(crate) fn outputs(&mut self, show: &mut dyn FnMut(&str, &[f64])) {
         let Parts { capabilities, work, .. } = self.parts();
@@ -420,13 +422,13 @@ impl RobotDynamics {
         }
     }
 
-    /// Returns the smallest controls and contact forces that hold the robot still as nearly as possible: (u, λ) = [S
-    /// Jᵀ]⁺ g(q). Controls that are accelerations are zero.
+    /// Returns the controls and contact forces of smallest norm that hold the robot still, as nearly as possible: (u,
+    /// λ) = [S Jᵀ]⁺ g(q). If accelerations are controls, they are zero.
     #[track_caller]
     pub(crate) fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         assert_length("x", x.len(), nq + nv);
-        // allocates data for one state only, because the workspace for many knots may not exist yet
+        // allocates data for one state, because the workspace for groups of knots may not exist yet
         let Self { model, actuation, kind, .. } = &*self;
         let (data, zero, mut J) = (&mut Data::new(model), vec![0.0; nv], DMatrix::zeros(0, nv));
         let (contacts, drives): (&[Contact], _) = match kind {
@@ -447,7 +449,7 @@ impl RobotDynamics {
         if matches!(kind, DynamicsKind::ContactInverse(..)) { [zero, forces].concat() } else { both } // (q̈, λ), or u
     }
 
-    /// Implements [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
+    /// Computes the second derivatives of [`ContinuousModel::hessian`](crate::robot::ContinuousModel::hessian).
     pub(crate) fn hessian(
         &mut self,
         KnotInput { x, u, .. }: KnotInput<'_>,
@@ -494,7 +496,7 @@ impl RobotDynamics {
         }
     }
 
-    /// Computes the blocks of groups in ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
+    /// Computes the blocks of groups in the Jacobians ∂(q ⊕ δq)/∂q and ∂(q ⊕ δq)/∂δq.
     pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Position, by_q);
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);

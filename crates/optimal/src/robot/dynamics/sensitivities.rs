@@ -1,15 +1,15 @@
 //! Derivatives of the outputs of a knot with respect to its state and its controls.
-#![allow(non_snake_case)] // J
+#![allow(non_snake_case)] // names follow the literature: J
 
 use crate::robot::actuation::Actuation;
 use crate::robot::knot_data::{KnotData, Sensitivities, add_matrix_row};
 use crate::robot::outputs::Output;
 use crate::robot::residuals::rows::Row;
 
-/// Derivatives of the outputs of a knot, computed from the derivatives in the knot's data.
+/// Derivatives of the outputs of a knot, read from the derivatives in the knot's data.
 pub(crate) struct DynamicsSensitivities<'a> {
-    /// Output that equals S u. If this output is the acceleration, it equals the first nv controls; the other controls
-    /// are contact forces.
+    /// Output that equals S u. If this output is the acceleration, it equals the first nv controls, and the other
+    /// controls are contact forces.
     pub given: Output,
     pub data: &'a KnotData,
     pub actuation: &'a Actuation,

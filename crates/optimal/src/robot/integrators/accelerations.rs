@@ -1,4 +1,5 @@
-//! Accelerations of a group of knots: at once for a robot, one by one for user-defined models.
+//! Accelerations of a group of knots. They are computed in one batch for a robot, and knot by knot for user-defined
+//! models.
 
 use crate::lq::LqKnot;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
@@ -15,18 +16,18 @@ pub(super) fn robot_mut<M: ContinuousModel>(model: &mut M) -> Option<&mut RobotD
     model.robot_mut()?.downcast_mut()
 }
 
-/// Panic message if a model is not a robot, although it has been checked.
+/// Panic message if a model that was checked to be a robot is not a robot.
 const ROBOT: &str = "the model is a robot";
 
-/// Computes the dynamics of a group of a robot's knots. Does nothing for user-defined models, which compute each knot
-/// by itself.
+/// Computes the dynamics of a group of a robot's knots. Does nothing for user-defined models, whose dynamics are
+/// computed knot by knot.
 pub(super) fn solve<M: ContinuousModel>(model: &mut M, group: Group<'_>) {
     if let Some(robot) = robot_mut(model) {
         robot.solve(group);
     }
 }
 
-/// Returns the accelerations, the cost ℓ and the term of the limits at one knot of the last group in [`solve`].
+/// Returns the accelerations, the cost ℓ and the limit term at one knot of the last group in [`solve`].
 pub(super) fn values<'m, M: ContinuousModel>(
     model: &'m mut M,
     lane: usize,

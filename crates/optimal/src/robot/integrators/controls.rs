@@ -1,23 +1,24 @@
-//! Control polynomials: how the controls of a knot change during its duration.
-#![allow(non_snake_case)] // B, S, R
+//! Control polynomials, which describe how the controls of a knot change during its duration.
+#![allow(non_snake_case)] // names follow the literature: B, S, R
 
 use super::Integrator;
 use crate::lq::LqKnot;
 
-/// Polynomial u(s) that the controls of a knot follow, where s is the time within the knot divided by Δt, from 0 to 1.
+/// Polynomial u(s) that the controls of a knot follow. The argument s is the time within the knot divided by Δt, from 0
+/// to 1.
 ///
-/// The control vector of the knot is w: the values of u at the nodes of the polynomial, one after the other.
+/// The control vector w of the knot contains the values of u at the nodes of the polynomial, one after the other.
 ///
 /// ```text
-/// constant    u(s) = w                                             nu numbers
-/// linear      u(s) = (1 − 2 s) w₀ + 2 s w₁                         at s = 0 and ½
-/// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials            at s = 0, ½, 1; by `RungeKutta3` at 0, ⅓, ⅔
+/// constant    u(s) = w                                     one node
+/// linear      u(s) = (1 − 2 s) w₀ + 2 s w₁                 nodes at s = 0 and ½
+/// quadratic   u(s) = Σ lₖ(s) wₖ, Lagrange's polynomials    nodes at s = 0, ½, 1; with `RungeKutta3` at 0, ⅓, ⅔
 /// ```
 ///
 /// Dynamics and costs are computed at the stages of the [`Integrator`], each with its own u(s). Semi-implicit Euler has
-/// one stage, at s = 0. So w₁ and w₂ have no effect there; only regularisation and [`Constrained`](crate::Constrained)
-/// terms determine them. These polynomials are Crocoddyl's `ControlParametrizationModelPolyZero`, `PolyOne` and
-/// `PolyTwoRK`.
+/// one stage, at s = 0. With this integrator, w₁ and w₂ therefore have no effect on the next state; only regularisation
+/// and [`Constrained`](crate::Constrained) terms determine them. These polynomials are Crocoddyl's
+/// `ControlParametrizationModelPolyZero`, `PolyOne` and `PolyTwoRK`.
 ///
 /// ```
 /// use condyle_optimal::robot::{ControlPolynomial, Integrator};
@@ -32,14 +33,14 @@ pub enum ControlPolynomial {
     /// Constant controls: one node.
     #[default]
     Constant,
-    /// Polynomial of first degree: two nodes.
+    /// First-degree polynomial: two nodes.
     Linear,
-    /// Polynomial of second degree: three nodes.
+    /// Second-degree polynomial: three nodes.
     Quadratic,
 }
 
 impl ControlPolynomial {
-    /// Returns the number of nodes; a knot has nodes · nu controls.
+    /// Returns the number of nodes. A knot has nodes · nu entries in its control vector.
     pub fn nodes(self) -> usize {
         match self {
             Self::Constant => 1,
@@ -48,7 +49,7 @@ impl ControlPolynomial {
         }
     }
 
-    /// Returns the weights of w₀, w₁, w₂ in u(s), 0 for nodes that do not exist.
+    /// Returns the weights of w₀, w₁, w₂ in u(s). The weight of a node that does not exist is 0.
     pub fn weights(self, integrator: Integrator, s: f64) -> [f64; 3] {
         match (self, integrator) {
             (Self::Constant, _) => [1.0, 0.0, 0.0],
@@ -66,7 +67,7 @@ impl ControlPolynomial {
     }
 }
 
-/// Copies the derivatives of a step with respect to u = w₀ into those with respect to all w; the other columns are
+/// Converts derivatives with respect to u = w₀ into derivatives with respect to all w. The columns of w₁ and w₂ are
 /// zero.
 pub(super) fn widen(from: &LqKnot, knot: &mut LqKnot) {
     let (n, nu) = (from.ndx(), from.nu());

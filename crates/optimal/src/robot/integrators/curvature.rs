@@ -1,4 +1,4 @@
-//! Second derivatives of a step of semi-implicit Euler.
+//! Second derivatives of a semi-implicit Euler step.
 //!
 //! With y = v + Δt a(x, u) the step is q⁺ = q ⊕ Δt y, v⁺ = y. Let E = ∂(q ⊕ δ)/∂δ at δ = Δt y, ε = Δt δy and
 //! θ(δq, ε) = λ_qᵀ((q ⊕ δq) ⊕ (Δt y + ε) ⊖ q⁺). By the chain rule
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! where ∂²θ has a block for each group of positions that is not a vector space, and is zero elsewhere.
-#![allow(non_snake_case)] // E
+#![allow(non_snake_case)] // names follow the literature: E
 
 use super::retraction::Retraction;
 use crate::lq::Hessian;
@@ -19,16 +19,16 @@ use core::ops::Range;
 /// Entries of a matrix column in the rows of a group, padded with zeros.
 type Rows = [f64; LARGEST_BLOCK];
 
-/// Workspace for the second derivatives of a model's steps.
+/// Workspace for the second derivatives of a model's Euler steps.
 #[derive(Clone, Debug)]
 pub(super) struct Curvature {
     groups: Vec<Range<usize>>,
     /// Vector Δt μ. Shape: nv. Written by: `run`.
     mu: Vec<f64>,
-    /// Hessian ∂²θ, with ε instead of controls. Shape: nv and nv; empty without groups. Written by: `run`.
+    /// Hessian ∂²θ, with ε in place of the controls. Shape: nv and nv; empty without groups. Written by: `run`.
     theta: Hessian,
-    /// Rows of one group in ∂ε/∂(x, u), ∂²θ/∂q∂(x, u) and ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns each; empty without
-    /// groups. Written by: `add_group`.
+    /// Rows of one group in the three matrices ∂ε/∂(x, u), ∂²θ/∂q∂(x, u) and ∂²θ/∂ε∂(x, u). Shape: ndx + nu columns
+    /// each; empty without groups. Written by: `add_group`.
     columns: [Vec<Rows>; 3],
 }
 
@@ -78,8 +78,8 @@ impl Curvature {
     }
 }
 
-/// Adds [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε] of one group, in O((ndx + nu)²) operations, with ε = Δt (δv + Δt (∂a/∂q δq + ∂a/∂v δv
-/// + ∂a/∂u δu)).
+/// Adds the term [∂δq; ∂ε]ᵀ ∂²θ [∂δq; ∂ε] of one group, where ε = Δt (δv + Δt (∂a/∂q δq + ∂a/∂v δv + ∂a/∂u δu)). Takes
+/// O((ndx + nu)²) operations.
 fn add_group(
     group: &Range<usize>,
     dt: f64,
@@ -117,7 +117,7 @@ fn add_group(
             column += 1;
         }
     }
-    // column j, row i: (∂δq/∂i)ᵀ ∂²θ/∂q∂j + (∂ε/∂i)ᵀ ∂²θ/∂ε∂j
+    // entry in column j, row i: (∂δq/∂i)ᵀ ∂²θ/∂q∂j + (∂ε/∂i)ᵀ ∂²θ/∂ε∂j
     let (ndx, nu) = (2 * nv, column - 2 * nv);
     let (by_state, by_control) = epsilon.split_at(ndx);
     for j in 0..column {
@@ -135,7 +135,7 @@ fn add_group(
     }
 }
 
-/// Computes out += Rᵀ x, where `rows` has the columns of R.
+/// Computes out += Rᵀ x, where `rows` contains the columns of R.
 fn add_products(rows: &[Rows], x: &Rows, out: &mut [f64]) {
     for (out, row) in out.iter_mut().zip(rows) {
         let mut sum = 0.0;

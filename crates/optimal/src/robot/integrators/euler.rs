@@ -1,6 +1,6 @@
-//! Semi-implicit Euler, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), cost ℓ Δt. The term of the limits is
-//! not multiplied by Δt.
-#![allow(non_snake_case)] // A, B
+//! Semi-implicit Euler steps, as in Crocoddyl: v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²), cost ℓ Δt. The limit term is not
+//! multiplied by Δt.
+#![allow(non_snake_case)] // names follow the literature: A, B
 
 use super::accelerations::{slopes, values};
 use super::retraction::Retraction;
@@ -9,7 +9,7 @@ use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
 use crate::robot::dynamics::batch::Group;
 use condyle_linalg::{Vector, Vectorized, at_level};
 
-/// Writes the next state of one knot of the last solved group. Returns the cost.
+/// Writes the next state of one knot of the last computed group. Returns the cost of the knot.
 pub(super) fn calc<M: ContinuousModel>(
     model: &mut M,
     lane: usize,
@@ -29,11 +29,11 @@ pub(super) fn calc<M: ContinuousModel>(
     dt * cost + term
 }
 
-/// Writes the derivatives of a step, with T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ for δ = v Δt + a Δt²:
+/// Writes the derivatives of an Euler step, with T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ at δ = v Δt + a Δt²:
 ///
 /// A = [T + E ∂a/∂q Δt², E (Δt 1 + ∂a/∂v Δt²); ∂a/∂q Δt, 1 + ∂a/∂v Δt],   B = [E ∂a/∂u Δt²; ∂a/∂u Δt]
 ///
-/// In inverse-dynamics form, only T and E are written.
+/// For a knot in inverse-dynamics form, only T and E are written.
 pub(super) fn calc_diff<M: ContinuousModel>(
     model: &mut M,
     lane: usize,
@@ -61,7 +61,8 @@ pub(super) fn calc_diff<M: ContinuousModel>(
     }
 }
 
-/// Conversion of columns a of acceleration derivatives (nv numbers) to columns of step derivatives: [a Δt²; a Δt].
+/// Conversion of columns a of the acceleration's derivatives (nv entries) to columns [a Δt²; a Δt] of a step's
+/// derivatives.
 struct Steps<'a, const N: usize>([(&'a [f64], &'a mut [f64]); N], usize, f64);
 
 impl<const N: usize> Vectorized for Steps<'_, N> {

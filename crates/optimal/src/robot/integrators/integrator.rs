@@ -1,17 +1,18 @@
-//! Integration rules: how the next state of a knot is computed from its accelerations.
+//! Integration rules, which compute the next state of a knot from its accelerations.
 
 use core::fmt;
 
-/// Integration rule, by which the next state of a knot is computed from its accelerations.
+/// Integration rule, which computes the next state of a knot from its accelerations.
 ///
-/// As in Crocoddyl, the stages of the Runge–Kutta methods add velocities of different points as if positions were a
+/// As in Crocoddyl, the Runge–Kutta methods add velocities at different configurations as if the configurations were a
 /// vector space. For the rotation of a free-flyer, these methods are therefore only of first order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Integrator {
-    /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
+    /// Semi-implicit Euler rule, v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): 1 evaluation; symplectic. Crocoddyl's
+    /// `IntegratedActionModelEuler`.
     SemiImplicitEuler,
     /// Midpoint rule, 2 evaluations.
     #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_2"))]
@@ -19,7 +20,7 @@ pub enum Integrator {
     /// Heun's rule of third order, 3 evaluations.
     #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_3"))]
     RungeKutta3,
-    /// Classical rule, 4 evaluations.
+    /// Classical Runge–Kutta rule of fourth order, 4 evaluations.
     #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_4"))]
     RungeKutta4,
 }
@@ -36,7 +37,7 @@ impl Integrator {
     }
 }
 
-/// Writes the integrator by its usual name.
+/// Writes the integrator's usual name.
 impl fmt::Display for Integrator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {

@@ -26,27 +26,27 @@ use retraction::Retraction;
 use runge_kutta::RungeKutta;
 use std::any::Any;
 
-/// Knot that integrates a [`ContinuousModel`] over Δt seconds. It can also be an impact or a terminal knot; the cost is
-/// then ℓ without the factor Δt.
+/// Knot that integrates a [`ContinuousModel`] over Δt seconds. It can also be an impact or a terminal knot, whose cost
+/// is ℓ without the factor Δt.
 #[derive(Clone, Debug)]
 pub struct Integrated<M> {
     inner: M,
     method: Method,
-    /// Δt of the knots; not used by impacts and terminal knots.
+    /// Durations Δt of the knots; not used by impacts and terminal knots.
     durations: PerModel<PerKnot<f64>>,
     controls: ControlPolynomial,
-    /// Lower and upper bounds of the controls.
+    /// Lower and upper bounds of the controls; `None` without bounds.
     bounds: Option<[Vec<f64>; 2]>,
     work: OnDemand<Work>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Method {
-    /// End of a horizon, without a next state.
+    /// Terminal knot, without a next state.
     Terminal,
-    /// Jump of the velocity.
+    /// Impact, with a jump of the velocity.
     Impact,
-    /// Step of semi-implicit Euler.
+    /// Semi-implicit Euler step.
     Euler,
     /// Runge–Kutta step with this number of stages.
     RungeKutta(usize),
@@ -58,7 +58,8 @@ struct Work {
     retraction: Retraction,
     curvature: Curvature,
     runge_kutta: Option<RungeKutta>,
-    /// Derivatives with respect to the first node of the control polynomial; only if there are other nodes.
+    /// Derivatives with respect to the first node of the control polynomial; `None` if the polynomial has only one
+    /// node.
     first: Option<Box<LqKnot>>,
 }
 
@@ -90,7 +91,7 @@ impl<M: ContinuousModel> Integrated<M> {
         Self::of(model, Method::Terminal, 0.0)
     }
 
-    /// Creates an impact, where the model computes v⁺ − v instead of accelerations.
+    /// Creates an impact. Its model computes the velocity change v⁺ − v instead of accelerations.
     pub(super) fn impact(model: M) -> Self {
         Self::of(model, Method::Impact, 0.0)
     }
@@ -117,7 +118,8 @@ impl<M: ContinuousModel> Integrated<M> {
     }
 
     /// Returns the same knot with controls that follow a polynomial in time. A terminal knot has no controls and is
-    /// returned unchanged. Bounds on controls, also those that were set before, hold at each node of the polynomial.
+    /// returned unchanged. Bounds on controls, including bounds set before this call, apply at each node of the
+    /// polynomial.
     #[must_use]
     pub fn with_controls(mut self, controls: ControlPolynomial) -> Self {
         if self.method != Method::Terminal {
@@ -128,7 +130,8 @@ impl<M: ContinuousModel> Integrated<M> {
         self
     }
 
-    /// Returns the same knot with bounds on the controls u of its model, infinite where a control is unbounded.
+    /// Returns the same knot with bounds on the controls u of its model. The bounds are infinite where a control is
+    /// unbounded.
     ///
     /// # Panics
     /// If the length of a bound differs from the number of controls of the model.
@@ -156,7 +159,7 @@ impl<M: ContinuousModel> Integrated<M> {
     /// [`Problem::outputs`](crate::Problem::outputs).
     pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         if self.method != Method::Terminal {
-            let u = &u[..self.inner.nu()]; // u(0)
+            let u = &u[..self.inner.nu()]; // shows the outputs for u(0)
             self.inner.outputs(KnotInput { t, x, u }, show);
         }
     }
@@ -168,19 +171,19 @@ impl<M: ContinuousModel> Integrated<M> {
         assert_length("u", u.len(), self.nu());
     }
 
-    /// Returns whether several states can be computed at once. They cannot with Runge–Kutta methods, which compute
-    /// stage after stage, and with controls that change within a knot.
+    /// Returns whether several states can be computed in one batch. This excludes Runge–Kutta methods, which compute
+    /// stage after stage, and controls that change within a knot.
     fn is_simple_step(&self) -> bool {
         !matches!(self.method, Method::RungeKutta(_)) && self.controls.is_constant()
     }
 
-    /// Returns the controls from which a step is computed: all nodes of the polynomial for the stages of a Runge–Kutta
-    /// method, and otherwise u(0).
+    /// Returns the controls from which a step is computed. For a Runge–Kutta method these are all nodes of the
+    /// polynomial; for other methods, only u(0).
     fn controls_of_step<'u>(&self, u: &'u [f64]) -> &'u [f64] {
         if matches!(self.method, Method::RungeKutta(_)) { u } else { &u[..self.inner.nu()] }
     }
 
-    /// Writes the next state of one knot of the last solved group. Returns the cost.
+    /// Writes the next state of one knot of the last computed group. Returns the cost of the knot.
     fn step(&mut self, lane: usize, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
         let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
         let (inner, Work { retraction, runge_kutta, .. }) = self.parts();
@@ -201,7 +204,7 @@ impl<M: ContinuousModel> Integrated<M> {
         }
     }
 
-    /// Writes the derivatives at one knot of the last solved group.
+    /// Writes the derivatives at one knot of the last computed group.
     fn differentiate(&mut self, lane: usize, input: KnotInput<'_>, group: Group<'_>, knot: &mut LqKnot) {
         let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
         let (inner, Work { retraction, runge_kutta, first, .. }) = self.parts();
@@ -215,7 +218,7 @@ impl<M: ContinuousModel> Integrated<M> {
             (Method::Impact, ..) => {
                 let nv = inner.nv();
                 let Derivatives { da_dq, da_dv, .. } = slopes(inner, lane, input, 1.0, group, knot);
-                // A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v], as for an Euler step with Δt = 0
+                // the Jacobian A = [1, 0; ∂v⁺/∂q, ∂v⁺/∂v] has the structure of an Euler step with Δt = 0
                 knot.structure.set_euler(0.0, &[]);
                 knot.A.fill_with_identity();
                 let mut below = knot.A.rows_mut(nv, nv);
@@ -232,7 +235,8 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         GroupModel::lanes(self)
     }
 
-    /// Computes dynamics, steps, costs and limits of a group of knots, as many knots at a time as a vector has lanes.
+    /// Computes dynamics, steps, costs and limits of a group of knots, in batches of as many knots as a SIMD register
+    /// has lanes.
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
         let (nx, nu, inner_nu, count) = (self.nx(), self.nu(), self.inner.nu(), knots.len());
@@ -251,7 +255,7 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         for from in (0..count).step_by(lanes) {
             let to = (from + lanes).min(count);
             let (knots, xs) = (&knots[from..to], &xs[from * nx..to * nx]);
-            let controls = &us[from * nu..][..(to - from) * inner_nu]; // several knots only if controls are constant
+            let controls = &us[from * nu..][..(to - from) * inner_nu]; // with several knots, controls are constant
             let group = Group { knots, xs, us: controls, what: what.part(from..to, count), limited: true };
             if !matches!(self.method, Method::RungeKutta(_)) {
                 solve(&mut self.inner, group);
@@ -425,7 +429,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         Some(self)
     }
 
-    /// Computes second derivatives of a step of semi-implicit Euler with constant controls: see `curvature.rs`.
+    /// Computes the second derivatives of a semi-implicit Euler step with constant controls: see `curvature.rs`.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let (euler, dt) = (self.method == Method::Euler, *self.durations.at(t).at(t));
         let (inner, Work { retraction, curvature, first: None, .. }) = self.parts() else { return false };

@@ -1,6 +1,6 @@
-//! Retraction: a step δ of a configuration q, and the Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both are the
-//! identity, except a block for each group of positions that is not a vector space.
-#![allow(non_snake_case)] // T, E
+//! Retraction q ⊕ δ of a configuration q by a step δ, and its Jacobians T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ. Both
+//! Jacobians are the identity, except for a block for each group of positions that is not a vector space.
+#![allow(non_snake_case)] // names follow the literature: T, E
 
 use crate::EulerBlock;
 use crate::lq::LARGEST_BLOCK;
@@ -9,14 +9,14 @@ use condyle_linalg::{Vector, Vectorized, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
 
-/// Step of a configuration and its Jacobians.
+/// Step of a configuration, and the Jacobians of the retraction.
 #[derive(Debug)]
 pub(super) struct Retraction {
     /// Step δ. Shape: nv.
     pub delta: Vec<f64>,
-    /// Jacobian T, only in the blocks of groups. Shape: nv × nv. Written by: `differentiate`.
+    /// Jacobian T; only the blocks of groups are written. Shape: nv × nv. Written by: `differentiate`.
     T: DMatrix<f64>,
-    /// Jacobian E, only in the blocks of groups. Shape: nv × nv. Written by: `differentiate`.
+    /// Jacobian E; only the blocks of groups are written. Shape: nv × nv. Written by: `differentiate`.
     pub E: DMatrix<f64>,
 }
 
@@ -26,7 +26,7 @@ impl Retraction {
         Self { delta: vec![0.0; nv], T: square.clone(), E: square }
     }
 
-    /// Sets the step of semi-implicit Euler, δ = v Δt + a Δt².
+    /// Sets δ to the step of semi-implicit Euler, δ = v Δt + a Δt².
     pub(super) fn set_euler(&mut self, v: &[f64], a: &[f64], dt: f64) {
         for k in 0..v.len() {
             self.delta[k] = v[k] * dt + a[k] * dt * dt;
@@ -40,7 +40,7 @@ impl Retraction {
         }
     }
 
-    /// Copies the blocks of T and E of each group to `blocks`.
+    /// Copies the blocks of T and E to `blocks`, one pair for each group.
     pub(super) fn write_blocks(&self, groups: &[Range<usize>], blocks: &mut [EulerBlock]) {
         for (group, block) in groups.iter().zip(blocks) {
             block.T.copy_from(&self.T.view((group.start, group.start), (group.len(), group.len())));
@@ -48,7 +48,7 @@ impl Retraction {
         }
     }
 
-    /// Replaces X by E X, where the first nv rows of X belong to δ.
+    /// Replaces X by E X. The first nv rows of X are derivatives of δ.
     pub(super) fn multiply(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
         for group in groups {
             let rows = X.nrows();
@@ -56,8 +56,8 @@ impl Retraction {
         }
     }
 
-    /// Replaces X = ∂(δ, δv) by ∂(x ⊕ (δ, δv)), with the chain rule: E X + T for positions, X + 1 for velocities. The
-    /// first columns of X are derivatives with respect to x.
+    /// Replaces X = ∂(δ, δv) by ∂(x ⊕ (δ, δv)), by the chain rule: E X + T in the rows of positions, X + 1 in the rows
+    /// of velocities. The first columns of X are derivatives with respect to x.
     pub(super) fn chain(&self, groups: &[Range<usize>], X: &mut DMatrix<f64>) {
         self.multiply(groups, X);
         let n = X.nrows();
@@ -73,7 +73,7 @@ impl Retraction {
     }
 }
 
-/// Multiplication in place of a group's rows by the group's block of E.
+/// Multiplication of a group's rows by the group's block of E, in place.
 struct Multiply<'a> {
     E: &'a DMatrix<f64>,
     group: &'a Range<usize>,

@@ -1,13 +1,11 @@
-//! Runge–Kutta methods, as Crocoddyl's `IntegratedActionModelRK`.
+//! Runge–Kutta methods, as in Crocoddyl's `IntegratedActionModelRK`.
 //!
 //! ```text
 //! y₀ = x,   kᵢ = (vᵢ, a(yᵢ, uᵢ)),   yᵢ₊₁ = x ⊕ cᵢ₊₁ Δt kᵢ,   x⁺ = x ⊕ Δt Σ bᵢ kᵢ,   cost = Δt Σ bᵢ ℓ(yᵢ, uᵢ)
 //! ```
 //!
 //! where uᵢ = u(cᵢ) is the value of the control polynomial u(s) = Σ lₖ(s) wₖ. Derivatives are taken with respect to all
-//! w.
-//!
-//! Limits are evaluated at y₀ only.
+//! w. Limits are evaluated only at y₀.
 //!
 //! Source: Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I* (1993), section II.1.
 
@@ -23,27 +21,27 @@ use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
 pub(super) struct RungeKutta {
-    /// Times of the stages, as fractions of Δt; `b` has the weights of the stages.
+    /// Times of the stages, as fractions of Δt; the next field contains the weights of the stages.
     c: &'static [f64],
     b: &'static [f64],
-    /// Weights of the controls w in the controls of each stage.
+    /// Weights lₖ of the controls wₖ at each stage.
     l: [[f64; 3]; 4],
     /// Controls of the current stage. Shape: nu.
     u: Vec<f64>,
     /// State y of the current stage. Shape: nq + nv.
     y: Vec<f64>,
-    /// Slope k of the current stage; `dx` is the step to the next stage, `sum` is Σ b k. Shape: 2 nv.
+    /// Slope k of the current stage; the next fields are the step to the next stage and the sum Σ b k. Shape: 2 nv.
     k: Vec<f64>,
     dx: Vec<f64>,
     sum: Vec<f64>,
-    /// Derivatives ∂y/∂(x, w), ∂k/∂(x, w) and ∂(Σ b k)/∂(x, w). Shape: 2 nv × (2 nv + nw).
+    /// Derivatives ∂y/∂(x, w); the next fields are ∂k/∂(x, w) and ∂(Σ b k)/∂(x, w). Shape: 2 nv × (2 nv + nw).
     dy: DMatrix<f64>,
     dk: DMatrix<f64>,
     dsum: DMatrix<f64>,
     /// Derivatives of the cost at the current stage.
     stage: LqKnot,
-    /// Products with the Hessian of the current stage. Shape: (2 nv + nw) × (2 nv + nw), and 2 nv × (2 nv + nw) for
-    /// `W`.
+    /// Products of derivatives with the Hessian of the current stage. Shape: (2 nv + nw) × (2 nv + nw); `W`: 2 nv × (2
+    /// nv + nw).
     H: DMatrix<f64>,
     W: DMatrix<f64>,
 }
@@ -83,7 +81,7 @@ impl RungeKutta {
         }
     }
 
-    /// Computes x ⊕ c Δt k into `self.y`, and the step c Δt k into `self.dx`.
+    /// Computes the state x ⊕ c Δt k into `self.y`, and the step c Δt k into `self.dx`. The argument `step` is c Δt.
     fn advance<M: ContinuousModel>(&mut self, model: &M, x: &[f64], step: f64) {
         let (nq, nv) = (model.nq(), model.nv());
         (0..2 * nv).for_each(|i| self.dx[i] = step * self.k[i]);
@@ -117,7 +115,7 @@ impl RungeKutta {
             let (input, limited) = (KnotInput { t, x: &self.y, u: &self.u }, i == 0);
             solve(model, Group::one(&input, Evaluation::Values, limited));
             let (a, rate, limits) = values(model, 0, input, limited);
-            term += limits; // the term of the limits is zero at later stages
+            term += limits; // the limit term is zero at later stages
             cost += self.b[i] * rate;
             self.k[..nv].copy_from_slice(&self.y[nq..]);
             self.k[nv..].copy_from_slice(a);
@@ -128,7 +126,7 @@ impl RungeKutta {
         dt * cost + term
     }
 
-    /// Writes the derivatives of a step for the controls w, with the chain rule through the stages.
+    /// Writes the derivatives of a step for the controls w, by the chain rule through the stages.
     pub(super) fn calc_diff<M: ContinuousModel>(
         &mut self,
         model: &mut M,
@@ -187,8 +185,8 @@ impl RungeKutta {
         knot.B.copy_from(&self.dsum.columns(n, nw));
     }
 
-    /// Adds the cost of stage i, a function of y and uᵢ, converted to a function of x and w by the chain rule: H += Yᵀ
-    /// Q Y and further products, with Y = ∂y/∂(x, w) and ∂uᵢ/∂wₖ = lₖ.
+    /// Adds the derivatives of the cost of stage i. The cost is a function of y and uᵢ; the chain rule converts its
+    /// derivatives to x and w: H += Yᵀ Q Y and further products, with Y = ∂y/∂(x, w) and ∂uᵢ/∂wₖ = lₖ.
     fn add_cost(&mut self, knot: &mut LqKnot, i: usize, n: usize, nu: usize) {
         let Self { l, dy: Y, stage, H, W, .. } = self;
         let (l, nw) = (l[i], Y.ncols() - n);

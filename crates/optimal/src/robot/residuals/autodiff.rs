@@ -1,4 +1,4 @@
-//! User-defined residuals that are written for any scalar, with exact Jacobians by dual numbers.
+//! User-defined residuals that are generic over the scalar type. Dual numbers compute their exact Jacobians.
 
 use super::own::{Inputs, OwnResidual, ResidualFunction};
 use condyle_dynamics::{
@@ -8,39 +8,40 @@ use condyle_spatial::Scalar;
 use std::any::Any;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Residual r(t, x, u) of a robot, written for any [`Scalar`], so that [`OwnResidual::autodiff`] can differentiate r.
+/// Residual r(t, x, u) of a robot, generic over the [`Scalar`] type, so that [`OwnResidual::autodiff`] can
+/// differentiate it.
 ///
-/// Mark `calc` with `#[inline(always)]`: `calc` is then compiled for the vector registers in which the Jacobian is
+/// Mark `calc` with `#[inline(always)]`. The compiler then compiles `calc` for the SIMD level at which the Jacobian is
 /// computed.
 pub trait GenericResidual: Any + Send + Sync {
     /// Returns the number of entries of r.
     fn size(&self) -> usize;
 
-    /// Returns the arguments on which r depends: all by default. The result must not change. Columns of the Jacobian
-    /// for other arguments are zero and are not computed, so fewer arguments take less time.
+    /// Returns the arguments on which r depends; the default is all arguments. The result must not change. Columns of
+    /// the Jacobian for other arguments are zero and are not computed, which saves time.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
 
-    /// Computes r at a knot into `r`, which has [`size`](Self::size) numbers.
+    /// Computes r at a knot into `r`, which has [`size`](Self::size) entries.
     fn calc<S: Scalar>(&self, state: &mut RobotState<'_, S>, r: &mut [S]);
 }
 
-/// State and controls of a robot at a knot, for any scalar, with the kinematics of this state.
+/// State and controls of a robot at a knot, generic over the scalar type, with the kinematics of this state.
 #[derive(Debug)]
 pub struct RobotState<'a, S> {
     /// Robot.
     pub model: &'a Model,
     /// Index of the knot.
     pub t: usize,
-    /// Position, nq numbers.
+    /// Position, nq entries.
     pub q: &'a [S],
-    /// Velocity, nv numbers.
+    /// Velocity, nv entries.
     pub v: &'a [S],
-    /// Controls of the knot, nu numbers; none at the terminal knot and at an impact.
+    /// Controls of the knot, nu entries; none at the terminal knot and at an impact.
     pub u: &'a [S],
     data: &'a mut Data<S>,
-    /// Whether `data` holds the placements at q.
+    /// Whether `data` contains the placements at q.
     placed: bool,
 }
 
@@ -51,7 +52,8 @@ impl<'a, S: Scalar> RobotState<'a, S> {
         Self { model, t, q, v, u, data, placed: false }
     }
 
-    /// Returns the placements of all bodies and frames at q. They are computed at the first call and kept.
+    /// Returns the placements of all bodies and frames at q. The first call computes the placements; later calls return
+    /// the stored ones.
     pub fn placements(&mut self) -> Placements<'_, S> {
         if !self.placed {
             forward_kinematics(self.model, self.data, self.q);
@@ -60,8 +62,8 @@ impl<'a, S: Scalar> RobotState<'a, S> {
         self.data.placements(self.model).expect("bodies were just placed")
     }
 
-    /// Computes the placements and velocities of all bodies and frames at (q, v). One call is enough for a whole
-    /// residual: the result has the placements, too.
+    /// Computes the placements and velocities of all bodies and frames at (q, v). The result contains both, so a
+    /// residual needs only one call.
     pub fn velocities(&mut self) -> Velocities<'_, S> {
         self.placed = true;
         forward_velocities(self.model, self.data, self.q, self.v)
@@ -75,12 +77,12 @@ impl<'a, S: Scalar> RobotState<'a, S> {
 }
 
 impl OwnResidual {
-    /// Makes a residual from a function that is written for any scalar. Dual numbers compute its exact Jacobian, in the
-    /// tangent space of the state: four or eight columns take one evaluation in vector registers (AVX2, NEON, SIMD128
-    /// or AVX-512). The Hessian of a cost of this residual is the Gauss–Newton approximation.
+    /// Creates a residual from a function that is generic over the scalar type. Dual numbers compute its exact
+    /// Jacobian, in the tangent space of the state. One evaluation in SIMD registers (AVX2, NEON, SIMD128 or AVX-512)
+    /// computes four or eight columns. The Hessian of a cost of this residual is the Gauss–Newton approximation.
     ///
-    /// Copies share the function. Each thread takes a workspace that no other thread uses, and allocates a workspace
-    /// only if all existing ones are in use.
+    /// Copies of the residual share the function. Each call uses a workspace that no other thread uses. A new workspace
+    /// is allocated only if all existing workspaces are in use.
     ///
     /// ```
     /// use condyle_dynamics::robots;
@@ -110,22 +112,22 @@ impl OwnResidual {
     }
 }
 
-/// Generic residual with the workspaces in which it is computed.
+/// Generic residual, with the workspaces for its evaluation.
 struct Differentiated<F> {
     model: Arc<Model>,
     function: F,
-    /// Workspaces that no thread uses at present.
+    /// Workspaces that no thread uses at the moment.
     idle: Mutex<Vec<Scratch>>,
 }
 
-/// Workspaces of one thread, for knots with nu controls.
+/// Workspace of one thread, for knots with nu controls.
 struct Scratch {
     nu: usize,
     data: Box<Data<f64>>,
     /// Vector (q, v, u). Written by: `calc_diff`.
     state: Vec<f64>,
     jacobian: LaneJacobian,
-    /// Columns of the Jacobian with respect to (δq, δv, δu) that are computed.
+    /// Indices of the computed columns of the Jacobian with respect to (δq, δv, δu).
     columns: Vec<usize>,
 }
 
@@ -154,7 +156,7 @@ impl<F: GenericResidual> Differentiated<F> {
     }
 }
 
-/// Generic residual at a knot, as a function of the vector (q, v, u).
+/// Generic residual at a fixed knot, as a function of the vector (q, v, u).
 struct AtKnot<'a, F> {
     model: &'a Model,
     function: &'a F,
@@ -188,7 +190,7 @@ impl<F: GenericResidual> ResidualFunction for Differentiated<F> {
             let [[nq, nv], [own_nq, own_nv]] = [found, expected];
             return Err(format!("it is of a robot of nq = {own_nq}, nv = {own_nv}; this one has nq = {nq}, nv = {nv}"));
         }
-        self.with_scratch(nu, |_| ()); // allocates a workspace, so that the first solve does not
+        self.with_scratch(nu, |_| ()); // allocates a workspace, so that the first solve does not allocate one
         Ok(())
     }
 

@@ -1,14 +1,15 @@
 //! Friction cones, wrench cones and the support of the centre of pressure, as rows of inequalities.
 //!
 //! A contact's force is expressed along the axes of the contact's rows. The rotation R of a cone maps the axes of the
-//! surface, with the normal z, to these axes. Rows are in Crocoddyl's order, so residuals have the same numbers as in
-//! Crocoddyl.
+//! surface, whose z axis is the normal, to the axes of the contact's rows. The rows are in Crocoddyl's order, so
+//! residuals have the same values as in Crocoddyl.
 
 use crate::Error;
 use crate::problem::leave_a_value;
 use condyle_dynamics::{Mat3, Vec3};
 
-/// Coulomb's cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force: rows A with lower ≤ A f ≤ upper.
+/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, and bounds on the normal force. The rows of a matrix A limit the
+/// force f: lower ≤ A f ≤ upper.
 ///
 /// ```
 /// use condyle_optimal::robot::FrictionCone;
@@ -21,13 +22,13 @@ use condyle_dynamics::{Mat3, Vec3};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct FrictionCone {
-    /// Rotation R: the axes of the surface, expressed along the axes of the contact.
+    /// Rotation R from the axes of the surface to the axes of the contact's rows.
     pub rotation: Mat3<f64>,
     /// Coefficient of friction μ.
     pub mu: f64,
     /// Number of sides of the pyramid: an even number from 4 to [`MOST_FACETS`](Self::MOST_FACETS).
     pub facets: usize,
-    /// Whether the pyramid lies inside the cone; otherwise it lies around the cone.
+    /// Whether the pyramid is inside the cone. If not, the cone is inside the pyramid.
     pub inner: bool,
     /// Least normal force (N).
     pub least: f64,
@@ -36,8 +37,8 @@ pub struct FrictionCone {
     pub greatest: f64,
 }
 
-/// Limits of the wrench w (force first) of a rectangular sole, as rows A with lower ≤ A w ≤ upper. They limit friction,
-/// the centre of pressure (inside the rectangle), and the yaw moment that friction can produce.
+/// Limits of the wrench w (force first) of a rectangular sole, as rows of a matrix A with lower ≤ A w ≤ upper. The rows
+/// limit friction, the centre of pressure (inside the rectangle), and the yaw moment that friction can produce.
 ///
 /// Source: Caron, Pham, Nakamura, *Stability of surface contacts for humanoid robots* (2015).
 ///
@@ -51,7 +52,7 @@ pub struct FrictionCone {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct WrenchCone {
-    /// Cone of the force.
+    /// Friction cone of the force.
     pub friction: FrictionCone,
     /// Side lengths of the rectangle along the axes x and y of the surface (m).
     pub size: [f64; 2],
@@ -61,8 +62,8 @@ impl FrictionCone {
     /// Maximum number of sides of a pyramid. A pyramid with 1000 sides is within 5e-6 of the round cone.
     pub const MOST_FACETS: usize = 1000;
 
-    /// Returns a pyramid of four sides around the cone, on a surface with the normal z. Any normal force that pushes is
-    /// allowed.
+    /// Returns a pyramid with four sides around the cone, on a surface with the normal z. Any normal force that pushes
+    /// is allowed.
     pub fn new(mu: f64) -> Self {
         Self { rotation: Mat3::identity(), mu, facets: 4, inner: false, least: 0.0, greatest: f64::INFINITY }
     }
@@ -111,7 +112,7 @@ impl FrictionCone {
         (lower, upper)
     }
 
-    /// Checks the numbers of the cone. Problems that contain the cone also make this check.
+    /// Checks the parameters of the cone. A problem that contains the cone also makes this check.
     ///
     /// # Errors
     /// [`Error::Cone`] if μ is negative or not finite, or if the number of sides is odd, below 4 or above 1000. Also if
@@ -120,7 +121,7 @@ impl FrictionCone {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }
 
-    /// Returns an error message if a number of the cone is invalid.
+    /// Returns an error message if a parameter of the cone is invalid.
     pub(crate) fn wrong(&self) -> Option<String> {
         let Self { least, greatest, .. } = *self;
         if !(self.mu >= 0.0 && self.mu.is_finite()) {
@@ -156,15 +157,15 @@ pub(crate) fn pressure_rows(R: Mat3<f64>, [length, width]: [f64; 2]) -> [[f64; 6
 }
 
 impl WrenchCone {
-    /// Checks the numbers of the cone. Problems that contain the cone also make this check.
+    /// Checks the parameters of the cone. A problem that contains the cone also makes this check.
     ///
     /// # Errors
-    /// [`Error::Cone`] as for [`FrictionCone::check`], and for a side that is negative or not finite.
+    /// [`Error::Cone`] in the cases of [`FrictionCone::check`], and for a side length that is negative or not finite.
     pub fn check(&self) -> Result<(), Error> {
         self.wrong().map_or(Ok(()), |what| Err(Error::Cone { what }))
     }
 
-    /// Returns an error message if a number of the cone is invalid.
+    /// Returns an error message if a parameter of the cone is invalid.
     pub(crate) fn wrong(&self) -> Option<String> {
         self.friction.wrong().or_else(|| wrong_size(self.size))
     }
@@ -182,7 +183,8 @@ impl WrenchCone {
         let [length, width] = self.size.map(|side| 0.5 * side);
         for turn in [-1.0, 1.0] {
             for (sx, sy) in [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)] {
-                // |w f_x ∓ μ τ_x| + |l f_y ∓ μ τ_y| ± τ_z ≤ μ (l + w) f_z
+                // row of |w f_x ∓ μ τ_x| + |l f_y ∓ μ τ_y| ± τ_z ≤ μ (l + w) f_z, with the length l and the width w of
+                // the sole
                 let force = R * Vec3::new(sx * width, sy * length, -mu * (length + width));
                 let moment = R * Vec3::new(turn * sx * mu, turn * sy * mu, turn);
                 let ([a, b, c], [d, e, f]) = (force.to_array(), moment.to_array());

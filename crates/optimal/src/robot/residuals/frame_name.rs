@@ -1,9 +1,9 @@
-//! Names of frames, which are independent of a particular robot.
+//! Names of frames, which do not depend on a particular robot.
 
 use condyle_dynamics::{Frame, FrameKind, Model};
 
-/// Name of a frame. When an action is made, the index of the frame is looked up in the action's robot; an unknown name
-/// is an error.
+/// Name of a frame. When an action is created, it looks up the index of the frame in its robot. An unknown name is an
+/// error.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -20,8 +20,8 @@ use condyle_dynamics::{Frame, FrameKind, Model};
 pub struct FrameName {
     /// Name of the frame.
     pub name: String,
-    /// Kind of the frame, if several frames have the same name. Without a kind, or if no frame has this kind,
-    /// [`Model::frame`] chooses.
+    /// Kind of the frame, needed if several frames have the same name. Without a kind, or if no frame has this kind,
+    /// [`Model::frame`] chooses the frame.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub kind: Option<FrameKind>,
 }
@@ -42,7 +42,7 @@ impl FrameName {
     /// Returns the index of the frame in a robot.
     ///
     /// # Errors
-    /// [`condyle_dynamics::Error::UnknownFrame`], with the nearest name.
+    /// [`condyle_dynamics::Error::UnknownFrame`], whose message contains the most similar name.
     pub fn number(&self, model: &Model) -> Result<usize, condyle_dynamics::Error> {
         let is_it = |frame: &Frame| frame.name == self.name && Some(frame.kind) == self.kind;
         model.frames().iter().position(is_it).map_or_else(|| model.frame(&self.name), Ok)

@@ -1,5 +1,5 @@
-//! Gravity residual: the efforts of a knot minus the efforts that hold the robot still, for one knot or several at
-//! once.
+//! Gravity residual: the efforts of a knot minus the efforts that hold the robot still. It is computed for one knot or
+//! for several knots in SIMD lanes.
 
 use super::kernel::KnotGroup;
 use crate::robot::knot_data::unpack;
@@ -8,22 +8,22 @@ use condyle_spatial::block::Block;
 use condyle_spatial::kernel;
 use nalgebra::DMatrix;
 
-/// Vector M q̈ + h − g at knots with contacts, −g at other knots.
+/// Gravity residual without τ: M q̈ + h − g at knots with contacts, −g at other knots.
 #[derive(Debug)]
 pub(crate) struct GravityResidual<S> {
-    /// Value of the vector. Shape: nv.
+    /// Value of the gravity residual without τ. Shape: nv.
     value: Vec<S>,
-    /// Derivative with respect to q. Shape: nv × nv.
+    /// Derivative of the gravity residual with respect to q. Shape: nv × nv.
     by_q: DMatrix<S>,
 }
 
 impl<S: Block<Number = f64>> GravityResidual<S> {
-    /// Allocates the vector and its derivative for nv coordinates.
+    /// Allocates the gravity residual and its derivative for nv coordinates.
     pub(crate) fn new(nv: usize) -> Self {
         Self { value: vec![S::zero(); nv], by_q: DMatrix::from_element(nv, nv, S::zero()) }
     }
 
-    /// Computes the vector at (q, v, q̈), and its derivatives if `slopes` is set.
+    /// Computes the gravity residual without τ at (q, v, q̈), and also its derivatives if `slopes` is set.
     pub(crate) fn run(
         &mut self,
         model: &Model,
@@ -56,7 +56,7 @@ impl<S: Block<Number = f64>> GravityResidual<S> {
 }
 
 kernel! {
-    /// Computes x −= y.
+    /// Subtracts y from x.
     fn subtract<S>(x: &mut [S], y: &[S]) {
         for i in 0..x.len().min(y.len()) {
             x[i] -= y[i];

@@ -1,6 +1,6 @@
-//! Kinematic residuals and their Jacobians, for one knot or for several knots in the lanes of a vector register. Each
+//! Kinematic residuals and their Jacobians, for one knot or for several knots in the lanes of a SIMD register. Each
 //! kind of residual has its own function, compiled for the SIMD level of the scalar.
-#![allow(non_snake_case)] // J, R, X
+#![allow(non_snake_case)] // names follow the literature: J, R, X
 
 use super::layout::{Plan, ROWS, STRIDE, row_width};
 use super::residual::Residual;
@@ -13,7 +13,7 @@ use condyle_dynamics::{
 use condyle_spatial::block::{Block, Strided, gather_rows};
 use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
-/// Knots whose residuals read the same quantities.
+/// Group of knots whose residuals read the same quantities.
 pub(crate) struct KnotGroup<'a> {
     /// Terms of each knot.
     pub terms: &'a [KnotTerms<'a>],
@@ -26,8 +26,8 @@ pub(crate) struct KnotGroup<'a> {
 }
 
 impl KnotGroup<'_> {
-    /// Calls `visit` for each kinematic residual with a weight above 0 at one knot at least. The two numbers are the
-    /// index of the list (costs or limits), and the index of the residual in this list.
+    /// Calls `visit` for each kinematic residual that has a weight above 0 at one or more knots. The two numbers are
+    /// the index of the list (costs or limits), and the index of the residual in this list.
     fn each(&mut self, mut visit: impl FnMut(&mut Self, [usize; 2], &Residual, &Plan)) {
         let (first, terms) = (self.terms[0], self.terms);
         for list in 0..2 {
@@ -63,7 +63,7 @@ impl KnotGroup<'_> {
 /// Workspace of kinematic residuals.
 #[derive(Debug)]
 pub(crate) struct ResidualKernel<S> {
-    /// Numbers of the residuals' targets.
+    /// Entries of the residuals' targets, one lane per knot.
     t: [S; 12],
     r: [S; STRIDE],
     /// Jacobians ∂r/∂v and ∂r/∂q. Shape: 6 × nv.
@@ -231,7 +231,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the error v − v_ref of a frame's velocity, ∂v/∂q̇ and ∂v/∂q.
+    /// Computes the error v − v_ref of a frame's velocity, and its Jacobians ∂v/∂q̇ and ∂v/∂q.
     fn frame_velocity<S>(
         velocities: Velocities<'_, S>, frame: usize, reference: ReferenceFrame, t: &[S; 12], r: &mut [S; STRIDE],
         slopes: bool, J: &mut [Matrix<S>; 2],
@@ -245,13 +245,13 @@ kernel! {
     }
 }
 
-/// Returns three numbers of a target, from index k on.
+/// Returns three entries of a target, from index k on.
 #[inline(always)]
 fn vector<S: Scalar>(t: &[S; 12], k: usize) -> Vec3<S> {
     Vec3::new(t[k], t[k + 1], t[k + 2])
 }
 
-/// Returns the rotation in the numbers of a target.
+/// Returns the rotation from the entries of a target.
 #[inline(always)]
 fn rotation<S: Scalar>(t: &[S; 12]) -> Mat3<S> {
     Mat3 { x: vector(t, 3), y: vector(t, 6), z: vector(t, 9) }

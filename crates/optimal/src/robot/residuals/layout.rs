@@ -1,6 +1,6 @@
-//! Layout of the residuals of a knot: how each residual is computed, which quantities it reads, and where its entries
-//! are stored.
-#![allow(non_snake_case)] // W
+//! Layout of the residuals of a knot: the method of computing each residual, the quantities that it reads, and the
+//! offset of its entries.
+#![allow(non_snake_case)] // names follow the literature: W
 
 use super::residual::{Part, Residual};
 use crate::robot::outputs::{Capabilities, Output};
@@ -8,27 +8,27 @@ use condyle_dynamics::Model;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;
 
-/// Plan for the computation of a residual, made once for a robot.
+/// Plan for the computation of a residual, created once for a robot.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// Number of entries of the residual.
     pub n: usize,
-    /// Number of entries of all terms before this one.
+    /// Offset of the residual's entries: the number of entries of all terms before this one.
     pub first: usize,
     /// Index of a kinematic residual among the kinematic residuals of the knot.
     pub index: usize,
     /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
-    /// Rows in λ of the residual's contact.
+    /// Range in λ of the rows of the residual's contact.
     pub rows: Range<usize>,
     /// Whether the knot has contacts.
     pub in_contact: bool,
-    /// Matrix W, row after row, of a residual W f of a contact's force f or W τ of the efforts τ.
+    /// Matrix W, row after row, of a residual W f or W τ. Here f is a contact's force and τ the efforts.
     pub W: Vec<f64>,
 }
 
 impl Plan {
-    /// Returns the plan of a residual, or a text that describes what does not fit the robot and the capabilities of its
+    /// Returns the plan of a residual, or a text that describes why the residual does not fit the robot or its
     /// dynamics.
     pub(crate) fn new(model: &Model, capabilities: &Capabilities, residual: &Residual) -> Result<Self, String> {
         let n = residual.check(model, capabilities)?;
@@ -43,23 +43,24 @@ impl Plan {
     }
 }
 
-/// Returns the width of a row of a kinematic residual's Jacobian, which is with respect to q alone or to (v, q).
+/// Returns the length of a row of a kinematic residual's Jacobian. The Jacobian is with respect to only q, or to (v,
+/// q).
 pub(crate) fn row_width(nv: usize, residual: &Residual) -> usize {
     if residual.part() == Part::Positions { nv } else { 2 * nv }
 }
 
-/// Memory sizes for the residuals of a knot, and the quantities that these residuals read.
+/// Memory sizes for the residuals of a knot, and flags for the quantities that these residuals read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct KnotLayout {
     /// Largest number of entries of one residual.
     pub longest: usize,
-    /// Number of rows of Jacobians with respect to (u, v, q), and with respect to q alone.
+    /// Number of Jacobian rows with respect to (u, v, q), and number of Jacobian rows with respect to only q.
     pub rows: [usize; 2],
     /// Number of kinematic residuals.
     pub kinematic: usize,
-    /// Whether a residual reads forces.
+    /// Whether a residual reads contact forces.
     pub forces: bool,
-    /// Whether a residual is user-defined; `curved`: whether a user-defined residual has second derivatives.
+    /// Whether a residual is user-defined; the next field tells whether a user-defined residual has second derivatives.
     pub own: bool,
     pub curved: bool,
     pub requirements: Requirements,
@@ -81,7 +82,7 @@ impl KnotLayout {
         Self { longest: plan.n, rows, kinematic, forces, own, curved, requirements }
     }
 
-    /// Returns a layout that is large enough for two knots, each by itself.
+    /// Returns a layout that is large enough for either of two knots.
     pub(crate) fn or(self, other: Self) -> Self {
         let most = |a: [usize; 2], b: [usize; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         let kinematic = self.kinematic.max(other.kinematic);
@@ -89,7 +90,7 @@ impl KnotLayout {
     }
 }
 
-/// Layout of the residuals of two lists together.
+/// Layout of the residuals of two lists in one knot.
 impl Add for KnotLayout {
     type Output = Self;
     fn add(self, other: Self) -> Self {
@@ -106,19 +107,20 @@ impl Add for KnotLayout {
     }
 }
 
-/// Quantities of the whole robot that the residuals of a knot read. Each quantity is computed once.
+/// Flags for the quantities of the whole robot that the residuals of a knot read. Each quantity is computed once per
+/// knot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Requirements {
     pub placements: bool,
     pub velocities: bool,
-    /// Jacobian of the centre of mass.
+    /// Whether a residual reads the Jacobian of the centre of mass.
     pub com: bool,
     pub momentum: bool,
-    /// Efforts g that hold the robot still.
+    /// Whether a residual reads the efforts g that hold the robot still.
     pub gravity: bool,
-    /// Efforts M q̈ + h of joints and contacts together.
+    /// Whether a residual reads the efforts M q̈ + h of joints and contacts together.
     pub inertia: bool,
-    /// Change of the velocity of the centre of mass at an impact.
+    /// Whether a residual reads the velocity change of the centre of mass at an impact.
     pub impulse_com: bool,
 }
 
@@ -152,29 +154,30 @@ impl BitOr for Requirements {
     }
 }
 
-/// Distance between the first numbers of consecutive kinematic residuals.
+/// Stride of kinematic residuals: the distance between the first entries of consecutive residuals.
 pub(crate) const STRIDE: usize = 8;
-/// Number of entries of the Jacobian of a residual for each coordinate: six rows with respect to v and q.
+/// Number of Jacobian entries of a residual per coordinate: six rows with respect to v, and six with respect to q.
 pub(crate) const ROWS: usize = 12;
 
-/// Quantities that the residuals of a knot read. Quantities that no term of the knot requires are not written.
+/// Quantities that the residuals of a knot read. A quantity is not written if no term of the knot requires it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ResidualData {
-    /// Kinematic residuals of costs, then of limits.
+    /// Kinematic residuals of the costs, then of the limits.
     pub kinematic: [KinematicData; 2],
-    /// Gravity residual: M q̈ + h − g at a knot with contacts, −g at other knots. Shape: nv.
+    /// Gravity residual without τ: M q̈ + h − g at a knot with contacts, −g at other knots. Shape: nv.
     pub gravity_residual: Vec<f64>,
-    /// Derivatives of the gravity residual with respect to q, v and q̈; for −g only with respect to q. Shape: nv × nv.
+    /// Derivatives of `gravity_residual` with respect to q, v and q̈; without contacts, only with respect to q. Shape:
+    /// nv × nv.
     pub dsurplus: [DMatrix<f64>; 3],
     /// Velocity change J_c (v⁺ − v) of the centre of mass at an impact.
     pub com_change: [f64; 3],
-    /// Derivatives of `com_change` with respect to q, at constant v⁺ − v, and with respect to v⁺ − v. Shape: 3 × nv.
+    /// Derivatives of `com_change`: with respect to q at constant v⁺ − v, and with respect to v⁺ − v. Shape: 3 × nv.
     pub dcom_change: [DMatrix<f64>; 2],
-    /// Whether these data were written for the terms of the knot.
+    /// Whether these quantities have been written for the terms of the knot.
     pub is_written: bool,
 }
 
-/// Kinematic residuals and the rows of their Jacobians. Each residual is stored at the `index` of its plan.
+/// Kinematic residuals and the rows of their Jacobians. The `index` of a residual's plan gives its slot.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KinematicData {
     pub r: Vec<f64>,

@@ -1,4 +1,4 @@
-//! User-defined residuals: any function of the state and the controls.
+//! User-defined residuals: arbitrary functions of the state and the controls.
 
 use crate::lq::Hessian;
 use condyle_dynamics::Model;
@@ -7,41 +7,41 @@ use core::ops::Deref;
 use std::any::Any;
 use std::sync::Arc;
 
-/// Arguments of which a residual r(q, v, u) is a function.
+/// Flags for the arguments on which a residual r(q, v, u) depends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Inputs {
-    /// Position q.
+    /// Whether r depends on the position q.
     pub positions: bool,
-    /// Velocity v.
+    /// Whether r depends on the velocity v.
     pub velocities: bool,
-    /// Controls u.
+    /// Whether r depends on the controls u.
     pub controls: bool,
 }
 
 impl Inputs {
-    /// All of q, v and u.
+    /// Dependence on all of q, v and u.
     pub const ALL: Self = Self { positions: true, velocities: true, controls: true };
-    /// State x = (q, v).
+    /// Dependence on the state x = (q, v).
     pub const STATE: Self = Self { controls: false, ..Self::ALL };
-    /// Position q alone.
+    /// Dependence on only the position q.
     pub const POSITIONS: Self = Self { velocities: false, ..Self::STATE };
 }
 
-/// User-defined residual r(t, x, u) with its Jacobian. Several threads may call it at the same time.
+/// User-defined residual r(t, x, u) with its Jacobian. Several threads may call its methods at the same time.
 ///
-/// [`GenericResidual`](crate::robot::GenericResidual) needs no Jacobian: dual numbers compute it.
+/// A [`GenericResidual`](crate::robot::GenericResidual) needs no Jacobian, because dual numbers compute the Jacobian.
 pub trait ResidualFunction: Any + Send + Sync {
     /// Returns the number of entries of r.
     fn size(&self) -> usize;
 
-    /// Returns the arguments on which r depends: all by default. The result must not change. Columns of the Jacobian
-    /// for other arguments are not read.
+    /// Returns the arguments on which r depends; the default is all arguments. The result must not change. Columns of
+    /// the Jacobian for other arguments are not read.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
 
-    /// Returns an error if r cannot be used with this robot or this number of controls. By default it can always be
-    /// used. An action calls this function once, when the action receives the residual.
+    /// Returns an error if r cannot be used with this robot or this number of controls. The default returns no error.
+    /// An action calls this method once, when the action receives the residual.
     ///
     /// # Errors
     /// A description of the fault, including the invalid numbers.
@@ -50,22 +50,22 @@ pub trait ResidualFunction: Any + Send + Sync {
         Ok(())
     }
 
-    /// Computes r(t, x, u) of knot t into `r`.
+    /// Computes the residual r(t, x, u) of knot t into `r`.
     fn calc(&self, t: usize, x: &[f64], u: &[f64], r: &mut [f64]);
 
     /// Computes ∂r/∂x in the tangent space of the state (size × ndx) and ∂r/∂u (size × nu), row after row. Both arrays
     /// contain zeros before the call.
     fn calc_diff(&self, t: usize, x: &[f64], u: &[f64], by_x: &mut [f64], by_u: &mut [f64]);
 
-    /// Returns whether [`calc_hessian`](Self::calc_hessian) computes second derivatives. By default it does not: the
+    /// Returns whether [`calc_hessian`](Self::calc_hessian) computes second derivatives. The default returns false: the
     /// Hessian of the cost is then the Gauss–Newton approximation (∂r)ᵀ a″ ∂r.
     fn has_hessian(&self) -> bool {
         false
     }
 
-    /// Computes the same as [`calc_diff`](Self::calc_diff), and Σ dᵢ ∂²rᵢ, where d is the gradient of the activation
-    /// with respect to r. The sum is added to the Gauss–Newton Hessian. For positions that are not a vector space, ∂²rᵢ
-    /// is the Hessian of rᵢ(x ⊕ δ) at δ = 0. All outputs contain zeros before the call.
+    /// Computes the outputs of [`calc_diff`](Self::calc_diff), and also Σ dᵢ ∂²rᵢ, where d is the gradient of the
+    /// activation with respect to r. The caller adds this sum to the Gauss–Newton Hessian. For positions that are not a
+    /// vector space, ∂²rᵢ is the Hessian of rᵢ(x ⊕ δ) at δ = 0. All outputs contain zeros before the call.
     fn calc_hessian(
         &self,
         t: usize,
@@ -102,14 +102,14 @@ pub trait ResidualFunction: Any + Send + Sync {
 /// # assert_eq!(power, power.clone());
 /// ```
 ///
-/// For a user-defined cost that is a number and not a residual, write a residual with one entry and use the activation
-/// [`Sum`](crate::robot::Activation::Sum). Its second derivatives, if any, belong in
+/// For a user-defined cost that is a scalar and not a residual, write a residual with one entry and use the activation
+/// [`Sum`](crate::robot::Activation::Sum). If the cost has second derivatives, compute them in
 /// [`calc_hessian`](ResidualFunction::calc_hessian).
 #[derive(Clone)]
 pub struct OwnResidual(Arc<dyn ResidualFunction>);
 
 impl OwnResidual {
-    /// Makes a residual from a function.
+    /// Creates a residual from a function.
     pub fn new(function: impl ResidualFunction) -> Self {
         Self(Arc::new(function))
     }

@@ -1,4 +1,4 @@
-//! Residuals, which costs and limits read.
+//! Residuals of costs and limits.
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
@@ -7,127 +7,130 @@ use super::target::check_rotation;
 use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
-/// Residual: a vector r(x, u) that should be small.
+/// Residual: a vector r(x, u) that a cost makes small or a limit bounds.
 ///
-/// Frames have the names from the robot; contacts and impulses have the names from the action.
+/// Names of frames are names in the robot. Names of contacts are names in the action.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
 #[non_exhaustive]
 pub enum Residual {
-    /// State error x ⊖ x_ref, 2 nv numbers.
+    /// State error x ⊖ x_ref, 2 nv entries.
     State {
         /// Reference state x_ref = (q, v).
         reference: Vec<f64>,
     },
-    /// Control error u − u_ref, nu numbers.
+    /// Control error u − u_ref, nu entries.
     Control {
         /// Reference controls u_ref.
         reference: Vec<f64>,
     },
-    /// Efforts and contact forces minus the efforts that hold the robot still: τ − g(q) + Jᵀλ, nv numbers.
+    /// Efforts and contact forces minus the efforts that hold the robot still: τ − g(q) + Jᵀλ, nv entries.
     ControlGravity,
-    /// Effort error τ − τ_ref of all joints, nv numbers.
+    /// Effort error τ − τ_ref of all joints, nv entries.
     JointEffort {
         /// Reference efforts τ_ref.
         reference: Vec<f64>,
     },
-    /// Undriven efforts Nᵀτ from inverse dynamics, with Nᵀ S = 0 and orthonormal rows of Nᵀ. They are 0 in each motion
-    /// that the controls can produce. For a floating base they are 6 numbers: the force and the moment on the base.
+    /// Efforts Nᵀτ without motor, from inverse dynamics. The rows of Nᵀ are orthonormal and satisfy Nᵀ S = 0. These
+    /// efforts are 0 in each motion that the controls can produce. For a floating base they have 6 entries: the force
+    /// and the moment on the base.
     UndrivenEffort,
-    /// Acceleration J q̈ + γ of a contact along the axes of its rows, if joint accelerations are controls: 1, 2, 3 or 6
-    /// numbers. They are 0 while the contact holds.
+    /// Acceleration J q̈ + γ of a contact along the axes of its rows, if joint accelerations are controls. It has 1, 2,
+    /// 3 or 6 entries, which are 0 while the contact holds.
     ContactAcceleration {
         /// Name of the contact.
         contact: String,
     },
-    /// Acceleration error q̈ − a_ref of all joints, nv numbers.
+    /// Acceleration error q̈ − a_ref of all joints, nv entries.
     JointAcceleration {
         /// Reference accelerations a_ref.
         reference: Vec<f64>,
     },
-    /// Error c − c_ref of the centre of mass, 3 numbers along the world's axes.
+    /// Error c − c_ref of the centre of mass, 3 entries along the world's axes.
     CenterOfMass {
         /// Desired centre of mass in the world (m).
         target: Vec3<f64>,
     },
-    /// Error h_G − h_ref of the momentum about the centre of mass: 6 numbers along the world's axes, linear first.
+    /// Error h_G − h_ref of the momentum about the centre of mass: 6 entries along the world's axes, linear first.
     CentroidalMomentum {
         /// Desired momentum (kg m/s, kg m²/s).
         target: Force<f64>,
     },
-    /// Twist log(refXo oXf) from the target to the frame, expressed in the target's frame: 6 numbers, linear first.
+    /// Twist log(refXo oXf) from the target to the frame, expressed in the target's frame: 6 entries, linear first.
     FramePlacement {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired pose of the frame in the world.
         target: Se3<f64>,
     },
-    /// Error p − p_ref of a frame's position, 3 numbers along the world's axes.
+    /// Error p − p_ref of a frame's position, 3 entries along the world's axes.
     FrameTranslation {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired position of the frame's origin in the world (m).
         target: Vec3<f64>,
     },
-    /// Rotation error log(R_refᵀ R) of a frame, 3 numbers along the target's axes.
+    /// Rotation error log(R_refᵀ R) of a frame, 3 entries along the target's axes.
     FrameRotation {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired rotation of the frame in the world.
         target: Mat3<f64>,
     },
-    /// Velocity error v − v_ref of a frame, 6 numbers, linear first.
+    /// Velocity error v − v_ref of a frame, 6 entries, linear first.
     FrameVelocity {
-        /// Frame to which the residual refers.
+        /// Frame whose pose or velocity the residual reads.
         frame: FrameName,
         /// Desired velocity (m/s, rad/s).
         target: Motion<f64>,
         /// Frame in which the velocity and its target are expressed.
         reference: ReferenceFrame,
     },
-    /// Error λ − λ_ref of a contact's force or impulse along the axes of the contact's rows: 1, 2, 3 or 6 numbers,
+    /// Error λ − λ_ref of a contact's force or impulse along the axes of the contact's rows: 1, 2, 3 or 6 entries,
     /// linear first.
     ContactForce {
         /// Name of the contact.
         contact: String,
-        /// Desired force along the contact's axes. Only the components that the contact has are read: no moment for a
-        /// point, only z for a line, only x and z for a plane.
+        /// Desired force along the contact's axes. Only the components that the contact constrains are read: no moment
+        /// for a point, only z for a line, only x and z for a plane.
         target: Force<f64>,
     },
-    /// Rows of a friction cone times the contact's force f along its axes: a number for each side of the cone, then the
-    /// normal force. For a line f = (0, 0, λ), for a plane f = (λ₁, 0, λ₂). See [`FrictionCone::bounds`].
+    /// Rows of a friction cone times the contact's force f: one entry for each side of the cone, then the normal force.
+    /// The force is f = (0, 0, λ) for a line contact, and f = (λ₁, 0, λ₂) for a plane contact. See
+    /// [`FrictionCone::bounds`].
     FrictionCone {
         /// Name of the contact.
         contact: String,
-        /// Cone whose rows are used.
+        /// Cone that defines the rows.
         cone: FrictionCone,
     },
     /// Rows of a wrench cone times the wrench w of a rigid contact. See [`WrenchCone::bounds`].
     WrenchCone {
         /// Name of the contact.
         contact: String,
-        /// Cone whose rows are used.
+        /// Cone that defines the rows.
         cone: WrenchCone,
     },
-    /// Limits ±τ_x − ½ size_y f_z and ±τ_y − ½ size_x f_z of a rigid contact: at most 0 while the centre of pressure is
-    /// inside the rectangle.
+    /// Limits ±τ_x − ½ size_y f_z and ±τ_y − ½ size_x f_z of a rigid contact. They are at most 0 while the centre of
+    /// pressure is inside the rectangle.
     CenterOfPressure {
         /// Name of the contact.
         contact: String,
-        /// Axes of the surface, expressed along the axes of the contact.
+        /// Rotation from the axes of the surface to the axes of the contact.
         rotation: Mat3<f64>,
         /// Side lengths of the rectangle along the axes x and y of the surface (m).
         size: [f64; 2],
     },
-    /// Velocity change J_c (v⁺ − v) of the centre of mass at an impact (m/s), 3 numbers along the world's axes.
+    /// Velocity change J_c (v⁺ − v) of the centre of mass at an impact (m/s), 3 entries along the world's axes.
     ImpulseCenterOfMass,
     /// User-defined function, which cannot be written to a file.
     #[cfg_attr(feature = "serde", serde(skip))]
     Own(OwnResidual),
 }
 
-/// Returns the entries of a wrench that a contact with this number of rows has: z for a line, x and z for a plane.
+/// Returns the indices of the wrench entries that a contact with this number of rows constrains: z for a line, x and z
+/// for a plane.
 pub(super) fn held(rows: usize) -> &'static [usize] {
     match rows {
         1 => &[2],
@@ -137,14 +140,14 @@ pub(super) fn held(rows: usize) -> &'static [usize] {
     }
 }
 
-/// Nonzero block of the Hessian of a residual's term.
+/// Block of the Hessian in which a residual's term has nonzero entries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Part {
-    /// Diagonal of Q or R, and the blocks of groups.
+    /// Diagonal of Q or R, and the blocks of groups that are not a vector space.
     Diagonal,
-    /// Block of positions with positions.
+    /// Block of Q for the positions.
     Positions,
-    /// Whole Hessian.
+    /// All blocks of the Hessian.
     All,
 }
 
@@ -162,7 +165,8 @@ impl Residual {
         }
     }
 
-    /// Returns the output of the dynamics on which the residual depends, besides x and u.
+    /// Returns the output of the dynamics that the residual reads, in addition to x and u; `None` without such an
+    /// output.
     pub(crate) fn output(&self) -> Option<Output> {
         match self {
             Self::JointEffort { .. } | Self::UndrivenEffort => Some(Output::Effort),
@@ -183,12 +187,13 @@ impl Residual {
         self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
     }
 
-    /// Returns whether another residual differs only in its target. Callers compare the frames of both residuals.
+    /// Returns whether the residual and `other` differ only in their targets. Callers must compare the frames of both
+    /// residuals.
     pub(crate) fn differs_in_target(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other) && self.reference() == other.reference()
     }
 
-    /// Returns the numbers of the target, padded with zeros: a position, twist or wrench, then a rotation column by
+    /// Returns the entries of the target, padded with zeros: a position, twist or wrench, then a rotation column by
     /// column.
     pub(crate) fn target_numbers(&self) -> [f64; 12] {
         let mut to = [0.0; 12];
@@ -218,8 +223,7 @@ impl Residual {
         }
     }
 
-    /// Returns the reference frame in which the residual is expressed; `None` if the kind of residual has no such
-    /// choice.
+    /// Returns the reference frame of the residual's axes; `None` if the kind of residual has fixed axes.
     pub(crate) fn reference(&self) -> Option<ReferenceFrame> {
         match self {
             Self::FrameVelocity { reference, .. } => Some(*reference),
@@ -239,8 +243,7 @@ impl Residual {
         }
     }
 
-    /// Returns the number of entries, or a text that describes what does not fit the robot and the capabilities of its
-    /// dynamics.
+    /// Returns the number of entries, or a text that describes why the residual does not fit the robot or its dynamics.
     pub(crate) fn check(&self, model: &Model, capabilities: &Capabilities) -> Result<usize, String> {
         let (nv, nu) = (model.nv(), capabilities.nu);
         let rows = self.contact().map_or(Ok(0), |name| capabilities.contact(name).map(|rows| rows.len()))?;
@@ -293,8 +296,8 @@ impl Residual {
         }
     }
 
-    /// Returns the matrix W, row after row, of a residual r = W f of a contact's force f. W has as many columns as the
-    /// contact has rows.
+    /// Returns the matrix W, row after row, of a residual r = W f, where f is a contact's force. W has as many columns
+    /// as the contact has rows.
     pub(crate) fn force_rows(&self, rows: usize) -> Vec<f64> {
         match self {
             Self::ContactForce { .. } => (0..rows * rows).map(|k| f64::from(u8::from(k % rows == k / rows))).collect(),

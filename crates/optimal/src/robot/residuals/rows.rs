@@ -1,12 +1,12 @@
-//! Rows of the Jacobians of residuals. All rows of a knot are collected. Then the gradient and the Gauss–Newton Hessian
-//! are written once. Each entry of Q, S and R is a sum of products of row entries.
-#![allow(non_snake_case)] // names of matrices follow the literature
+//! Rows of the Jacobians of residuals. All rows of a knot are collected first. Then the gradient and the Gauss–Newton
+//! Hessian are written once: each entry of Q, S and R is a sum of products of row entries.
+#![allow(non_snake_case)] // names follow the literature
 
 use crate::lq::LqKnot;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product_without_slack};
 use core::ops::Range;
 
-/// Adds d to q and diag(dd) to Q at `entries`, where the Jacobian of the residual is the identity.
+/// Adds d to q and diag(dd) to Q at `entries`, for a residual whose Jacobian there is the identity.
 pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[f64], dd: &[f64]) {
     let (n, inverse, form) = (knot.ndx(), knot.structure.is_inverse_dynamics(), &mut knot.inverse_dynamics);
     for i in entries.clone() {
@@ -21,7 +21,7 @@ pub(crate) fn add_state_diagonal(knot: &mut LqKnot, entries: Range<usize>, d: &[
     }
 }
 
-/// Adds d to r and diag(dd) to R.
+/// Adds d to r and diag(dd) to R, for a residual whose Jacobian is the identity.
 pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
     let (n, m, inverse) = (knot.ndx(), knot.nu(), knot.structure.is_inverse_dynamics());
     let form = &mut knot.inverse_dynamics;
@@ -34,7 +34,7 @@ pub(crate) fn add_control_diagonal(knot: &mut LqKnot, d: &[f64], dd: &[f64]) {
     }
 }
 
-/// Row of a Jacobian with respect to (u, v, q), to which terms are added.
+/// Row of a Jacobian with respect to (u, v, q), to which derivatives are added.
 pub(crate) struct Row<'a> {
     pub u: &'a mut [f64],
     pub v: &'a mut [f64],
@@ -42,28 +42,28 @@ pub(crate) struct Row<'a> {
 }
 
 /// Rows of all residuals of a knot, with respect to (u, v, q), and the derivatives a′ and a″ of their activations. In a
-/// knot in inverse-dynamics form, u means the unknowns that replace the controls.
+/// knot in inverse-dynamics form, u stands for the unknowns that replace the controls.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
     nu: usize,
     nv: usize,
-    /// Distance from one row to the next.
+    /// Stride: distance from the first entry of a row to the first entry of the next row.
     stride: usize,
-    /// From the front: rows of residuals that depend on more than q. From the back: rows of residuals that depend on q
-    /// alone.
+    /// Buffer of rows, filled from both ends. Rows of residuals that depend on more than q begin at the front; rows of
+    /// residuals that depend only on q begin at the back.
     rows: Vec<f64>,
     /// Derivatives a′ and a″ of the activation for each row.
     slopes: Vec<[f64; 2]>,
-    /// Number of rows with respect to (u, v, q); `positions` counts rows with respect to q alone.
+    /// Number of rows with respect to (u, v, q); the next field is the number of rows with respect to only q.
     whole: usize,
     positions: usize,
-    /// Rows times √|a″|; `right` has the same rows with the sign of a″.
+    /// Rows multiplied by √|a″|; the next field contains the same rows with the sign of a″.
     left: Vec<f64>,
     right: Vec<f64>,
 }
 
 impl Rows {
-    /// Allocates `whole` rows with respect to (u, v, q) and `positions` rows with respect to q alone.
+    /// Allocates `whole` rows with respect to (u, v, q) and `positions` rows with respect to only q.
     pub(crate) fn new(nv: usize, nu: usize, [whole, positions]: [usize; 2]) -> Self {
         let (most, stride) = (whole + positions, nu + 2 * nv + SLACK);
         let rows = vec![0.0; most.max(1) * stride];
@@ -76,7 +76,8 @@ impl Rows {
         (self.whole, self.positions) = (0, 0);
     }
 
-    /// Appends a row of zeros with the derivatives `worth` = [a′, a″], and returns it to be filled.
+    /// Appends a row of zeros with the derivatives `worth` = [a′, a″] of the activation. Returns the row, which the
+    /// caller fills.
     pub(crate) fn push(&mut self, worth: [f64; 2]) -> Row<'_> {
         let k = self.whole;
         self.slopes[k] = worth;
@@ -88,7 +89,7 @@ impl Rows {
         Row { u, v, q }
     }
 
-    /// Appends a row of a Jacobian with respect to q alone, with the derivatives `worth` = [a′, a″].
+    /// Appends a row of a Jacobian with respect to only q, with the derivatives `worth` = [a′, a″] of the activation.
     pub(crate) fn push_positions(&mut self, row: &[f64], worth: [f64; 2]) {
         self.positions += 1;
         let k = self.slopes.len() - self.positions;
@@ -97,8 +98,8 @@ impl Rows {
     }
 
     /// Writes q, r, Q, S and R from the matrix G of all rows: the gradient is Gᵀ a′, the Hessian Gᵀ a″ G. In
-    /// inverse-dynamics form, only the gradient and the block of Q for positions are written; the sweep uses the rows
-    /// that depend on more than positions.
+    /// inverse-dynamics form, only the gradient and the block of Q for positions are written. The sweep then uses the
+    /// rows that depend on more than positions.
     pub(crate) fn write(&mut self, knot: &mut LqKnot) {
         knot.q.as_mut_slice().fill(0.0);
         knot.r.as_mut_slice().fill(0.0);
@@ -174,8 +175,9 @@ fn add_multiple(y: &mut [f64], x: &[f64], a: f64) {
     }
 }
 
-/// Computes C = Σ left rightᵀ over the first `length` rows of `left` and `right`. The rows and columns of C begin at
-/// two given offsets in these rows. Sums on both sides of the diagonal are equal.
+/// Computes C = Σ left rightᵀ over the first `length` rows of `left` and `right`. The rows of C correspond to entries
+/// of `left`, and the columns of C to entries of `right`, each from a given offset. Both triangles of C contain the
+/// same sums.
 fn outer(
     C: &mut [f64],
     ldc: usize,

@@ -1,4 +1,4 @@
-//! Targets of residuals: the reference values, which can be read and changed in place.
+//! Targets of residuals: reference values, which can be read and changed in place.
 
 use super::residual::Residual;
 use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
@@ -14,11 +14,11 @@ use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Target<'a> {
-    /// Reference of a state (nq + nv numbers), of controls (nu), or of efforts or accelerations of joints (nv).
+    /// Reference of a state (nq + nv entries), of controls (nu), or of efforts or accelerations of joints (nv).
     Numbers(&'a [f64]),
     /// Position of a frame's origin or of the centre of mass in the world (m).
     Position(Vec3<f64>),
-    /// Axes of a frame in the world.
+    /// Rotation of a frame in the world.
     Rotation(Mat3<f64>),
     /// Pose of a frame in the world.
     Placement(Se3<f64>),
@@ -29,7 +29,7 @@ pub enum Target<'a> {
     Force(Force<f64>),
 }
 
-/// Conversions into targets.
+/// Defines conversions of values into targets.
 macro_rules! targets {
     ($($Type:ty => $variant:ident),*) => {$(
         impl From<$Type> for Target<'_> {
@@ -62,7 +62,7 @@ impl<'a, const N: usize> From<&'a [f64; N]> for Target<'a> {
 }
 
 impl Target<'_> {
-    /// Returns the name of the kind of target, for error messages.
+    /// Returns a description of the kind of target, for error messages.
     fn kind(&self) -> String {
         match self {
             Self::Numbers(numbers) => format!("{} numbers", numbers.len()),
@@ -75,7 +75,7 @@ impl Target<'_> {
     }
 }
 
-/// Returns an error if one of the numbers called `name` is not finite.
+/// Returns an error if an entry of `numbers` is not finite; the error contains `name`.
 fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     match numbers.iter().position(|x| !x.is_finite()) {
         None => Ok(()),
@@ -84,7 +84,7 @@ fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     }
 }
 
-/// Returns an error if the matrix called `name` is not a rotation.
+/// Returns an error if the matrix R is not a rotation; the error contains `name`.
 pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
     match R.is_rotation() {
         true => Ok(()),
@@ -109,7 +109,7 @@ impl Residual {
         })
     }
 
-    /// Returns an error if the target does not fit this residual and a robot with nu controls.
+    /// Returns an error if the target does not fit this residual or a robot with nu controls.
     pub(crate) fn check_target(&self, model: &Model, nu: usize, target: Target<'_>) -> Result<(), String> {
         let (nq, nv) = (model.nq(), model.nv());
         match (self, target) {

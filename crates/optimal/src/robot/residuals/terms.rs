@@ -1,4 +1,4 @@
-//! Terms of a knot: residuals of its costs or limits, and their contributions to the objective.
+//! Terms of a knot: the residuals of its costs or of its limits, and their contributions to the objective.
 
 use super::layout::{KnotLayout, Plan};
 use super::residual::{Part, Residual};
@@ -6,22 +6,22 @@ use super::view::ResidualView;
 use crate::lq::LqKnot;
 use crate::robot::knot_data::Sensitivities;
 
-/// Residual that contributes to the objective: a cost or a limit.
+/// Cost or limit: a residual that contributes to the objective.
 pub(crate) trait Term {
     fn residual(&self) -> &Residual;
 
-    /// Returns the weight; a term whose weight is 0 is not computed.
+    /// Returns the weight. A term with the weight 0 is not computed.
     fn weight(&self) -> f64 {
         1.0
     }
 }
 
-/// Function of a term's residual: a cost, or a term of the augmented Lagrangian.
+/// Objective: a scalar function of a term's residual, for a cost or for the augmented Lagrangian.
 pub(crate) trait Objective<T> {
-    /// Returns the value of the function for a term with the residual r.
+    /// Returns the value of the objective for a term with the residual r.
     fn value(&self, term: &T, plan: &Plan, r: &[f64]) -> f64;
 
-    /// Computes the gradient and the diagonal of the Hessian of the function with respect to r, into `d` and `dd`.
+    /// Computes the gradient and the diagonal of the Hessian of the objective with respect to r, into `d` and `dd`.
     fn slopes(&mut self, term: &T, plan: &Plan, r: &[f64], d: &mut [f64], dd: &mut [f64]);
 }
 
@@ -53,7 +53,8 @@ impl<T: Term> Terms<T> {
         self.plans.push(plan);
     }
 
-    /// Replaces term k by a term with the plan of its residual. Returns whether both terms take the same memory.
+    /// Replaces term k by a term with the plan of its residual. Returns whether the new term needs the same memory as
+    /// the old one.
     pub(crate) fn replace(&mut self, k: usize, term: T, plan: Plan) -> bool {
         let (old, before) = (&mut self.all[k], &mut self.plans[k]);
         let same = KnotLayout::of(term.residual(), &plan) == KnotLayout::of(old.residual(), before);
@@ -68,7 +69,7 @@ impl<T: Term> Terms<T> {
         &self.all
     }
 
-    /// Returns term k, mutably, and the number of entries of its residual.
+    /// Returns term k as a mutable reference, and the number of entries of its residual.
     pub(crate) fn term_mut(&mut self, k: usize) -> (&mut T, usize) {
         (&mut self.all[k], self.plans[k].n)
     }
@@ -98,8 +99,8 @@ impl<T: Term> Terms<T> {
         sum
     }
 
-    /// Adds the derivatives of all terms. Without `diagonal`, adds the rows of Jacobians to the rows that the scratch
-    /// collects. With `diagonal`, adds the terms that have no rows to q, r, Q and R of the knot.
+    /// Adds the derivatives of all terms. Without `diagonal`, adds the rows of Jacobians to the rows in the scratch.
+    /// With `diagonal`, adds the terms without rows to q, r, Q and R of the knot.
     pub(crate) fn differentiate(
         &self,
         view: &mut ResidualView<'_>,
@@ -124,12 +125,12 @@ impl<T: Term> Terms<T> {
     }
 }
 
-/// Terms (costs or limits) as the computation of kinematics sees them.
+/// View of terms (costs or limits) for the computation of kinematics.
 pub(crate) trait KinematicTerms {
-    /// Returns the memory sizes for the terms, and the quantities that they read.
+    /// Returns the memory sizes for the terms, and the flags for the quantities that they read.
     fn layout(&self) -> KnotLayout;
 
-    /// Returns the kinematic residual with index i, its weight and its plan.
+    /// Returns the kinematic residual with index i, with its weight and its plan.
     fn kinematic(&self, i: usize) -> Option<(&Residual, f64, &Plan)>;
 }
 

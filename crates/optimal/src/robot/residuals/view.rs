@@ -1,5 +1,5 @@
-//! Values of residuals, and how the Jacobians of residuals enter the gradient and Hessian of a knot.
-#![allow(non_snake_case)] // D, W
+//! Values of residuals, and the addition of their Jacobians to the gradient and Hessian of a knot.
+#![allow(non_snake_case)] // names follow the literature: D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::{Inputs, OwnResidual};
@@ -16,19 +16,20 @@ use nalgebra::DMatrix;
 /// Workspace of the residuals of a knot.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// Residual r. `d` is the gradient and `dd` the diagonal of the Hessian of the residual's objective.
+    /// Residual r; the next fields are the gradient and the diagonal of the Hessian of the residual's objective.
     pub r: Vec<f64>,
     pub d: Vec<f64>,
     pub dd: Vec<f64>,
-    /// Rows of all Jacobians.
+    /// Rows of the Jacobians of all residuals.
     pub rows: Rows,
     /// Jacobian of the difference of configurations; only the blocks of groups are read. Shape: nv × nv.
     D: DMatrix<f64>,
     /// Coordinates of each group of positions that is not a vector space.
     groups: Vec<Range<usize>>,
-    /// ∂r/∂x and ∂r/∂u of a user-defined residual, row after row.
+    /// Derivatives ∂r/∂x and ∂r/∂u of a user-defined residual, row after row.
     own: [Vec<f64>; 2],
-    /// Second derivatives of a user-defined residual, and the sum over all such residuals, if they have any.
+    /// Second derivatives of one user-defined residual, and their sum over all user-defined residuals; `None` without
+    /// any.
     hessians: Option<Box<[Hessian; 2]>>,
 }
 
@@ -42,7 +43,7 @@ impl Scratch {
         Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model), own, hessians }
     }
 
-    /// Removes all rows and sets second derivatives to zero.
+    /// Removes all rows, and sets the second derivatives to zero.
     pub(crate) fn clear(&mut self) {
         self.rows.clear();
         if let Some(hessians) = &mut self.hessians {
@@ -113,8 +114,8 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Appends the rows of the Jacobian of the residual that was just computed, with the derivatives d and dd of its
-    /// objective. If the Jacobian is the identity, [`add_diagonal`](Self::add_diagonal) is used instead.
+    /// Appends the rows of the Jacobian of the residual that was computed last, with the derivatives d and dd of its
+    /// objective. If the Jacobian is the identity, [`add_diagonal`](Self::add_diagonal) is called instead.
     pub(crate) fn push_rows(&mut self, residual: &Residual, plan: &Plan, sensitivities: &dyn Sensitivities) {
         let (s, nv) = (&mut *self.scratch, self.model.nv());
         let worth = s.d.iter().zip(&s.dd).map(|(d, dd)| [*d, *dd]);
@@ -223,7 +224,8 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Adds the gradient and Hessian of the residual of the state or the controls that was just computed.
+    /// Adds the gradient and Hessian of the residual that was computed last, which is a residual of the state or the
+    /// controls.
     pub(crate) fn add_diagonal(&mut self, residual: &Residual, knot: &mut LqKnot) {
         match residual {
             Residual::State { .. } => self.add_state(knot),
@@ -231,7 +233,8 @@ impl ResidualView<'_> {
         }
     }
 
-    /// Adds the gradient and Hessian of a residual of the state: ∂r/∂x is the identity, except in the blocks of groups.
+    /// Adds the gradient and Hessian of a residual of the state, whose ∂r/∂x is the identity except in the blocks of
+    /// groups.
     fn add_state(&mut self, knot: &mut LqKnot) {
         let Self { model, scratch: s, .. } = self;
         let nv = model.nv();
