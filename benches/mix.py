@@ -4,7 +4,7 @@
     python3 benches/mix.py [--lines] [ROBOT ...] [--of NAME ...]
 
 The program runs the benchmark of instructions.py under callgrind (of valgrind), once for each algorithm. It sorts the
-executed instructions by the names that objdump prints:
+executed instructions by their names, which objdump prints, into these groups:
 
 - arithmetic: sums, products, quotients and roots;
 - load, store: moves of vectors from or to memory; stack: moves from or to the stack, if there are too few registers;

@@ -40,7 +40,7 @@ pub(crate) struct Budget {
     pub rows: Vec<Row>,
     /// Sum of the times in all rows.
     pub total_ms: f64,
-    /// Times of single dynamics functions that a solver iteration calls. They are part of the times in `rows`.
+    /// Times of single dynamics functions that a solver iteration calls. They do not count in `total_ms`.
     pub alone: Vec<Row>,
     #[serde(skip)]
     pub solve_ms: f64,
