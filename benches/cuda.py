@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Measures generated kernels on a GPU, in states per second, for many batch sizes. Compares these rates with MJX and
-MuJoCo Warp.
+"""Measures generated kernels on a GPU (states per second, many batch sizes). Compares them with MJX and MuJoCo Warp.
 
     python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
                            [--partitions 1 0]
@@ -61,7 +60,7 @@ def rate(n: int, call: Callable[[], object], wait: Callable[[], object]) -> floa
 
 
 def states(model: condyle.Model, names: "list[str]", n: int, dtype: str) -> list[Any]:
-    """Returns arguments of n states, along the last axis. At most 1024 states are different."""
+    """Returns the arguments of n states, with one state per index of the last axis. States repeat after 1024."""
     rng = np.random.default_rng(0)
     q = np.array([condyle.random_configuration(model, seed=k) for k in range(min(n, 1024))])
     given = {"q": q, **{name: rng.standard_normal((len(q), model.nv)) for name in names if name != "q"}}

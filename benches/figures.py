@@ -102,7 +102,7 @@ ALGORITHMS = ("rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivative
 
 
 def dynamics_table(figures: Figures, mode: str) -> str:
-    """Returns a table of ratios to Pinocchio, with Condyle's time in brackets (µs)."""
+    """Returns a table of Condyle's times divided by Pinocchio's times. Brackets contain Condyle's time (µs)."""
     lines = [f"| {mode}: ratio (ours in µs) | " + " | ".join(ROBOTS) + " |", "| --- |" + " --- |" * len(ROBOTS)]
     names = list(dict.fromkeys(r["algorithm"] for r in figures.rows("dynamics") if r["mode"] == mode))
     for name in [name for name in names if mode == "a horizon" or name in ALGORITHMS]:
@@ -173,8 +173,8 @@ def ways_table(figures: Figures) -> str:
 
 
 def generated_table(figures: Figures) -> str:
-    """Returns the table of generated C: the time of a call (ns), its ratios to the call of Condyle and of Pinocchio,
-    and the operations."""
+    """Returns the table of generated C: the time of a call (ns), its ratios to the times of Condyle's and Pinocchio's
+    calls, and the number of operations."""
     rows = {(row["robot"], row["function"]): row for row in figures.rows("generated")}
     lines = ["| ns (ratios) | panda | anymal | talos | operations |", "| --- | --- | --- | --- | --- |"]
     for name in ALGORITHMS:
@@ -294,7 +294,7 @@ TABLES: dict[str, Callable[[Figures], str]] = {
 
 
 def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
-    """Returns the least and the greatest ratio to Pinocchio's time among the robots."""
+    """Returns the least and the greatest ratio of Condyle's time to Pinocchio's time among the robots."""
     ratios = [f.ratio(algorithm, robot, mode) for robot in ROBOTS]
     return f"{min(ratios):.2f}", f"{max(ratios):.2f}"
 
@@ -338,7 +338,8 @@ def fddp_spread(f: Figures) -> list[str]:
 
 
 def all_ratios(f: Figures, mode: str) -> list[str]:
-    """Returns the least and the greatest ratio to Pinocchio's time among all algorithms and robots."""
+    """Returns the least and the greatest ratio of Condyle's time to Pinocchio's time among all algorithms and
+    robots."""
     ratios = [f.ratio(name, robot, mode) for name in ALGORITHMS for robot in ROBOTS]
     return [f"{min(ratios):.2f}", f"{max(ratios):.2f}"]
 

@@ -128,7 +128,8 @@ def measured(
 
 
 def record_theirs(program: Path, model: Path, states: Path) -> Path:
-    """Returns the folder with Pinocchio's generated code for a model. It contains a library for each function."""
+    """Returns the folder with Pinocchio's generated code for a model. The folder contains a library for each
+    function."""
     folder = dynamics.PEERS / f"cppadcg-{model.stem}-{Path(compiler()).name}"
     if not (folder / "aba_derivatives.so").exists():
         folder.mkdir(exist_ok=True)

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Counts the instructions for several standing quadrupeds in one model. The numbers are instructions per robot, at SIMD
-level AVX2.
+"""Counts the instructions per robot for several standing quadrupeds in one model, at SIMD level AVX2.
 
     python3 benches/islands.py
 

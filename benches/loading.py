@@ -1,9 +1,8 @@
-"""Times how long this version of condyle and another version take to load robots. The robots are the URDFs of
-example-robot-data.
+"""Times how long two versions of condyle take to load the robots (URDFs) of example-robot-data.
 
     python benches/loading.py [OPTION ...]
 
-The options are `--rounds N` and `--beside FOLDER`, a folder with another `condyle` package, for example an earlier
+The options are `--rounds N` and `--beside FOLDER`. FOLDER contains another `condyle` package, for example an earlier
 version. Both versions load each file in turn, in separate processes. Each time is the median over the rounds. The
 program prints a line for each robot, and the ratio of the sums of all times.
 """

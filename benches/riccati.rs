@@ -1,12 +1,12 @@
 //! Times the backward sweep per knot, with and without use of the structure of Euler steps: `cargo bench -p
 //! condyle-benches --bench riccati`.
 //!
-//! The figures are times in µs per knot on a Xeon at 2.5 GHz with the default build. Each is the shortest of many
-//! sweeps of 50 knots, for (ndx, nu) = (76, 32) / (36, 12) / (18, 9) / (14, 7). With AVX-512, a knot takes 46 / 8.4 /
-//! 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7 / 1.6 with dense matrices. With AVX2, it takes 63 / 9.1 / 2.7 /
-//! 1.7, or 106 / 11 / 2.9 / 1.8 with dense matrices. At the baseline level, it takes 133 / 15 / 3.7 / 2.3, or 222 / 22
-//! / 4.9 / 2.7 with dense matrices. The sweep uses the structure if ndx is at least 16. The 46 µs consist of the three
-//! products (36 %, at 57 GFLOP/s), factor and gains (24 %), waiting for 200 KB per knot (10 %), and copies and
+//! The figures are times in µs per knot on a Xeon at 2.5 GHz with the default build. Each time is from the shortest of
+//! many sweeps of 50 knots, for (ndx, nu) = (76, 32) / (36, 12) / (18, 9) / (14, 7). With AVX-512, a knot takes 46 /
+//! 8.4 / 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7 / 1.6 with dense matrices. With AVX2, it takes 63 / 9.1 / 2.7
+//! / 1.7, or 106 / 11 / 2.9 / 1.8 with dense matrices. At the baseline level, it takes 133 / 15 / 3.7 / 2.3, or 222 /
+//! 22 / 4.9 / 2.7 with dense matrices. The sweep uses the structure if ndx is at least 16. The 46 µs consist of the
+//! three products (36 %, at 57 GFLOP/s), factor and gains (24 %), waiting for 200 KB per knot (10 %), and copies and
 //! transposes.
 //!
 //! In a sweep in segments, some knots take longer than the 46 / 8.1 / 1.6 µs of a usual knot (on one thread). A knot

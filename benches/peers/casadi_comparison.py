@@ -35,7 +35,7 @@ SAME = 1e-6
 
 
 def own(model: condyle.Model, name: str, x: list[np.ndarray]) -> dict[str, Callable[[], object]]:
-    """Returns Condyle's calls from Python, which write into existing arrays."""
+    """Returns functions that call Condyle from Python. Each call writes its results into existing arrays."""
     data, value = condyle.Data(model), np.zeros(model.nv)
     function, derivatives = getattr(condyle, name), getattr(condyle, f"{name}_derivatives")
     return {

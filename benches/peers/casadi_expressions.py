@@ -151,6 +151,6 @@ class Expressions:
         M, h = casadi.jacobian(effort, a), casadi.substitute(effort, a, casadi.SX.zeros(model.nv))
         rows = J.size1()
         K = casadi.blockcat([[M, J.T], [J, casadi.SX(rows, rows)]])
-        D, LT, order = casadi.ldl(K, False)  # not reordered: M must be eliminated first
+        D, LT, order = casadi.ldl(K, False)  # rows keep their order: M must be eliminated first
         x = casadi.ldl_solve(casadi.vertcat(tau - h, -gamma), D, LT, order)
         return casadi.Function("constrained_dynamics", [self.q, self.v, tau], [x[: model.nv], -x[model.nv :]])

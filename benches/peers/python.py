@@ -87,7 +87,7 @@ class Robot:
         self.v, self.a, self.tau = rng.standard_normal((3, STATES, self.model.nv))
 
     def singles(self) -> dict[str, tuple[Call, Call]]:
-        """Returns, for one state, calls of Condyle and of Pinocchio."""
+        """Returns, for each algorithm, a call of Condyle and a call of Pinocchio for one state."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau = self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -121,7 +121,7 @@ class Robot:
         }
 
     def spelled(self) -> dict[str, tuple[Call, Call]]:
-        """Returns, for one state, calls in Pinocchio's spelling and calls of `condyle`."""
+        """Returns, for each algorithm, a call in Pinocchio's spelling and the same call of `condyle`, for one state."""
         m, d, sm = self.model, self.data, spelling.Model(self.model)
         sd, q, v, a, tau = sm.createData(), self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -179,7 +179,8 @@ class Robot:
         return {name: (lambda name=name: getattr(m, name)) for name in ("frames", "names", "limits", "inertias")}
 
     def batches(self) -> dict[str, tuple[Call, Call, list[np.ndarray]]]:
-        """Returns calls for all states, loops over Pinocchio's calls, and the arrays that Condyle's calls fill."""
+        """Returns, for each algorithm, a call for all states, a loop over Pinocchio's calls, and the arrays that
+        Condyle's call fills."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau, n = self.q, self.v, self.a, self.tau, self.model.nv
         empty = {k: [np.zeros((STATES, *[n] * axes)) for axes in shapes] for k, shapes in SHAPES.items()}
@@ -224,7 +225,7 @@ class Robot:
 
 
 SHAPES = {"rnea": [1], "aba": [1], "crba": [2], "rnea_derivatives": [2, 2, 2], "aba_derivatives": [1, 2, 2, 2]}
-"""Number of axes of length nv that each result has for one state."""
+"""Shapes of the results for one state: 1 for a vector of nv numbers, 2 for an nv × nv matrix."""
 
 
 def import_seconds(rounds: int) -> tuple[float, float]:

@@ -142,7 +142,7 @@ impl Gait {
         self.phase(&feet, knots, |gait, _| gait.costs(&feet, &[], gait.com))
     }
 
-    /// Swings the feet with these indices ahead by `length`, along an arc of this height, and sets them down.
+    /// Swings the feet with these indices ahead by `length`, along an arc of height `height`, and sets them down.
     pub(crate) fn step(&mut self, swinging: &[usize], length: f64, height: f64, knots: usize) -> Result<(), Error> {
         let swings = |k: &usize| swinging.contains(k);
         let support: Vec<_> = (0..self.feet.len()).filter(|k| !swings(k)).map(|k| self.feet[k].0).collect();

@@ -77,8 +77,8 @@ pub(crate) fn text(findings: &[Finding], source: &str) -> String {
     text
 }
 
-/// Minimum ratio between a body and its parent, for masses or moments of inertia, that is reported. A wrong unit can
-/// cause such a ratio, or a light tip, which makes M ill-conditioned.
+/// Minimum ratio between the masses, or moments of inertia, of a body and its parent. A larger ratio is reported. Its
+/// cause can be a wrong unit, or a light tip, which makes M ill-conditioned.
 const APART: f64 = 1e3;
 /// Excess over a limit that counts as a rounding error.
 const ROUNDING: f64 = 1e-9;

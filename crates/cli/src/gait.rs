@@ -266,8 +266,8 @@ fn feet_at(model: &Model, q: &[f64], frames: &[usize]) -> Vec<(usize, Vec3<f64>)
     frames.iter().map(|&frame| (frame, placements.frame(frame).translation)).collect()
 }
 
-/// Returns the position with the given joint values. The other coordinates are neutral, or mid-range if limits exclude
-/// neutral.
+/// Returns the position with the given joint values. The other coordinates are neutral. If limits exclude a neutral
+/// value, the coordinate gets the middle of its range.
 pub(crate) fn posture(model: &Model, joints: &BTreeMap<String, f64>, task: &Task) -> Result<Vec<f64>, Error> {
     let mut q = inside(model, neutral(model));
     for (name, &value) in joints {

@@ -9,8 +9,8 @@ use condyle::{ConstraintSet, ContactConstraint, Data, Joint, Model, constrained_
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Placeholders of the template, and the texts that replace them, in this order. The data are inserted last, so that
-/// text in the data that looks like a placeholder is not replaced.
+/// Placeholders of the template, and the texts that replace them, in this order. The data are inserted last. So text in
+/// the data is never replaced, even if it looks like a placeholder.
 const PARTS: [(&str, &str); 8] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),

@@ -21,7 +21,7 @@ pub struct Array {
 }
 
 impl Array {
-    /// Returns the number of numbers in the array.
+    /// Returns the length of the array: the count of its numbers.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.rows * self.columns

@@ -18,9 +18,9 @@
 //! ```
 //!
 //! The search begins with a partition for each limb, and repeatedly merges the two partitions whose union gives the
-//! greatest worth. The best of all splits in this sequence is used. The last of them is the whole function. For efforts
-//! and accelerations the whole function is best, since the trunk needs the values of all limbs. For derivatives, most
-//! limbs have their own partition.
+//! greatest worth (gain / loss). The best of all splits in this sequence is used. The last of them is the whole
+//! function. For efforts and accelerations the whole function is best, since the trunk needs the values of all limbs.
+//! For derivatives, most limbs have their own partition.
 //!
 //! All partitions together cost more than the whole function. So a kernel contains both the whole function and its
 //! partitions, and each launch selects one of these forms. A launch uses the partitions if the threads of all

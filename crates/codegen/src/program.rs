@@ -1,5 +1,5 @@
-//! A function as a program. Its ordered steps are cut into parts of bounded size; values shared between parts are
-//! stored.
+//! Program of a function: the function's ordered steps, cut into parts of bounded size. Values that several parts use
+//! are stored in an array, the work space.
 
 use crate::function::Function;
 use crate::graph::Id;

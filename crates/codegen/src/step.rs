@@ -7,11 +7,11 @@ use crate::graph::{Id, Node};
 pub(crate) enum Step {
     /// Computation of a value by one operation of the graph.
     Plain(Id, Node),
-    /// Computation of a b + c from the operands [a, b, c].
+    /// Computation of a b + c. The array holds the operands a, b and c, in this order.
     MulAdd(Id, [Id; 3]),
-    /// Computation of a b − c from the operands [a, b, c].
+    /// Computation of a b − c. The array holds the operands a, b and c, in this order.
     MulSub(Id, [Id; 3]),
-    /// Computation of c − a b from the operands [a, b, c].
+    /// Computation of c − a b. The array holds the operands a, b and c, in this order.
     SubMul(Id, [Id; 3]),
     /// Computation of the sine and the cosine of an angle.
     SinCos(Angle),

@@ -84,7 +84,7 @@ fn symmetric_about_z<S: Scalar>(sin: S, cos: S, A: Sym3<S>) -> Sym3<S> {
     Sym3 { xx: A.xx - g * sin, xy: g.mul_add(cos, -A.xy), yy: g.mul_add(sin, A.yy), xz: z.x, yz: z.y, zz: A.zz }
 }
 
-/// Quantity of a body that a joint transforms into the joint's frame, on the parent's side.
+/// Quantity of a body that a joint pose transforms from the body's frame to the joint's frame.
 pub trait Carried<S>: Sized {
     /// Returns the quantity after the transform X.
     fn carried_by(self, X: &JointPlacement<S>) -> Self;

@@ -41,7 +41,7 @@ pub enum Language {
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
     /// `robot_aba_casadi` for `robot_aba`. The interface has the Jacobian if `robot_aba_derivatives` is also generated.
     /// In addition, no position coordinates of the robot may be quaternions or points on circles. For impacts, the
-    /// Jacobian also has columns for the restitution, with respect to which the generated derivatives are not taken.
+    /// Jacobian also has columns for the restitution; the generated functions of derivatives have no such columns.
     CCasadi,
     /// A module of Rust with `f64`, without `std`.
     Rust,
