@@ -1,5 +1,5 @@
-//! Times the dynamics under contacts and its derivatives, with one call on one state: `cargo bench -p condyle-benches
-//! --bench constrained`.
+//! Times the dynamics under contacts and the derivatives of this dynamics, with single calls for one state: `cargo
+//! bench -p condyle-benches --bench constrained`.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,
@@ -14,10 +14,11 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// Number of states that are used in turn, so that branch prediction cannot learn a single state.
+/// Number of states, which are used in turn. With a single state, the processor's branch prediction would learn this
+/// state.
 const STATES: usize = 16;
 
-/// A position, a velocity, and an effort.
+/// Position, velocity and effort of one state.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Measures generated kernels on a GPU, in states per second, for many batch sizes. Compares them with MJX and MuJoCo
-Warp.
+"""Measures generated kernels on a GPU (states per second, many batch sizes). Compares them with MJX and MuJoCo Warp.
 
     python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
                            [--partitions 1 0]
 
 Batch sizes are powers of two. "Resident" means that all arrays are on the device. "Copied" means that arguments are
-copied to the device, and results are copied back. `--partitions` gives numbers of threads that share a state; with 0
-the kernel chooses this number by the number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp
-compute `forward`, which is forward dynamics and kinematics, in single precision, for the same robot without shapes.
-They are skipped if they are not installed. The program needs a GPU, NVIDIA's run-time compiler, the packages condyle
-and example-robot-data-loaders, and mujoco for the peers. Without a device, the program prints NOT RUN.
+copied to the device, and results are copied back. `--partitions` gives numbers of threads that compute one state
+together. With 0, the kernel selects this number for each batch size. Before the measurement, each kernel's results are
+compared with the CPU's results. MJX and MuJoCo Warp compute `forward`, which is forward dynamics and kinematics, in
+single precision, for the same robot without shapes. MJX and MuJoCo Warp are skipped if they are not installed. The
+program needs a GPU, NVIDIA's run-time compiler, the packages condyle and example-robot-data-loaders, and mujoco for the
+peers. Without a device, the program prints NOT RUN.
 """
 
 import argparse
@@ -31,13 +31,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests/peers/mujoco"))
 SECONDS = 0.3
 """Minimum duration of a measurement (s)."""
 ROUNDING = 1e-11
-"""Tolerance for rounding errors of double precision that M⁻¹ amplifies; relative to the largest number."""
+"""Tolerance for rounding errors of double precision, relative to the largest number. M⁻¹ amplifies these errors."""
 CHECKED = 64
 """Number of states compared with the CPU."""
 
 
 def rate(n: int, call: Callable[[], object], wait: Callable[[], object]) -> float:
-    """Returns the rate of a call in millions of states per second: the fastest of five runs, each with many calls."""
+    """Returns the rate of a call in millions of states per second. The rate is the best of five runs, each with many
+    calls."""
     call(), wait()
     count, best = 1, 0.0
     while True:
@@ -59,7 +60,7 @@ def rate(n: int, call: Callable[[], object], wait: Callable[[], object]) -> floa
 
 
 def states(model: condyle.Model, names: "list[str]", n: int, dtype: str) -> list[Any]:
-    """Returns arguments of n states, along the last axis. At most 1024 states are different."""
+    """Returns the arguments of n states, with one state per index of the last axis. States repeat after 1024."""
     rng = np.random.default_rng(0)
     q = np.array([condyle.random_configuration(model, seed=k) for k in range(min(n, 1024))])
     given = {"q": q, **{name: rng.standard_normal((len(q), model.nv)) for name in names if name != "q"}}
@@ -76,7 +77,8 @@ def error(model: condyle.Model, kernel: condyle.cuda.Kernel) -> float:
 
 
 def ours(model: condyle.Model, kernel: condyle.cuda.Kernel, n: int) -> tuple[float, float]:
-    """Returns the rate with resident arrays and the rate with copied arrays."""
+    """Returns two rates: with resident arrays (on the device), and with arrays that are copied to the device and
+    back."""
     from condyle import _cuda_driver
 
     def wait() -> None:
@@ -102,7 +104,7 @@ def table(
         made = {k: condyle.cuda.compile(model, name, dtype=dtype, partitions=k or None) for k in all_partitions}
         for k, kernel in made.items():
             if kernel.partitions == 1 and k != next(iter(made)):
-                continue  # the kernel is the same as before
+                continue  # without partitions, the kernel is the same as the first one
             apart = error(model, kernel)
             if dtype == "float64" and not apart <= ROUNDING:
                 sys.exit(f"{robot}, {name}: {apart:.1e} from the CPU, {ROUNDING} are allowed")

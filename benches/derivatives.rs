@@ -1,13 +1,13 @@
 //! Times the analytic derivatives for several sizes and shapes of a tree, compared with dual numbers and central
 //! differences: `cargo bench -p condyle-benches --bench derivatives`.
 //!
-//! The throughput is in pairs that consist of a joint and one of its ancestors or the joint itself. The number of such
-//! pairs is n · depth, where depth is the mean number of joints on the path to the world. If the throughput is
-//! constant, the cost grows as O(n · depth).
+//! The throughput is the number of pairs per time. A pair consists of a joint and one of its ancestors, or of a joint
+//! and itself. The number of pairs is n · depth, where depth is the mean number of joints on the path to the world. If
+//! the throughput is constant, the cost grows as O(n · depth).
 //!
 //! Results for n = 8, 32 and 128 on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`. A cell has the times of
-//! analytic derivatives in µs, these times per pair in ns, and the ranges of two factors: how much longer dual numbers
-//! take, and how much longer differences take.
+//! analytic derivatives (µs), and in brackets the times per pair (ns). Then follow the ranges of two ratios to these
+//! times: for dual numbers, and for central differences.
 //!
 //! | | shape | n = 8, 32, 128 |
 //! | --- | --- | --- |
@@ -24,9 +24,10 @@
 //! | λᵀ∂²q̈ | binary tree | 4.1, 26, 360 (196, 189, 464) 25–315, 18–143 |
 //! | λᵀ∂²q̈ | star | 4.0, 20, 259 (264, 323, 1017) 23–233, 17–132 |
 //!
-//! ∂τ and λᵀ∂²τ grow as O(n · depth), until most of the time is for writing n² zeros. ∂q̈ grows in the same way on
-//! chains, where a linear system is solved for it. On other trees ∂q̈ is a product and grows faster; the same holds on
-//! all trees for the additional product in λᵀ∂²q̈.
+//! The times of ∂τ and λᵀ∂²τ grow as O(n · depth), until most of the time is spent on writing n² zeros. On chains, ∂q̈
+//! is the solution of a linear system, and its time grows in the same way. On other trees, ∂q̈ is computed as a matrix
+//! product, whose time grows faster. On all trees, λᵀ∂²q̈ contains an additional matrix product, whose time also grows
+//! faster.
 use condyle::{
     Data, Model, Scalar, aba, aba_derivatives,
     derivatives::{LaneJacobian, StateFunction, aba_hessian, rnea_hessian},
@@ -43,7 +44,8 @@ use std::time::Duration;
 
 const SIZES: [usize; 5] = [8, 16, 32, 64, 128];
 
-/// Returns the number of pairs that consist of a joint and one of its ancestors or the joint itself.
+/// Returns the number of pairs of a joint and one of its ancestors, plus the number of joints (each joint paired with
+/// itself).
 fn pairs(model: &Model) -> u64 {
     let mut depth = vec![0; model.bodies().len()];
     for (i, body) in model.bodies().iter().enumerate().skip(1) {
@@ -52,7 +54,7 @@ fn pairs(model: &Model) -> u64 {
     depth.iter().sum()
 }
 
-/// A state (q, v), a vector that serves as a or τ, and λ.
+/// State (q, v), a vector x that serves as a or τ, and the weights λ of the second derivatives.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,
@@ -69,7 +71,8 @@ impl State {
     }
 }
 
-/// Calls `f` at (q ⊕ δ, v + δ, x + δ) with steps in one direction after the other: all directions of q, of v and of x.
+/// Calls `f` for a step δ in one direction after the other: first at (q ⊕ δ, v, x), then at (q, v + δ, x), then at (q,
+/// v, x + δ).
 fn along_each<S: Scalar>(
     model: &Model,
     s: &State,
@@ -104,8 +107,8 @@ fn along_each<S: Scalar>(
 
 type Group<'c> = BenchmarkGroup<'c, WallTime>;
 
-/// Measures one method for all derivatives. `steps` are the steps in one direction that the method needs for one
-/// derivative, in its type of numbers.
+/// Measures one method for all derivatives. `steps` contains the steps that the method needs for the derivative in one
+/// direction, in the method's number type.
 fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model, s: &State, steps: &[S]) {
     let (mut data, nv) = (Data::<S>::new(model), model.nv());
     group.bench_function(BenchmarkId::new(format!("∂τ {way}"), n), |b| {
@@ -116,7 +119,7 @@ fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model
             along_each(model, s, 3 * nv, steps, |q, v, tau| _ = black_box(aba(model, &mut data, q, v, tau, &[])))
         });
     });
-    // This starts from the analytic first derivatives. ∂²/∂a∂a is known and not computed.
+    // The second derivatives are differentiated from the analytic first derivatives. ∂²/∂a∂a is known and not computed.
     group.bench_function(BenchmarkId::new(format!("λᵀ∂²τ {way}"), n), |b| {
         let mut call = |q: &[S], v: &[S], a: &[S]| _ = black_box(rnea_derivatives(model, &mut data, q, v, a, &[]));
         b.iter(|| along_each(model, s, 2 * nv, steps, &mut call));
@@ -143,7 +146,7 @@ fn by_hand(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     });
 }
 
-/// The function `rnea` or `aba` with the arguments (q, v, x).
+/// Function `rnea` or `aba` with the arguments (q, v, x).
 struct Dynamics<'m> {
     model: &'m Model,
     forward: bool,
@@ -161,7 +164,7 @@ impl StateFunction for Dynamics<'_> {
     }
 }
 
-/// Measures dual numbers in lanes. Each lane of a vector has another direction.
+/// Measures derivatives by dual numbers in SIMD lanes. Each lane computes a different direction.
 fn by_lanes(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     let x = [&s.q[..], &s.v, &s.x].concat();
     let mut jacobian = LaneJacobian::new(model, x.len(), model.nv());

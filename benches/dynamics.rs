@@ -1,5 +1,5 @@
-//! Times the rigid-body algorithms, their derivatives, and the terms of the equations of motion, with one call on one
-//! state: `cargo bench -p condyle-benches --bench dynamics`.
+//! Times the rigid-body algorithms, their derivatives, and the terms of the equations of motion, with single calls for
+//! one state: `cargo bench -p condyle-benches --bench dynamics`.
 
 use condyle::{
     Data, Model, aba, aba_derivatives,
@@ -14,10 +14,11 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// Number of states that are used in turn, so that branch prediction cannot learn a single state.
+/// Number of states, which are used in turn. With a single state, the processor's branch prediction would learn this
+/// state.
 const STATES: usize = 16;
 
-/// A position, a velocity, and a vector that serves as acceleration or effort.
+/// Position and velocity of a state, and a vector that serves as acceleration or effort.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,

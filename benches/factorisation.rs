@@ -1,7 +1,7 @@
 //! Finds the fastest method for forward dynamics and for M⁻¹, for several sizes and shapes of a tree: `cargo bench -p
 //! condyle-benches --bench factorisation`. `ForwardDynamicsMethod::fastest` has a rule that follows from these results;
-//! `docs/performance.md` has the table. The factor gives M⁻¹ faster than the recursion if its rows have at most about
-//! 12 entries on average.
+//! `docs/performance.md` has the table. Computing M⁻¹ from the factor of M is faster than the recursion if the factor's
+//! rows have at most about 12 entries on average.
 #![allow(non_snake_case)]
 
 use condyle::{
@@ -101,7 +101,7 @@ fn factors(c: &mut Criterion, name: &str, model: &Model) -> (Ltdl<f64>, Cholesky
     (sparse, dense)
 }
 
-/// Measures models that contain several humanoids.
+/// Measures models that contain several humanoids each.
 fn crowds(c: &mut Criterion) {
     for n in [2, 4, 8, 22] {
         let (one, mut builder) = (robots::humanoid(), ModelBuilder::new("crowd"));

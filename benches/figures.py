@@ -36,9 +36,9 @@ COMMANDS = {
     "factorisation": "cargo bench --profile release -p condyle-benches --bench factorisation",
     "divide_conquer": "cargo bench --profile release -p condyle-benches --bench divide_conquer",
 }
-"""Command that measures each part."""
+"""Command for each part of the measurement."""
 WITHOUT_OPTION = ("casadi", "slopes")
-"""Parts whose command prints one JSON object and has no option --json."""
+"""Parts of the measurement whose command prints one JSON object and has no option --json."""
 
 
 def measure(part: str) -> Any:
@@ -73,7 +73,7 @@ def machine() -> dict[str, str]:
 
 
 class Figures:
-    """Figures in the JSON, by the names that the pages use."""
+    """Figures in the JSON, with one method for each figure or table of the pages."""
 
     def __init__(self, results: dict[str, Any]) -> None:
         self.results = results
@@ -102,7 +102,7 @@ ALGORITHMS = ("rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivative
 
 
 def dynamics_table(figures: Figures, mode: str) -> str:
-    """Returns a table of ratios to Pinocchio, with Condyle's time in brackets (µs)."""
+    """Returns a table of Condyle's times divided by Pinocchio's times. Brackets contain Condyle's time (µs)."""
     lines = [f"| {mode}: ratio (ours in µs) | " + " | ".join(ROBOTS) + " |", "| --- |" + " --- |" * len(ROBOTS)]
     names = list(dict.fromkeys(r["algorithm"] for r in figures.rows("dynamics") if r["mode"] == mode))
     for name in [name for name in names if mode == "a horizon" or name in ALGORITHMS]:
@@ -150,8 +150,8 @@ def us(ns: float) -> str:
 
 
 def ways_table(figures: Figures) -> str:
-    """Returns the table of forward dynamics by three methods, with the times of the factor alone and of the inverse of
-    M."""
+    """Returns the table of forward dynamics by three methods. The table also has the times to factorise M and to
+    compute M⁻¹."""
     groups = figures.medians("factorisation")
     names = [group.partition("/")[2] for group in groups if group.startswith("forward dynamics/")]
     order = ["arm7", "quadruped", "humanoid"]
@@ -173,8 +173,8 @@ def ways_table(figures: Figures) -> str:
 
 
 def generated_table(figures: Figures) -> str:
-    """Returns the table of generated C: the time of a call (ns), its ratios to the call of Condyle and of Pinocchio,
-    and the operations."""
+    """Returns the table of generated C: the time of a call (ns), its ratios to the times of Condyle's and Pinocchio's
+    calls, and the number of operations."""
     rows = {(row["robot"], row["function"]): row for row in figures.rows("generated")}
     lines = ["| ns (ratios) | panda | anymal | talos | operations |", "| --- | --- | --- | --- | --- |"]
     for name in ALGORITHMS:
@@ -198,7 +198,8 @@ def cppadcodegen_table(figures: Figures) -> str:
 
 
 def threads_table(figures: Figures) -> str:
-    """Returns the table of an iteration of FDDP on two threads, as fractions of the time on one thread."""
+    """Returns the table of times of an FDDP iteration on two threads. A time is a fraction of the time on one
+    thread."""
     rows = {(row["name"], row["way"]): row for row in figures.rows("threads")}
     lines = ["| time on two threads / on one | " + " | ".join(FDDP) + " |", "| --- |" + " --- |" * len(FDDP)]
     kinds = [("whole", "2 threads", "total"), ("derivatives that the sweep waits for", "2 threads", "derivatives")]
@@ -257,7 +258,8 @@ DIVIDED = ("chain of 100", "chain of 300", "chain of 1000", "star of 100", "star
 
 
 def divided_table(figures: Figures) -> str:
-    """Returns the table of divide and conquer with two halves. Each half is computed by recursion."""
+    """Returns the table of divide and conquer, where the tree is cut into two halves. Each half is computed by
+    recursion."""
     groups = figures.medians("divide_conquer")
     lines = ["| µs | `aba` | one thread | two threads |", "| --- | --- | --- | --- |"]
     for name in DIVIDED:
@@ -292,13 +294,13 @@ TABLES: dict[str, Callable[[Figures], str]] = {
 
 
 def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
-    """Returns the least and the greatest ratio to Pinocchio among the robots."""
+    """Returns the least and the greatest ratio of Condyle's time to Pinocchio's time among the robots."""
     ratios = [f.ratio(algorithm, robot, mode) for robot in ROBOTS]
     return f"{min(ratios):.2f}", f"{max(ratios):.2f}"
 
 
 def share_of_sum(f: Figures, group: str) -> tuple[str, str]:
-    """Returns the least and the greatest ratio of two times: the faster factor of M, and ABA."""
+    """Returns the least and the greatest ratio of two times: forward dynamics with the faster factor of M, and ABA."""
     ratios = [
         min(ways["Dense"], ways["Sparse"]) / ways["ArticulatedBody"]
         for name, ways in f.medians("factorisation").items()
@@ -336,7 +338,8 @@ def fddp_spread(f: Figures) -> list[str]:
 
 
 def all_ratios(f: Figures, mode: str) -> list[str]:
-    """Returns the least and the greatest ratio to Pinocchio among all algorithms and robots."""
+    """Returns the least and the greatest ratio of Condyle's time to Pinocchio's time among all algorithms and
+    robots."""
     ratios = [f.ratio(name, robot, mode) for name in ALGORITHMS for robot in ROBOTS]
     return [f"{min(ratios):.2f}", f"{max(ratios):.2f}"]
 

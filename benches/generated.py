@@ -5,13 +5,14 @@ type f64.
     python benches/generated.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
 Generated code is compiled by CC, else by clang, else by gcc, and called with 64 states in turn. Pinocchio is called in
-the same way; benches/peers/dynamics.py builds it (about ten minutes the first time). Pinocchio's own generated code is
-what CppADCodeGen makes from Pinocchio's recursions (benches/peers/cppadcg.cpp, about ten minutes more). It is compiled
-by the same compiler with the same options. One program calls both generated codes in turn: their ratio is the median
-over the rounds. A time is the shortest one, since other work on the machine only adds time. Condyle's library is timed
-by `cargo bench -p condyle-codegen --bench generated`: limbs one after the other and in parallel lanes, and batches,
-which are compared with vectors of eight states. --json prints one record per line instead of tables, without the times
-of the library. The program needs Linux, Rust, compilers of C and C++, and the package condyle.
+the same way; benches/peers/dynamics.py builds it (about ten minutes the first time). CppADCodeGen generates code from
+Pinocchio's recursions (benches/peers/cppadcg.cpp, about ten minutes more). This code is compiled by the same compiler
+with the same options. One program calls Condyle's and Pinocchio's generated code in turn. The ratio is the median over
+the rounds. A time is the shortest of all rounds, because other work on the machine only adds time. `cargo bench -p
+condyle-codegen --bench generated` times Condyle's library in three variants: limbs one after the other, limbs in
+parallel lanes, and batches. Batches are compared with generated code for vectors of eight states. --json prints one
+record per line instead of tables, without the times of the library. The program needs Linux, Rust, compilers of C and
+C++, and the package condyle.
 """
 
 import argparse
@@ -127,7 +128,8 @@ def measured(
 
 
 def record_theirs(program: Path, model: Path, states: Path) -> Path:
-    """Returns the folder with Pinocchio's generated code for a model. It contains a library for each function."""
+    """Returns the folder with Pinocchio's generated code for a model. The folder contains a library for each
+    function."""
     folder = dynamics.PEERS / f"cppadcg-{model.stem}-{Path(compiler()).name}"
     if not (folder / "aba_derivatives.so").exists():
         folder.mkdir(exist_ok=True)

@@ -3,7 +3,8 @@
 //!
 //! At each knot, RNEA, ABA and the derivatives of both are computed. Three variants are measured: one call at a time, a
 //! batch on one thread (several knots in the lanes of vectors), and a batch on all threads. An iteration of FDDP starts
-//! from the last solution with a disturbed initial state, as in MPC. `condyle budget` measures the same for any robot.
+//! from the last solution with a disturbed initial state, as in MPC. `condyle budget` measures the same times for any
+//! robot.
 
 use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{Fddp, Problem};
@@ -21,7 +22,8 @@ use std::time::Duration;
 const KNOTS: [usize; 5] = [20, 60, 100, 115, 200];
 /// Time between two knots (s).
 const DT: f64 = 0.01;
-/// Maximum distance of a new initial state from the last one (rad and m, and per second for velocities).
+/// Maximum difference between a new initial state and the previous initial state (rad and m; rad/s and m/s for
+/// velocities).
 const DISTURBANCE: f64 = 1e-3;
 
 /// Positions, velocities, accelerations and efforts of all knots, one knot after the other.

@@ -4,8 +4,8 @@
     python3 benches/instructions.py [--write]
 
 The program runs benches/instructions.rs under callgrind (of valgrind), and compares the counts with
-benches/instructions.json, which --write replaces. If the compiler is not the compiler of that file, counts differ: they
-are printed without a comparison.
+benches/instructions.json, which --write replaces. Counts depend on the compiler. If the file was written with another
+compiler, the program prints the counts without a comparison.
 """
 
 import argparse
@@ -28,7 +28,7 @@ PHASES = {
     "SolverLoop::sweep": "fddp_sweep",
     "LineSearch::run": "fddp_rollout",
 }
-"""Names of the parts of an FDDP iteration, by the function of the solver."""
+"""Names of the parts of an FDDP iteration, for each function of the solver."""
 GROWTH = 1.03
 LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured::(\w+)|((?:SolverLoop|LineSearch)::\w+))")
 
@@ -55,7 +55,7 @@ def counts(program: Path, robot: str) -> dict[str, int]:
         run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
         table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
     found: dict[str, int] = {}
-    for match in filter(None, map(LINE.match, table.splitlines())):  # a function has one line for each of its files
+    for match in filter(None, map(LINE.match, table.splitlines())):  # a function has one line per source file
         name, n = match[2] or match[3], int(match[1].replace(",", ""))
         if match[3] and name not in PHASES:
             continue

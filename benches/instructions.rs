@@ -1,6 +1,6 @@
 //! Runs each algorithm, so that `instructions.py` can count its instructions: the script runs this program under
-//! callgrind, which finds the functions by name. Instruction counts show a change of a thousandth, while times differ
-//! by a tenth from run to run.
+//! callgrind, which finds the functions by name. Instruction counts are exact to 0.1 %, while times differ by 10 % from
+//! run to run.
 
 use condyle::optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem};
@@ -35,7 +35,7 @@ impl States {
     }
 }
 
-/// Defines one function for each algorithm. callgrind identifies it by its name.
+/// Defines one function for each algorithm. callgrind identifies each function by its name.
 macro_rules! measured {
     ($($name:ident($m:ident, $d:ident, $q:ident, $v:ident, $x:ident) $call:expr;)*) => {
         mod measured {
@@ -69,12 +69,12 @@ measured! {
     aba_derivatives(m, d, q, v, x) condyle::aba_derivatives(m, d, q, v, x, &[]);
 }
 
-/// Number of FDDP iterations. The next constant is the number of knots.
+/// Number of FDDP iterations. (The next constant is the number of knots.)
 const ITERATIONS: usize = 5;
 const KNOTS: usize = 32;
 
-/// Builds a motion with a warm start: a robot bends its joints and then comes to rest. Its feet, if it has any, stay on
-/// the ground.
+/// Builds the optimal control problem of a motion, with a warm start. A robot bends its joints and then comes to rest.
+/// If the robot has feet, the feet stay on the ground.
 fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, Vec<f64>, Vec<f64>) {
     let (nv, mut q) = (robot.nv(), neutral(robot));
     for (joint, angle) in bent {

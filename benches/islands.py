@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Counts the instructions for a standing quadruped that shares a model with other quadrupeds. The numbers are
-instructions for each robot, at SIMD level AVX2.
+"""Counts the instructions per robot for several standing quadrupeds in one model, at SIMD level AVX2.
 
     python3 benches/islands.py
 

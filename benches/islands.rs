@@ -1,7 +1,8 @@
-//! Times several quadrupeds that stand in one model, compared with one quadruped alone: `cargo bench -p condyle-benches
-//! --bench islands`, in µs per robot. A second table has the same robots as separate models, computed one after the
-//! other or shared by threads. It shows the maximum gain if islands were solved in parallel. `islands.py` runs this
-//! program under callgrind, which identifies the functions by name, and prints instructions.
+//! Times several standing quadrupeds in one model, compared with a model of one quadruped: `cargo bench -p
+//! condyle-benches --bench islands`, in µs per robot. A second table has the times for the same robots as separate
+//! models, on one thread or on several threads. This table shows how much time solving islands in parallel could save
+//! at most. `islands.py` runs this program under callgrind and prints the instructions of each function. callgrind
+//! identifies functions by name.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,
@@ -20,7 +21,7 @@ const ROBOTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
 /// Duration of the measurement of each function.
 const TIME: Duration = Duration::from_millis(500);
 
-/// Several quadrupeds in one model, and their contacts with the ground, one robot after the other.
+/// Model of several quadrupeds, with the contacts between their feet and the ground, one robot after the other.
 struct Herd {
     model: Model,
     data: Data<f64>,
@@ -50,7 +51,7 @@ impl Herd {
     }
 }
 
-/// Defines one function for each algorithm. callgrind identifies it by its name.
+/// Defines one function for each algorithm. callgrind identifies each function by its name.
 macro_rules! measured {
     ($($name:ident($h:ident) $call:expr;)*) => {
         mod measured {

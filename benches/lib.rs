@@ -1,4 +1,4 @@
-//! Models that several benchmarks use.
+//! Robot models that several benchmarks use.
 
 use condyle::spatial::Mat3;
 use condyle::tree::BodyId;

@@ -1,10 +1,10 @@
-"""Times the loading of robots, the URDFs of example-robot-data, by this version of condyle and by another version.
+"""Times how long two versions of condyle take to load the robots (URDFs) of example-robot-data.
 
     python benches/loading.py [OPTION ...]
 
-The options are `--rounds N` and `--beside FOLDER`, a folder with another `condyle` package, for example an earlier
-version. Both versions load each file in turn, in separate processes; a time is the median over the rounds. The program
-prints a line for each robot, and the ratio of the sums of all times.
+The options are `--rounds N` and `--beside FOLDER`. FOLDER contains another `condyle` package, for example an earlier
+version. Both versions load each file in turn, in separate processes. Each time is the median over the rounds. The
+program prints a line for each robot, and the ratio of the sums of all times.
 """
 
 import argparse
@@ -32,7 +32,7 @@ for line in sys.stdin:
 
 
 def robots() -> list[Path]:
-    """Returns the paths of the URDFs of example-robot-data, from the folder of that package."""
+    """Returns the paths of the URDFs in the installed package example-robot-data."""
     import example_robot_data
 
     folders = (base / "share" / "example-robot-data" / "robots" for base in Path(example_robot_data.__file__).parents)

@@ -4,7 +4,7 @@
     python3 benches/mix.py [--lines] [ROBOT ...] [--of NAME ...]
 
 The program runs the benchmark of instructions.py under callgrind (of valgrind), once for each algorithm. It sorts the
-executed instructions by the names that objdump prints:
+executed instructions by their names, which objdump prints, into these groups:
 
 - arithmetic: sums, products, quotients and roots;
 - load, store: moves of vectors from or to memory; stack: moves from or to the stack, if there are too few registers;
@@ -50,8 +50,8 @@ def kind(operation: str, operands: str) -> str:
 
 
 def executed(program: Path, robot: str, function: str) -> collections.Counter[int]:
-    """Counts the executions of each instruction within a function, by the instruction's address. Libraries have the
-    address 0."""
+    """Counts the executions of each instruction while a function runs, by the instruction's address. All instructions
+    of shared libraries are counted at address 0."""
     cost: collections.Counter[int] = collections.Counter()
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
@@ -72,8 +72,8 @@ def executed(program: Path, robot: str, function: str) -> collections.Counter[in
 
 
 def lines(program: Path, cost: collections.Counter[int]) -> None:
-    """Prints the source lines with the most executed instructions. They are the innermost lines outside of `spatial`,
-    which is inlined everywhere."""
+    """Prints the source lines with the most executed instructions. An instruction counts for its innermost line outside
+    of the crate `spatial`, because functions of `spatial` are inlined everywhere."""
     addresses = "\n".join(map(hex, cost))
     table = run("addr2line", "-a", "-i", "-e", program, input=addresses)
     found: collections.Counter[str] = collections.Counter()

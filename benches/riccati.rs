@@ -1,17 +1,18 @@
-//! Times the backward sweep per knot, with and without the structure of Euler steps: `cargo bench -p condyle-benches
-//! --bench riccati`.
+//! Times the backward sweep per knot, with and without use of the structure of Euler steps: `cargo bench -p
+//! condyle-benches --bench riccati`.
 //!
-//! The figures are µs per knot on a Xeon at 2.5 GHz, default build, smallest of many sweeps of 50 knots, for (ndx, nu)
-//! = (76, 32) / (36, 12) / (18, 9) / (14, 7). AVX-512 takes 46 / 8.4 / 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7
-//! / 1.6 for dense matrices. AVX2 takes 63 / 9.1 / 2.7 / 1.7, dense 106 / 11 / 2.9 / 1.8. The baseline takes 133 / 15 /
-//! 3.7 / 2.3, dense 222 / 22 / 4.9 / 2.7. The structure is used from 16 states on. The 46 µs consist of the three
-//! products (36 %, at 57 GFLOP/s), factor and gains (24 %), waiting for 200 KB per knot (10 %), and copies and
+//! The figures are times in µs per knot on a Xeon at 2.5 GHz with the default build. Each time is from the shortest of
+//! many sweeps of 50 knots, for (ndx, nu) = (76, 32) / (36, 12) / (18, 9) / (14, 7). With AVX-512, a knot takes 46 /
+//! 8.4 / 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7 / 1.6 with dense matrices. With AVX2, it takes 63 / 9.1 / 2.7
+//! / 1.7, or 106 / 11 / 2.9 / 1.8 with dense matrices. At the baseline level, it takes 133 / 15 / 3.7 / 2.3, or 222 /
+//! 22 / 4.9 / 2.7 with dense matrices. The sweep uses the structure if ndx is at least 16. The 46 µs consist of the
+//! three products (36 %, at 57 GFLOP/s), factor and gains (24 %), waiting for 200 KB per knot (10 %), and copies and
 //! transposes.
 //!
-//! In segments, on one thread, other kinds of knots take longer than these knots of 46 / 8.1 / 1.6 µs. If the
-//! continuation of a knot after its segment is unknown, the knot takes 1.4 / 1.3 / 1.0 times as long. A link takes 1.9
-//! / 1.7 / 1.35 times as long. The figures of `Sweep::set_segments` follow from these ratios. The group `segments` has
-//! the time of whole sweeps, on one thread and on all threads.
+//! In a sweep in segments, some knots take longer than the 46 / 8.1 / 1.6 µs of a usual knot (on one thread). A knot
+//! takes 1.4 / 1.3 / 1.0 times as long if the value function after its segment is unknown. A link between two segments
+//! takes 1.9 / 1.7 / 1.35 times as long. The figures of `Sweep::set_segments` follow from these ratios. The benchmark
+//! group `segments` has the times of whole sweeps, on one thread and on all threads.
 #![allow(non_snake_case)]
 
 use condyle::optimal::{LqKnot, Sweep};
@@ -26,7 +27,7 @@ const HORIZON: usize = 50;
 const LONG: usize = 100;
 const DT: f64 = 0.02;
 
-/// Sizes of a humanoid, a quadruped, and arms of 7 and 9 joints: (ndx, nu, rows of the free joint).
+/// Sizes (ndx, nu, rows of the free joint) of a humanoid, a quadruped, and arms of 7 and 9 joints.
 const SIZES: [(usize, usize, usize); 4] = [(76, 32, 6), (36, 12, 6), (14, 7, 0), (18, 9, 0)];
 
 /// Returns a knot of a problem with semi-implicit Euler steps and a convex cost.

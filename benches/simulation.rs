@@ -8,10 +8,10 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// Number of states from which steps start, one after the other.
+/// Number of initial states. The benchmark uses one after the other.
 const STATES: usize = 16;
 
-/// Measures a step of 1 ms from a random state, with efforts. The joints have no losses.
+/// Measures a step of 1 ms from a random state, with efforts. The joints have neither friction nor damping.
 fn step(c: &mut Criterion) {
     let integrators = [
         ("step_semi_implicit_euler", Integrator::SemiImplicitEuler),
@@ -42,8 +42,8 @@ fn step(c: &mut Criterion) {
     }
 }
 
-/// Measures a step of 1 ms on the ground, without an initial guess of the impulses. The contacts are four feet, or the
-/// eight corners of two soles.
+/// Measures a step of 1 ms of a robot on the ground, without an initial guess of the contact impulses. The contacts are
+/// four feet, or the eight corners of two soles.
 fn step_on_ground(c: &mut Criterion) {
     let corners = [(0.1, 0.05), (0.1, -0.05), (-0.1, -0.05), (-0.1, 0.05)].map(|(x, y)| Vec3::new(x, y, 0.0));
     let robots = [

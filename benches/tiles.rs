@@ -1,21 +1,22 @@
 //! Times dense products in registers, compared with the processor's peak: `cargo bench -p condyle-benches --bench
 //! tiles`.
 //!
-//! The peak is the rate of independent multiplications and additions. It is measured before and after each product,
-//! since the clock of a machine and the load by other virtual machines change. The program prints the best of many
-//! short rounds.
+//! The peak is the rate of independent multiplications and additions. The peak is measured before and after each
+//! product, because the processor's clock and the load by other virtual machines change. The program prints the best of
+//! many short rounds.
 
 use condyle::level::level;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Number of independent sums: more than a processor's latency requires, and fewer than a processor's registers.
+/// Number of independent sums. It is large enough to hide the latency of an operation, and smaller than the number of
+/// registers.
 const SUMS: usize = 12;
 const TERMS: usize = 4096;
 const ROUNDS: usize = 400;
 
-/// Computation of independent sums, which also counts the operations on single numbers.
+/// Function that computes independent sums and returns its number of operations on single numbers.
 struct Independent<'a> {
     operations: &'a mut usize,
 }
@@ -39,8 +40,8 @@ impl Vectorized for Independent<'_> {
     }
 }
 
-/// Returns the largest rate, in operations per nanosecond, of several rounds. Each round returns the number of its
-/// operations.
+/// Returns the largest rate (operations per nanosecond) of several rounds. In each round, `round` runs and returns its
+/// number of operations.
 fn fastest(mut round: impl FnMut() -> usize) -> f64 {
     let rate = |()| {
         let start = Instant::now();

@@ -1,6 +1,6 @@
-//! Times a tick of whole-body control, for robots that stand or move under pushes. One second of recorded ticks is
-//! replayed; each tick starts from the controller's own last solution. `cargo bench -p condyle-benches --bench
-//! wholebody`
+//! Times a tick (one step) of whole-body control, for robots that stand or move under pushes. The benchmark replays one
+//! second of recorded states. Each tick starts from the controller's solution of the previous tick. `cargo bench -p
+//! condyle-benches --bench wholebody`
 
 #[path = "../crates/wholebody/tests/common/workload.rs"]
 mod workload;

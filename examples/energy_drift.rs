@@ -1,12 +1,13 @@
-//! Measures the energy error of each integrator without drives and brakes, over 10 s. One robot is a double pendulum
-//! that swings chaotically. The other is a humanoid that falls and tumbles with loose joints.
+//! Measures the energy error of each integrator in motions of 10 s without motors and friction. One robot is a double
+//! pendulum that swings chaotically. The other is a humanoid that falls and tumbles with loose joints.
 //!
-//! The example prints a table and draws |E(t) − E(0)|; each point is the greatest value in a hundredth of the time.
+//! The example prints a table and draws |E(t) − E(0)|. Each point of a curve is the greatest value in a hundredth of
+//! the time.
 //!
-//! The humanoid is difficult. Its wrists are light, loose, and sometimes near the position in which yaw and roll share
-//! an axis; there the joint speeds jump. Near this position, Euler's method uses the Coriolis forces from the beginning
-//! of a step, which adds energy without bound. With steps of 2 ms, the variational integrator reports that its equation
-//! has no solution.
+//! The humanoid is difficult. Its wrists are light and loose, and sometimes come near the position in which yaw and
+//! roll have the same axis. Near this position, joint speeds change abruptly. Euler's method uses the Coriolis forces
+//! from the beginning of a step, which adds energy without bound. With steps of 2 ms, the variational integrator
+//! reports that its equation has no solution.
 //!
 //! ```text
 //! cargo run --release --example energy_drift -- energy_drift.svg

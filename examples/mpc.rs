@@ -2,9 +2,10 @@
 //!
 //! `cargo run --release --example mpc`
 //!
-//! Every 10 ms the loop reads the state, applies u + K (x ⊖ x̄) of the last plan, shifts the horizon by a knot, and
-//! improves the plan by one iteration within 5 ms. The example prints the error of the tool and the timing of the loop.
-//! A delayed solve ends after its iteration and reports the overrun; the next solve has its whole time budget again.
+//! Every 10 ms the loop reads the state x and applies the control u + K (x ⊖ x̄) of the last plan. Then it shifts the
+//! horizon by a knot, and improves the plan by one iteration within 5 ms. The example prints the error of the tool and
+//! the timing of the loop. If an iteration takes longer than 5 ms, the solve ends after this iteration and reports the
+//! overrun. The next solve has its whole time budget again.
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};
@@ -23,7 +24,8 @@ fn target(time: f64) -> Vec3<f64> {
     Vec3::new(0.45, 0.15 * cos, 0.45 + 0.15 * sin)
 }
 
-/// Returns the costs of a knot that lead the tool to the target of step `step`. The knot has this number of controls.
+/// Returns the costs of a knot, which move the tool to the target at step `step`. `controls` is the knot's number of
+/// controls.
 fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
     let follow = Residual::FrameTranslation { frame: "tool".into(), target: target(step as f64 * DT) };
     let effort = Residual::Control { reference: vec![0.0; controls] };
@@ -37,8 +39,8 @@ fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arm = Arc::new(robots::arm7());
     let rest = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
-    // One model of the arm serves all knots. Each knot has its own target, and keeps the target while the knot moves to
-    // the front.
+    // All knots share one action model of the arm. Each knot has its own target, which stays the same when the horizon
+    // is shifted.
     let mut knot = FreeDynamics::running(arm.clone(), DT, vec![])?;
     for t in 0..HORIZON {
         knot.set_costs(t, costs(&rest, t, 7))?;
@@ -68,14 +70,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (i, u) in u.iter_mut().enumerate() {
             *u = plan.u(0)[i] + plan.K[0].row(i).iter().zip(&dx).map(|(k, dx)| k * dx).sum::<f64>();
         }
-        // The arm moves. Twice, something hits its elbow.
+        // Simulate the arm. At two steps, a disturbance adds 1 rad/s to the speed of the elbow.
         plant.calc(0, &x, &u, &mut next);
         if step == STEPS / 3 || step == 2 * STEPS / 3 {
             next[7 + 3] += 1.0;
         }
         x.copy_from_slice(&next);
 
-        // Shift the horizon. Its last knot and its terminal get new targets.
+        // Shift the horizon. Then set new targets for the horizon's last knot and for the terminal.
         problem.shift(0)?;
         let knots: &mut FreeDynamics = problem.model_mut(0).expect("it serves all knots");
         knots.set_costs(HORIZON - 1, costs(&rest, step + HORIZON, 7))?;

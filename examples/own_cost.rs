@@ -1,4 +1,4 @@
-//! A cost written by a user, with exact derivatives. The cost takes three lines, and gradient and Hessian take one
+//! A user's own cost with exact derivatives. The cost takes three lines of code, and gradient and Hessian take one
 //! line.
 //!
 //! The tool should be near a target, with small efforts, and the arm should stay near its present position. The cost is
@@ -25,7 +25,7 @@ fn main() -> Result<(), Error> {
         if g.norm() < 1e-12 {
             break;
         }
-        // Where the cost is not convex, add a multiple of the identity to make the Hessian positive definite.
+        // If the Hessian is not positive definite, add a multiple of the identity to make it so.
         let lowest = H.symmetric_eigenvalues().min();
         H.iter_mut().step_by(8).for_each(|x| *x += (1e-2 - lowest).max(0.0));
         let mut step = H.cholesky().expect("it is positive now").solve(&-g);

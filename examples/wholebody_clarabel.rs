@@ -1,6 +1,7 @@
-//! Whole-body control with clarabel alone: a hundred lines write the program of `condyle::wholebody` directly.
+//! Whole-body control with the solver clarabel alone. A hundred lines of code write the same cone program as
+//! `condyle::wholebody`.
 //!
-//! A quadruped stands on four point feet and is pushed. Each millisecond, the program
+//! A quadruped stands on four point feet and is pushed. Each millisecond, clarabel solves the program
 //!
 //! ```text
 //! min  ½ w ‖J q̈ + J̇ v − a*‖² + ½ w_p ‖q̈_joints − a*_joints‖² + ½ ε_a ‖q̈‖² + ½ ε_f ‖f − f_ref‖²     over q̈ and f
@@ -9,8 +10,7 @@
 //! ‖f_t‖ ≤ μ f_n                                  each foot in its cone
 //! ```
 //!
-//! is written for clarabel, which solves it. The result is compared with the result of `WholeBodyController` for the
-//! same tick.
+//! The example compares clarabel's solution with the solution of `WholeBodyController` for the same state.
 //!
 //! ```text
 //! cargo run --release --features clarabel --example wholebody_clarabel
@@ -40,7 +40,8 @@ const TRUNK: f64 = 10.0; // w
 const POSTURE: f64 = 0.1; // w_p
 const SMALL_A: f64 = 1e-6; // ε_a
 const SMALL_F: f64 = 1e-4; // ε_f
-// Tolerance of both solvers. If a foot just reaches its cone, the error of the torques depends on the tolerance's root.
+// Tolerance of both solvers. If the force of a foot is on the boundary of its friction cone, the error of the torques
+// depends on the square root of the tolerance.
 const TOLERANCE: f64 = 1e-11;
 const DT: f64 = 1e-3; // s
 const PUSH: f64 = 60.0; // N, to the left, from 0.1 s to 0.3 s
@@ -54,7 +55,7 @@ fn sparse(A: &DMatrix<f64>, upper_triangle: bool) -> CscMatrix<f64> {
     CscMatrix::new_from_triplets(A.nrows(), A.ncols(), I, J, values)
 }
 
-/// Data of the program: the posture and the pose of the trunk that are to be held.
+/// Data of the cone program: the posture and the pose of the trunk that the controller holds.
 struct Standing<'a> {
     model: &'a Model,
     q: &'a [f64],
@@ -73,7 +74,7 @@ impl Standing<'_> {
         let (n, motors) = (nv + 3 * FEET.len(), nv - 6);
         let M = crba(model, data, q).clone();
         let h = DVector::from_column_slice(nonlinear_effects(model, data, q, v));
-        // Jacobians of the trunk and of the feet, and J̇ v, which is their acceleration at q̈ = 0.
+        // Jacobians of the trunk and of the feet, and the accelerations J̇ v of these frames at q̈ = 0.
         let trunk = model.frame("trunk")?;
         let feet: Vec<usize> = FEET.iter().map(|foot| model.frame(foot)).collect::<Result<_, _>>()?;
         let (mut J, mut J_foot) = (DMatrix::zeros(6, nv), DMatrix::zeros(6, nv));

@@ -69,7 +69,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         references.com.position.z = start.com.position.z;
         references.com.velocity.y = aside.y * (to[1] - back[1]);
         references.com.acceleration.y = aside.y * (to[2] - back[2]);
-        // The right foot is unloaded from 1.4 s to 1.6 s, is lifted and lands, and is loaded again after 3.3 s.
+        // The right foot is unloaded from 1.4 s to 1.6 s. Then it is lifted and lands. After 3.3 s it is loaded again.
         let up = PI * ((t - 1.6) / 1.6).clamp(0.0, 1.0);
         references.frames[1].pose.translation.z = start.frames[1].pose.translation.z + LIFT * up.sin().powi(2);
         references.frames[1].velocity.linear.z = LIFT * PI / 1.6 * (2.0 * up).sin();

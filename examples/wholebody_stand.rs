@@ -1,9 +1,9 @@
 //! A quadruped stands on four point feet. It is pushed, sways and returns.
 //!
-//! Every millisecond, one cone program gives the torques: whole-body control with true friction cones. The controller
-//! does not know the push; it sees only the state. The simulated ground holds a touching foot as long as the ground
-//! pushes. Friction on this ground is unbounded. So the example checks each force and prints the smallest distance of a
-//! force from the boundary of its cone.
+//! Every millisecond, the whole-body controller solves one cone program with exact friction cones, which gives the
+//! torques. The controller measures only the state, not the push. The simulated ground holds a foot as long as the
+//! ground pushes the foot, and the friction force has no limit. So the example checks each force and prints the
+//! smallest distance of a force from the boundary of its cone.
 //!
 //! ```text
 //! cargo run --release --example wholebody_stand

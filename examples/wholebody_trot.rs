@@ -1,5 +1,5 @@
-//! A quadruped trots along a plan that FDDP finds. Whole-body control tracks the plan at 1 kHz, on ground that only
-//! pushes.
+//! A quadruped trots along a plan that FDDP finds. Whole-body control tracks the plan at 1 kHz, on simulated ground
+//! that can push but not pull.
 //!
 //! ```text
 //! cargo run --release --example wholebody_trot
@@ -35,7 +35,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     gait.stand(20)?;
     let touches = gait.touches();
     let (solution, times) = gait.solve()?;
-    // Friction on the ground of this example is unbounded, so the forces are checked.
+    // The simulated friction force has no limit, so the example reports the forces that are outside their friction
+    // cones.
     let plan = plan_of(&robot, &solution, &times, &touches, 0.02)?;
 
     let contacts = FEET.map(|foot| FrictionContact::point(foot, FRICTION));

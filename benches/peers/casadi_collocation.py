@@ -1,20 +1,19 @@
 #!/usr/bin/env python3
-"""Solves optimisations of motions with IPOPT. The functions come from condyle.casadi, or are written as CasADi
-expressions.
+"""Optimises motions with IPOPT. The dynamics functions come from condyle.casadi, or are written as CasADi expressions.
 
     .venv/pinocchio/bin/python benches/peers/casadi_collocation.py [--rounds N] [--json] [PROBLEM ...]
 
-The problems come from python/examples. Both kinds of functions have the same transcription, with the same variables,
-constraints and zeros. condyle.casadi gives the dynamics of all points as one function (`states=`); the expressions use
-`Function.map`. The problems are `swing_up`, `reach` (of Condyle's arm) and `jump`. `reach_panda` and `reach_talos`
-(with a fixed pelvis) are the reach of robots from example-robot-data. For each problem the program prints the processor
-time of a solve (the least of the rounds), and the fraction of this time in the problem's functions. It also prints the
-iterations, the cost, and the time to build the expressions. The expressions run in CasADi's own virtual machine, as
-pinocchio.casadi's expressions do.
+The problems come from python/examples. With both sources of functions, the transcription is the same: the same
+variables, constraints and sparsity. condyle.casadi gives the dynamics of all points as one function (`states=`); the
+expressions use `Function.map`. The problems are `swing_up`, `reach` (of Condyle's arm) and `jump`. In `reach_panda` and
+`reach_talos` (with a fixed pelvis), robots from example-robot-data reach for a pose. For each problem the program
+prints the processor time of a solve (the least of the rounds), and the fraction of this time in the problem's
+functions. It also prints the iterations, the cost, and the time to build the expressions. The expressions run in
+CasADi's own virtual machine, as pinocchio.casadi's expressions do.
 
-The time outside of the functions belongs to IPOPT and its linear solver; it is the same for both kinds of functions.
-For an arm of two links (`swing_up`), it is 0.42 of the whole time with expressions. With any functions, a solve takes
-at least this long.
+The time outside of the functions belongs to IPOPT and its linear solver, and does not depend on the source of the
+functions. So faster functions cannot reduce this time. For an arm of two links (`swing_up`), it is 0.42 of the whole
+time with expressions.
 """
 
 import argparse
@@ -66,8 +65,8 @@ def reaches(
 
 
 def reaches_of(name: str, frame: str, locked: list[str]) -> tuple[Transcription, Transcription]:
-    """Builds the reach of a robot with a fixed base. It goes from the middle of the joints' ranges to a pose in which
-    each joint has moved towards its upper limit."""
+    """Builds a motion of a robot with a fixed base. The motion begins at the middle of the joints' ranges. Its target
+    is the position that a frame has after each joint has moved towards its upper limit."""
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
     loader = ROBOTS[name]

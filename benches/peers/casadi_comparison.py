@@ -3,11 +3,11 @@
 
     .venv/pinocchio/bin/python benches/peers/casadi_comparison.py [FILE.json] [--quick]
 
-Functions: RNEA and ABA, their Jacobian, and the Hessian of λᵀf, for the embedded robots. Each function is timed in
-three forms: Condyle's call from Python, Condyle's function in CasADi, and the same recursion written as CasADi
+The functions are RNEA and ABA, their Jacobian, and the Hessian of λᵀf, for the embedded robots. Each function is timed
+in three forms: Condyle's call from Python, Condyle's function in CasADi, and the same recursion written as CasADi
 expressions.
 
-The motion: an arm goes to a point and comes to rest there. FDDP solves the problem directly. IPOPT solves it by
+In the motion, an arm goes to a point and comes to rest there. FDDP solves the problem directly. IPOPT solves it by
 multiple shooting with exact Hessians, once with Condyle's ABA and once with an ABA of expressions. All three solutions
 must have the same cost.
 """
@@ -35,7 +35,7 @@ SAME = 1e-6
 
 
 def own(model: condyle.Model, name: str, x: list[np.ndarray]) -> dict[str, Callable[[], object]]:
-    """Returns Condyle's calls from Python, which write into existing arrays."""
+    """Returns functions that call Condyle from Python. Each call writes its results into existing arrays."""
     data, value = condyle.Data(model), np.zeros(model.nv)
     function, derivatives = getattr(condyle, name), getattr(condyle, f"{name}_derivatives")
     return {
@@ -72,7 +72,8 @@ class Reach:
         self.x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
 
     def by_fddp(self) -> Callable[[], tuple[float, float, int]]:
-        """Returns a function that solves the problem by FDDP, and returns seconds, cost and iterations."""
+        """Returns a function. This function solves the problem by FDDP, and returns the time (s), the cost and the
+        number of iterations."""
         arm, x0 = self.arm, self.x0
         speed = Activation.weighted(np.r_[np.zeros(7), np.ones(7)])
         running = [
@@ -94,7 +95,7 @@ class Reach:
         return solve
 
     def by_ipopt(self, dynamics: casadi.Function, placement: casadi.Function) -> Callable[[], tuple[float, float, int]]:
-        """Returns a function that solves the problem as a nonlinear program, by IPOPT. `dynamics` maps (q, v, τ) to q̈
+        """Returns a function that solves the problem by IPOPT, as a nonlinear program. `dynamics` maps (q, v, τ) to q̈
         for all knots; `placement` maps q to a tuple that begins with the position."""
         n, opti = 7, casadi.Opti()
         q, v, u = opti.variable(n, KNOTS + 1), opti.variable(n, KNOTS + 1), opti.variable(n, KNOTS)

@@ -7,7 +7,8 @@ import condyle
 
 
 class Expressions:
-    """Recursions in the bodies' frames (Featherstone 2008), for revolute, prismatic and free-flyer joints."""
+    """Dynamics of a robot by recursions in the bodies' frames (Featherstone 2008), for revolute, prismatic and
+    free-flyer joints."""
 
     def __init__(self, model: condyle.Model) -> None:
         self.model = model
@@ -102,7 +103,7 @@ class Expressions:
         return casadi.Function("aba", [self.q, self.v, tau], [a])
 
     def forward_kinematics(self, frame: str) -> casadi.Function:
-        """Returns the function of q that gives position and rotation of a frame."""
+        """Returns a CasADi function that computes the position and rotation of a frame from q."""
         R, p = self.frame(frame)
         return casadi.Function("forward_kinematics", [self.q], [p, R])
 
@@ -120,7 +121,7 @@ class Expressions:
         return vs
 
     def frame_velocity(self, name: str) -> casadi.Function:
-        """Returns the function that gives the velocity of a frame, along the frame's own axes."""
+        """Returns a CasADi function that computes the velocity of a frame, along the frame's own axes."""
         frame = self.model.frames[self.model.frame(name)]
         placement = np.array(frame.placement)
         R, p = casadi.DM(placement[:3, :3]), casadi.DM(placement[:3, 3])
@@ -129,8 +130,8 @@ class Expressions:
         return casadi.Function("frame_velocity", [self.q, self.v], [casadi.vertcat(linear, R.T @ v[3:])])
 
     def constrained_dynamics(self, points: list[str], kd: float) -> casadi.Function:
-        """Returns the function that gives the accelerations, and the forces of points that are held to the ground,
-        along the world's axes."""
+        """Returns the function for the dynamics of a robot whose contact points cannot move. This function computes the
+        accelerations, and the contact forces along the world's axes."""
         model, vs, biases = self.model, self.velocities(), [casadi.SX.zeros(6)]
         for i in range(1, model.nbodies):
             vJ = self.S[i] @ self.joint_velocity(self.v, i)
@@ -150,6 +151,6 @@ class Expressions:
         M, h = casadi.jacobian(effort, a), casadi.substitute(effort, a, casadi.SX.zeros(model.nv))
         rows = J.size1()
         K = casadi.blockcat([[M, J.T], [J, casadi.SX(rows, rows)]])
-        D, LT, order = casadi.ldl(K, False)  # not reordered: M must be eliminated first
+        D, LT, order = casadi.ldl(K, False)  # rows keep their order: M must be eliminated first
         x = casadi.ldl_solve(casadi.vertcat(tau - h, -gamma), D, LT, order)
         return casadi.Function("constrained_dynamics", [self.q, self.v, tau], [x[: model.nv], -x[model.nv :]])

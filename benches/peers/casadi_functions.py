@@ -4,10 +4,10 @@ expressions.
 
     .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
-Without a URDF, the robots are the embedded arm and humanoid. For RNEA and ABA the program prints times in microseconds,
-and the speed-up by condyle.casadi: of the function, of its Jacobian with respect to all arguments, and of the Hessian
-of λᵀf. Times are medians of alternating rounds on one core. The expressions run in CasADi's own virtual machine, as
-pinocchio.casadi's expressions do.
+Without a URDF, the robots are the embedded arm and humanoid. For RNEA and ABA, the program prints times in microseconds
+and the speed-up by condyle.casadi. It prints these for the function, for its Jacobian with respect to all arguments,
+and for the Hessian of λᵀf. Times are medians of alternating rounds on one core. The expressions run in CasADi's own
+virtual machine, as pinocchio.casadi's expressions do.
 """
 
 import argparse
@@ -33,8 +33,8 @@ def derived(f: casadi.Function) -> dict[str, casadi.Function]:
 
 
 def call(f: casadi.Function, x: list[np.ndarray]) -> Callable[[], None]:
-    """Returns a call of a function through its buffers, without Python's conversions. Inputs that x does not give are
-    ones."""
+    """Returns a call of a CasADi function through CasADi's buffers, which avoids Python's conversions. All entries of
+    inputs that are missing in x are 1."""
     buffer, trigger = f.buffer()
     given = [*x, *(np.ones(f.nnz_in(k)) for k in range(len(x), f.n_in()))]
     results = [np.zeros(f.nnz_out(k)) for k in range(f.n_out())]

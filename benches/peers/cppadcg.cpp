@@ -1,11 +1,11 @@
-// Times one call of Pinocchio's code after CppADCodeGen has recorded it and generated C. The script generated.py builds
-// and runs this program.
+// Times one call of C code that CppADCodeGen generates from Pinocchio's algorithms. The script generated.py builds and
+// runs this program.
 //
 //     cppadcg MODEL STATES FOLDER COMPILER FLAG…
 //
-// MODEL and STATES are the same as for pinocchio.cpp. The program writes C to FOLDER, compiles the C there, and prints
-// a line for each algorithm: its name, the median time of a call in ns, and the seconds for generating and compiling.
-// It is compiled once for each PART.
+// MODEL and STATES are the same as for pinocchio.cpp. The program writes C code to FOLDER, compiles the code, and
+// prints a line for each algorithm: its name, the median time of a call in ns, and the seconds for generating and
+// compiling. This file is compiled once for each PART.
 #include <cppad/cg.hpp>
 #include <pinocchio/codegen/cppadcg.hpp>
 #include <pinocchio/multibody.hpp>
@@ -48,8 +48,7 @@ void part1(const Task &), part2(const Task &), part3(const Task &);
 
 static double seconds(Clock::time_point since) { return std::chrono::duration<double>(Clock::now() - since).count(); }
 
-// Algorithm with the arguments q, v, and a or τ, which writes its results one after the other. It is recorded and
-// timed.
+// Algorithm to be recorded and timed. Its arguments are q, v, and a or τ. It writes its results one after the other.
 using Algorithm = std::function<void(const Model &, Data &, const Vector &, const Vector &, const Vector &, Vector &)>;
 static void measure(const Task &task, const char *name, int outputs, bool takes_tau, const Algorithm &algorithm) {
   const auto start = Clock::now();

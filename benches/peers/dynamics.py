@@ -4,9 +4,10 @@
     python3 benches/peers/dynamics.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
 Pinocchio is compiled for this processor (clang++ -O3 -march=native, or g++), which takes about ten minutes the first
-time. Condyle is a default build. Both programs run on one core, in turn, round after round. A time is the median over
-the rounds of the program's own median. A ratio is the median over the rounds of the quotient of two times. The script
-needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed under target/peers.
+time. Condyle is a default build. Both programs run on one core, in turn, round after round. In each round, a program
+prints the median of its times. The script prints the median of these medians over all rounds. A ratio is the median
+over the rounds of the quotient of two times. The script needs Linux, Rust, Python 3 with venv and a C++ compiler;
+everything else is installed under target/peers.
 """
 
 import argparse
@@ -38,12 +39,13 @@ BESIDE = {
     "dtau_dq_by_duals": "rnea_derivatives",
     "dtau_dq_by_differences": "rnea_derivatives",
 }
-"""Algorithms that Pinocchio's benchmark lacks, each with the algorithm of Condyle whose time it is compared with."""
+"""Algorithms that only Condyle's program times. For each, the name of the algorithm with whose time the script compares
+it."""
 
 MODES = {"": "one call", "batch": "per state of a batch", "horizon": "a horizon"}
 """Prefixes in the names of algorithms, each with a description of what is timed."""
 KNOT = ("aba", "aba_derivatives", "rnea")
-"""Algorithms that a solver calls at each knot of a horizon."""
+"""Names of the algorithms that a solver calls at each knot of a horizon."""
 
 
 def run(*command: "str | Path", **options: object) -> str:
@@ -62,8 +64,8 @@ def environment(name: str, *packages: str) -> Path:
 
 
 def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *packages: str) -> Path:
-    """Compiles pinocchio.cpp, or a similar program that consists of several parts and needs headers of additional
-    packages. Returns the path of the program."""
+    """Compiles pinocchio.cpp, or a similar program in several parts with headers of additional packages. Returns the
+    path of the program."""
     purelib = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
     prefix = Path(run(python, "-c", purelib).strip()) / "cmeel.prefix"
     folders = [prefix / "include", prefix / "include/urdfdom"]
@@ -85,7 +87,7 @@ def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *
     for part, target in zip(PARTS, objects, strict=True):
         if not target.exists() or target.stat().st_mtime < source.stat().st_mtime:
             print(f"compiling {source.name}, part {part} of {PARTS[-1]}, with {compiler} …", file=sys.stderr)
-            optimised = level if part else "-O1"  # part 0 only reads the model
+            optimised = level if part else "-O1"  # part 0 contains only the code that reads the model
             run(compiler, *flags, optimised, f"-DPART={part}", "-c", source, "-o", target)
     libraries = [f"-L{prefix}/lib", f"-Wl,-rpath,{prefix}/lib", "-lboost_serialization", "-ldl"]
     run(compiler, *objects, "-o", program, *libraries)
@@ -146,7 +148,7 @@ def times(output: str) -> dict[str, float]:
 
 
 def peer_time(kind: str, name: str, mine: dict[str, float], theirs: dict[str, float]) -> float:
-    """Returns the time with which a time of Condyle is compared."""
+    """Returns the reference time of an algorithm, with which the script compares Condyle's time."""
     if kind == "horizon":
         return int(name) * sum(theirs[algorithm] for algorithm in KNOT)
     return theirs.get(name) or mine[BESIDE[name]]

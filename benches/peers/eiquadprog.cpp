@@ -1,4 +1,5 @@
-// The fast solver of eiquadprog, which TSID uses, as a function for ctypes. See wholebody_theirs.py.
+// C function for eiquadprog's fast solver, which the library TSID uses. The script wholebody_theirs.py calls this
+// function by ctypes.
 #include <eiquadprog/eiquadprog-fast.hpp>
 
 using Eigen::Map;

@@ -3,14 +3,14 @@
 
     .venv/crocoddyl/bin/python benches/peers/ocp.py [OPTION ...] [NAME ...]
 
-Both libraries build each problem from the same JSON. It comes from the problems of a folder (with the robots in its
-`robots`), or from `ocp_problems.py`. The program compares the costs of all iterations (to 1e-6 of each cost), the step
-lengths, the regularisations, and the optimum. The stopping value, which loses its digits near the optimum, is only
-shown. Both solvers are timed in turn, round after round, on one core. Each timed solve follows the same untimed solve,
-as in a control loop that solves repeatedly. Times are medians of milliseconds per iteration, for the whole solve and
-for its phases. With --converted, `condyle.crocoddyl` converts Crocoddyl's problem; the converted problem is timed
-against Condyle's problem built from the JSON, instead of Crocoddyl. The program needs crocoddyl 3.2.1, pin 4.0.0 and
-condyle in one environment, which `./test` makes.
+Both libraries build each problem from the same JSON. The JSON comes from `ocp_problems.py`, or from a folder of
+problems whose subfolder `robots` contains the robots. The program compares the costs of all iterations (to 1e-6 of each
+cost), the step lengths, the regularisations, and the optimum. The stopping value is printed but not compared, because
+it has few correct digits near the optimum. Both solvers are timed in turn, round after round, on one core. Each timed
+solve follows the same untimed solve, as in a control loop that solves repeatedly. Times are medians of milliseconds per
+iteration, for the whole solve and for its phases. With --converted, `condyle.crocoddyl` converts Crocoddyl's problem;
+the program then compares the times of the converted problem and of Condyle's own problem from the JSON, instead of
+Crocoddyl's times. The program needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which `./test` makes.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import statistics
 import sys
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads on one core would wait for each other
+os.environ["OMP_NUM_THREADS"] = "1"  # set before Crocoddyl is loaded: on one core, threads would wait for each other
 
 import numpy as np
 from ocp_converted import Converted
@@ -31,7 +31,7 @@ from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
 COST = 1e-6
-"""Relative tolerance of the costs of an iteration. If Crocoddyl's input is perturbed by 1e-12, its own costs change by
+"""Relative tolerance for the cost of an iteration. If Crocoddyl's input changes by 1e-12, Crocoddyl's costs change by
 up to this tolerance."""
 CHAOTIC = {
     ("arm_kinova_cold", "fddp"): 3,
@@ -43,29 +43,28 @@ CHAOTIC = {
     ("talos_taichi", "fddp"): 0,
     ("talos_taichi", "boxfddp"): 0,
 }
-"""Problems and solvers for which Crocoddyl does not repeat its own trace, and the number of leading iterations that it
-repeats."""
+"""Problems and solvers for which two runs of Crocoddyl differ, with the number of leading iterations that are equal."""
 CURED = {("quadrotor_box", "boxddp"): 7}
-"""Number of leading iterations before Crocoddyl's quadratic program cycles. Condyle's quadratic program does not
-cycle."""
+"""Number of leading iterations that must agree. In the next iteration, the active set in Crocoddyl's quadratic program
+cycles. Condyle's quadratic program does not cycle."""
 ELSEWHERE = {("arm_talos", "ddp"), ("cartpole_swingup", "ddp"), ("quadrotor_box", "boxddp")}
-"""Problems and solvers for which the optimum depends on the trace."""
+"""Problems and solvers that can reach different optima, depending on the sequence of iterates."""
 INCOMPARABLE = {("arm_kinova_box", "boxddp")}
-"""Problems and solvers for which Crocoddyl repeats neither an iteration nor the optimum."""
+"""Problems and solvers for which two runs of Crocoddyl have neither an iteration nor the optimum in common."""
 OPTIMUM = 1e-6
 """Relative tolerance of the final costs."""
 
 
 def load(folder, name):
-    """Returns the JSON of a problem and of its robot; the latter is None if the problem has no robot."""
+    """Returns the JSON of a problem, and the JSON of its robot or None."""
     spec = json.loads((folder / f"{name}.json").read_text())
     robot = spec["robot"] and json.loads((folder / "robots" / f"{spec['robot']}.json").read_text())
     return spec, robot
 
 
 def agreeing(ours, theirs):
-    """Returns the number of leading iterations whose step and regularisation are equal, and whose costs agree to
-    `COST`."""
+    """Returns the number of leading iterations that agree: step length and regularisation are equal, and the costs
+    differ by at most `COST`."""
     n = min(len(ours), len(theirs))
     a, b = ours[:n], theirs[:n]
     near = np.abs(a[:, 0] - b[:, 0]) <= COST * np.maximum(np.abs(b[:, 0]), 1e-12)
@@ -74,8 +73,8 @@ def agreeing(ours, theirs):
 
 
 def compare(spec, robot, solver, make=Ours):
-    """Solves a problem by one of its solvers in both libraries, and returns the comparison. `make` builds Condyle's
-    problem."""
+    """Solves a problem in both libraries by one of the problem's solvers. Returns the comparison. `make` builds
+    Condyle's problem."""
     case = (spec["name"], solver)
     if case in INCOMPARABLE:
         raise NotRunError("Crocoddyl does not repeat itself")
@@ -148,8 +147,8 @@ def line(result):
 
 
 def run(spec, robot, solver, options):
-    """Compares the solves of a problem by both libraries and the times of both, and prints the result. Returns whether
-    the solves agree."""
+    """Solves a problem with both libraries, compares the iterations and the times, and prints the result. Returns
+    whether the iterations agree."""
     show = json.dumps if options.json else line
     try:
         make = Converted if options.converted else Ours

@@ -32,7 +32,7 @@ def unicycle(stage):
 
 
 class Cartpole:
-    """A pole on a cart with x = (y, θ, ẏ, θ̇) and u = (f); the pole is upright at θ = 0."""
+    """Action of a pole on a cart, with x = (y, θ, ẏ, θ̇) and u = (f). The pole is upright at θ = 0."""
 
     def __init__(self, stage):
         self.m1, self.m2, self.l, self.g = (stage[k] for k in ("m_cart", "m_pole", "length", "g"))
@@ -41,7 +41,7 @@ class Cartpole:
         self.dt = stage["dt"]
 
     def acceleration(self, x, f):
-        """Returns (ÿ, θ̈), and the derivatives of both with respect to θ, θ̇ and f."""
+        """Returns (ÿ, θ̈), and the derivatives of ÿ and θ̈ with respect to θ, θ̇ and f."""
         m1, m2, length, g = self.m1, self.m2, self.l, self.g
         s, c, rate = math.sin(x[1]), math.cos(x[1]), x[3]
         mu, dmu = m1 + m2 * s * s, 2.0 * m2 * s * c
@@ -63,7 +63,7 @@ class Cartpole:
         return a, (dup - a * dmu) / mu, by_rate, np.array([1.0, c / length]) / mu
 
     def rate(self, x, u):
-        """Returns the cost per second."""
+        """Returns the running cost per second."""
         return 0.5 * float(self.weights[: 4 + len(u)] @ np.r_[x, u] ** 2)
 
     def calc(self, t, x, u):
@@ -92,7 +92,8 @@ class Cartpole:
 
 
 class DoublePendulum:
-    """A double pendulum with one motor. Its goal is written in sines and cosines, and has its own Hessian."""
+    """Action of a double pendulum with one motor. The goal's residual contains sines and cosines, and the goal computes
+    its own Hessian."""
 
     def __init__(self, model, stage):
         self.model, self.data = model, condyle.Data(model)

@@ -7,7 +7,7 @@ import condyle.crocoddyl
 
 
 class Converted(Ours):
-    """Condyle's solver for a problem that Crocoddyl has built."""
+    """Solver of Condyle for a problem that Crocoddyl built and `condyle.crocoddyl` converted."""
 
     strict = True
 

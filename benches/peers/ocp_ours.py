@@ -65,7 +65,8 @@ def our_contact(contact, gains):
 
 
 def our_action(stage, model, spec, bounded, terminal=False, others=()):
-    """Returns an action. `others` lists knots, with their stages, that may use the same action with different costs."""
+    """Returns an action. `others` lists further knots, and the stage of each. These knots use the same action with
+    their own costs."""
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]
@@ -100,7 +101,7 @@ def our_action(stage, model, spec, bounded, terminal=False, others=()):
 
 
 class Ours:
-    """A problem built from JSON by Condyle. Its settings are those that Crocoddyl's solver of this name has."""
+    """Problem built from JSON by Condyle. The solver has the settings of Crocoddyl's solver with the same name."""
 
     def __init__(self, spec, robot, solver):
         self.spec = spec
@@ -115,10 +116,11 @@ class Ours:
         return optimal.Problem(spec["x0"], models, knot_models, terminal)
 
     def settings(self, solver):
-        """Returns the settings with which Condyle's solver works like Crocoddyl's solver of this name."""
+        """Returns settings with which Condyle's solver computes the same iterations as Crocoddyl's solver of this
+        name."""
         spec = self.spec
         settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
-        settings["project_warm_start"] = False  # Crocoddyl keeps a start that is outside of the bounds
+        settings["project_warm_start"] = False  # Crocoddyl keeps an initial guess outside of the bounds
         if spec["init_reg"] is not None:
             settings["regularisation_start"] = spec["init_reg"]
         if spec["th_stop"] is not None:
@@ -126,8 +128,8 @@ class Ours:
         return settings
 
     def phases(self, model, bounded):
-        """Returns one action for each group of knots with the same dynamics, whose costs may differ, and the index of
-        the action of each knot."""
+        """Returns the list of actions, and the index of each knot's action. Knots with the same dynamics share an
+        action, even if their costs differ."""
         first, serves = {}, []
         for t, k in enumerate(self.spec["stages"]):
             stage = self.spec["stage_models"][k]

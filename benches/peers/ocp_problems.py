@@ -110,7 +110,8 @@ def free(dt, costs, **bounds):
 
 
 def reach(name="reach", share=None):
-    """Returns a problem in which a panda reaches for a pose. Its efforts are limited to this share of their maximum."""
+    """Returns a problem in which a panda reaches for a pose. `share` is the fraction of the robot's maximum efforts
+    that the problem permits; None means that efforts have no limits."""
     model = load("panda").model
     q0, data = model.referenceConfigurations["default"], model.createData()
     pin.framesForwardKinematics(model, data, q0)
@@ -154,7 +155,8 @@ def hover():
 
 
 class Walker:
-    """Makes the knots of a legged robot. Feet with 3 rows are points, and feet with 6 rows are soles."""
+    """Builds the knots of a legged robot. A foot whose contact has 3 rows is a point, and a foot whose contact has 6
+    rows is a sole."""
 
     def __init__(self, name, feet, rows, posture):
         self.name, self.feet, self.rows = name, feet, rows

@@ -15,7 +15,8 @@ FRAMES = {
 
 
 class NotRunError(Exception):
-    """A problem that is not run: one of the libraries lacks a feature, or nothing can be compared."""
+    """Error for a problem that is not run, because a library lacks a feature or because the results cannot be
+    compared."""
 
 
 def bounds(numbers, infinite):
@@ -32,8 +33,8 @@ def homogeneous(placement):
 
 @dataclass
 class Solve:
-    """Result of a solve: for each iteration a row (cost, step, regularisation, stop), and the time of each phase
-    (s)."""
+    """Result of a solve: for each iteration a row (cost, step length, regularisation, stopping value), and the time of
+    each phase (s)."""
 
     rows: np.ndarray
     cost: float

@@ -18,7 +18,7 @@ THEIRS = {
 
 
 class TheirCartpole(crocoddyl.DifferentialActionModelAbstract):
-    """The action `Cartpole` as a class of Crocoddyl."""
+    """Action `Cartpole`, derived from a class of Crocoddyl."""
 
     def __init__(self, stage):
         crocoddyl.DifferentialActionModelAbstract.__init__(self, crocoddyl.StateVector(4), 1, 5)
@@ -39,7 +39,7 @@ class TheirCartpole(crocoddyl.DifferentialActionModelAbstract):
 
 
 class TheirGoal(crocoddyl.CostModelAbstract):
-    """The goal of `DoublePendulum` as a class of Crocoddyl."""
+    """Goal of `DoublePendulum`, derived from a class of Crocoddyl."""
 
     def __init__(self, state, weights, nu):
         activation = crocoddyl.ActivationModelWeightedQuad(weights)
@@ -54,7 +54,7 @@ class TheirGoal(crocoddyl.CostModelAbstract):
 
 
 class TheirDrives(crocoddyl.ActuationModelAbstract):
-    """The drives τ = S u as a class of Crocoddyl."""
+    """Actuation τ = S u, derived from a class of Crocoddyl."""
 
     def __init__(self, state, S):
         crocoddyl.ActuationModelAbstract.__init__(self, state, S.shape[1])
@@ -73,7 +73,7 @@ class TheirDrives(crocoddyl.ActuationModelAbstract):
 
 
 class Theirs:
-    """A problem built from JSON by Crocoddyl, for Crocoddyl's solver of this name."""
+    """Problem built from JSON by Crocoddyl, for Crocoddyl's solver of the given name."""
 
     def __init__(self, spec, robot, solver):
         self.spec, self.name, self.kept = spec, solver, []
@@ -195,7 +195,7 @@ class Theirs:
         return model
 
     def warm_start(self):
-        """Returns the states and controls from which the solvers of both libraries start."""
+        """Returns the initial guess, states and controls, which the solvers of both libraries use."""
         x0, kind, problem = np.array(self.spec["x0"], float), self.spec["warm_start"], self.problem
         if kind == "zero":
             xs = [m.state.zero() for m in problem.runningModels] + [problem.terminalModel.state.zero()]
@@ -248,6 +248,6 @@ class Theirs:
         phases["sweep"] = iterations * call(solver.backwardPass)
         try:
             phases["rollout"] = trials * call(solver.forwardPass, 1.0)
-        except RuntimeError:  # the step leaves all bounds
+        except RuntimeError:  # with this step, all controls are outside of their bounds
             phases["rollout"] = math.nan
         return phases

@@ -3,11 +3,12 @@
 
     .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--json] [--threads 2] [--rounds 15] [NAME ...]
 
-The program times three modes in turn, round after round, on the problems of `ocp_problems.py`: one thread; several
-threads, with the sweep at the same time as the derivatives; several threads, with the sweep in the same number of
-segments. Times are medians over the rounds of milliseconds per iteration; brackets have the medians of the quotients
-with one thread. Segments change the iterates only by rounding; the iterations of each mode are counted separately. The
-program needs as many cores as threads.
+The program times three modes in turn, round after round, on the problems of `ocp_problems.py`. The first mode uses one
+thread. In the second mode, several threads run the backward sweep at the same time as the derivatives. In the third
+mode, the sweep is divided into segments, one per thread. Times are medians over the rounds, in milliseconds per
+iteration. Brackets contain the medians of the quotients of the time and the time with one thread. Segments change the
+iterates only by rounding errors. The iterations of each mode are counted separately. The program needs as many cores as
+threads.
 """
 
 import argparse
@@ -30,8 +31,8 @@ def ways(threads):
 
 
 def solver(spec, robot, settings):
-    """Returns the solver of a problem with the problem's settings, and a start: the robot at rest, with quasi-static
-    controls."""
+    """Returns the solver of a problem with the problem's settings, and an initial guess: the robot at rest, with
+    quasi-static controls."""
     ours = Ours(spec, robot, "fddp")
     problem = ours.made(robot, "fddp")
     ours.solver = optimal.Fddp(problem, **ours.settings("fddp"), **settings)

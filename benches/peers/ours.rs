@@ -8,8 +8,8 @@
 //! STATES contains q, v, a, τ of one state after the other as doubles. The program prints a line for each algorithm:
 //! its name and the median time of a call in ns. The derivatives of `rnea` are also timed by dual numbers and by
 //! central differences. Lines with `batch:` have the time per state of a batch. Lines with `horizon:` have the time for
-//! N knots of `aba`, the derivatives of `aba`, and `rnea`. With the argument `batch`, only batches are timed, and the
-//! least time replaces the median (see `python.py`).
+//! N knots of `aba`, the derivatives of `aba`, and `rnea`. With the argument `batch`, the program times only batches,
+//! and prints the least time instead of the median (see `python.py`).
 
 use condyle::{
     Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba,
@@ -27,12 +27,13 @@ struct State {
     tau: Vec<f64>,
 }
 
-/// Returns the median, over all batches, of the mean time of a call (ns).
+/// Returns the median, over all series of calls, of the mean time of a call (ns).
 fn median(states: &[State], call: impl FnMut(&State)) -> f64 {
     timed(states, 10, call)
 }
 
-/// Returns the mean time of a call (ns) in one of 21 batches: the batch with this rank, where rank 0 is the fastest.
+/// Returns the mean time of a call (ns) in one of 21 series of calls, sorted by time. `rank` selects the series; rank 0
+/// is the fastest.
 fn timed(states: &[State], rank: usize, mut call: impl FnMut(&State)) -> f64 {
     let mut batch = |calls: usize| {
         let start = Instant::now();

@@ -4,8 +4,8 @@
 //
 // MODEL is an archive written by Pinocchio's Python package. STATES contains q, v, a, τ of one state after the other as
 // doubles. The program prints a line for each algorithm: its name and the median time of a call in ns. If Pinocchio
-// offers two conventions for an algorithm, the faster one counts. The program is compiled once for each PART, since a
-// single translation unit takes too much memory.
+// offers an algorithm in two conventions, the program prints the time of the faster convention. The file is compiled
+// once for each PART, because a single translation unit would take too much memory.
 #include <pinocchio/multibody.hpp>
 #if PART == 0
 #include <pinocchio/serialization.hpp>
@@ -29,7 +29,7 @@ struct State {
   Eigen::VectorXd q, v, a, tau;
 };
 
-// Returns the median, over all batches, of the mean time of a call (ns).
+// Returns the median, over all series of calls, of the mean time of a call (ns).
 template <class Call> double median(const std::vector<State> &states, Call call) {
   using Clock = std::chrono::steady_clock;
   auto batch = [&](long calls) {

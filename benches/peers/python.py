@@ -4,20 +4,20 @@
     .venv/pinocchio/bin/python benches/peers/python.py [--rounds N] [--cpu K] [--json] [--no-rust] [ROBOT ...]
 
 Without robots, the program takes panda and talos. It needs the packages of tests/peers/pinocchio/requirements.txt and a
-release build of condyle (`./test` makes both). It also needs Rust, unless `--no-rust` is given: it builds
-benches/peers/ours.rs. Everything runs on one core, in turn. A time is the least of all rounds, since other work on the
-machine only adds time. The output has five tables:
+release build of condyle (`./test` makes both). Without the option `--no-rust`, it also needs Rust, to build
+benches/peers/ours.rs. Everything runs on one core, in turn. A time is the least of all rounds, because other work on
+the machine only adds time. The output has five tables:
 
 - single calls: Condyle's time of a call, Pinocchio's time, and the quotient;
 - Pinocchio's spelling: the time of a call through `condyle.pinocchio`, of the same call of `condyle`, and the quotient;
 - attributes of a model: the time of an access;
 - batches of 1000 states, `out` reused: the time per state, the time of a loop of Pinocchio's calls, and a lower limit
-  for a batch.
-  The limit is the time of the library's own batch of the same size, plus 1.3 times the time to write the results once.
-  The second time is measured by filling the results with a number. The library's batch leaves matrices in the lanes of
-  registers: each entry for several states. NumPy needs whole matrices, state after state. The last column is the time
-  to copy one matrix from the cache to all states. For panda it is 1.7 times the filling time. With a copy alone, the
-  matrices of a batch would take 1.03 of the limit, and their transposition takes additional time;
+  for a batch. The limit is the time of the library's own batch of the same size, plus 1.3 times the time to write the
+  results once. The time to write is measured by filling the results with a number. The library's batch stores matrices
+  interleaved: one entry of several states, then the next entry. NumPy needs whole matrices, state after state, so the
+  Python package must transpose the matrices. The last column is the time to copy one matrix from the cache to all
+  states. For panda, this time is 1.7 times the filling time. If the matrices of a batch were only copied, the batch
+  would take 1.03 of the limit; the transposition takes additional time;
 - overall: the time of `import` minus NumPy's, and the time of a solve by FDDP minus the time that the solver itself
   measures.
 """
@@ -45,7 +45,7 @@ from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
 
 STATES = 1000
 SECONDS = 0.002  # duration of each round of a call, shorter than the time slices of a shared core
-WRITES = 1.3  # factor of the time to write the results
+WRITES = 1.3  # factor on the time to write the results; see the documentation of this file
 Call = Callable[[], object]
 
 
@@ -68,7 +68,7 @@ def least(calls: list[Call], rounds: int, seconds: float = SECONDS) -> list[floa
 
 
 class Robot:
-    """A robot in both libraries, with random states."""
+    """Robot as a model of both libraries, with random states."""
 
     def __init__(self, name: str) -> None:
         loader, (_, self.locked) = LOADERS[name], ROBOTS[name]
@@ -87,7 +87,7 @@ class Robot:
         self.v, self.a, self.tau = rng.standard_normal((3, STATES, self.model.nv))
 
     def singles(self) -> dict[str, tuple[Call, Call]]:
-        """Returns, for one state, calls of Condyle and of Pinocchio."""
+        """Returns, for each algorithm, a call of Condyle and a call of Pinocchio for one state."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau = self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -121,7 +121,7 @@ class Robot:
         }
 
     def spelled(self) -> dict[str, tuple[Call, Call]]:
-        """Returns, for one state, calls in Pinocchio's spelling and calls of `condyle`."""
+        """Returns, for each algorithm, a call in Pinocchio's spelling and the same call of `condyle`, for one state."""
         m, d, sm = self.model, self.data, spelling.Model(self.model)
         sd, q, v, a, tau = sm.createData(), self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -179,7 +179,8 @@ class Robot:
         return {name: (lambda name=name: getattr(m, name)) for name in ("frames", "names", "limits", "inertias")}
 
     def batches(self) -> dict[str, tuple[Call, Call, list[np.ndarray]]]:
-        """Returns calls for all states, loops over Pinocchio's calls, and the arrays that Condyle's calls fill."""
+        """Returns, for each algorithm, a call for all states, a loop over Pinocchio's calls, and the arrays that
+        Condyle's call fills."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau, n = self.q, self.v, self.a, self.tau, self.model.nv
         empty = {k: [np.zeros((STATES, *[n] * axes)) for axes in shapes] for k, shapes in SHAPES.items()}
@@ -211,8 +212,8 @@ class Robot:
     def rust(self, program: Path, rounds: int) -> dict[str, float]:
         """Returns the time per state of the library's own batches (µs), without Python.
 
-        The memory addresses of a program change times by a few per cent, differently in each process. The Python
-        process is one sample, so this function returns the median of several processes.
+        Times differ by a few per cent between processes, because memory addresses differ. So this function returns the
+        median over several processes of the library. (The Python process is a single sample.)
         """
         with tempfile.NamedTemporaryFile(suffix=".states") as file:
             for state in zip(self.q, self.v, self.a, self.tau, strict=True):
@@ -224,7 +225,7 @@ class Robot:
 
 
 SHAPES = {"rnea": [1], "aba": [1], "crba": [2], "rnea_derivatives": [2, 2, 2], "aba_derivatives": [1, 2, 2, 2]}
-"""Number of axes of length nv that each result has for one state."""
+"""Shapes of the results for one state: 1 for a vector of nv numbers, 2 for an nv × nv matrix."""
 
 
 def import_seconds(rounds: int) -> tuple[float, float]:
@@ -237,8 +238,8 @@ def import_seconds(rounds: int) -> tuple[float, float]:
 
 
 def solve_seconds(rounds: int) -> tuple[float, float]:
-    """Returns two least times of a solve by FDDP, the reach of an arm: as the solver measures it, and as Python
-    measures it."""
+    """Returns the least time of a solve by FDDP, measured by the solver and measured in Python. In the problem, an arm
+    reaches for a point."""
     arm, knots = condyle.robots.arm7(), 100
     x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
     way = [Cost("state", 1e-2, Residual.state(x0)), Cost("effort", 1e-4, Residual.control(np.zeros(7)))]
@@ -269,8 +270,8 @@ def measure(robot: Robot, program: Path | None, rounds: int) -> list[dict]:
     rust = robot.rust(program, rounds) if program else {}
     for name, (ours, theirs, out) in robot.batches().items():
         write = lambda out=out: [x.fill(1.0) for x in out]  # noqa: E731
-        # One call after the other, as the library is timed.
-        # If calls took turns, each would begin with other data in the cache.
+        # Time one function completely, then the next, in the same way as the library is timed. If calls took turns,
+        # each would begin with other data in the cache.
         ones = [np.ones(x.shape[1:]) for x in out]
         copy = lambda out=out, ones=ones: [np.copyto(x, one) for x, one in zip(out, ones, strict=True)]  # noqa: E731
         mine, other, writing, copying = (least([call], rounds, 0.0)[0] / STATES for call in (ours, theirs, write, copy))

@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
-"""Times a tick of whole-body control with each back end of Condyle, and with other solvers for the same programs.
+"""Times a step of whole-body control with Condyle's back ends, and other solvers for the same programs.
 
     python3 benches/peers/wholebody.py [--json] [--write] [--ticks N] [--window N] [--replays N] [--cpu K] [ROBOT ...]
 
 Robots that stand, walk and trot under pushes are recorded (benches/peers/wholebody.rs), and the recordings are
-replayed. The time of a tick is the least time in all replays, which excludes other work on the machine; the p99 of all
-replays is shown next to it. For Condyle's back ends, the program times a whole tick, from state to torques, with cones
-and with pyramids. It also times the assembly (kinematics, rows and condensing) alone. For ProxQP, quadprog, DAQP,
-eiquadprog (TSID's solver) and Condyle's solvers, it times the solve alone, with pyramids. The programs are consecutive
-ticks of a window, in both forms, with warm starts if available. All solvers run on one core, for some minutes after the
-build. With --write, the table is written to crates/wholebody/README.md. Talos and ANYmal come from example-robot-data.
-The script needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed under target/peers.
+replayed. A step is called a tick. The time of a tick is the least time in all replays, which excludes other work on the
+machine. The table also has the 99th percentile of the times in all replays. For Condyle's back ends, the program times
+a whole tick, from state to torques, with cones and with pyramids. It also times the assembly (kinematics, rows and
+condensing) alone. For ProxQP, quadprog, DAQP, eiquadprog (TSID's solver) and Condyle's solvers, it times the solve
+alone, with pyramids. These solvers get the programs of consecutive ticks, in full and in condensed form, with warm
+starts if available. All solvers run on one core, for some minutes after the build. With --write, the table is written
+to crates/wholebody/README.md. Talos and ANYmal come from example-robot-data. The script needs Linux, Rust, Python 3
+with venv and a C++ compiler; everything else is installed under target/peers.
 """
 
 import argparse

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! A new controller replays each recording; each tick starts from the solution of the previous tick. The time of a tick
-//! is the least time in all replays. The program prints one record per line. Run it on one core: `taskset -c 1`.
+//! is the least time in all replays. The program prints one record per line. Run the program on one core: `taskset -c
+//! 1`.
 
 #[path = "../../crates/wholebody/tests/common/workload.rs"]
 mod workload;
@@ -22,7 +23,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use workload::{Robot, Tick, record};
 
-/// Pyramid for comparisons, with four faces inside the cone.
+/// Friction pyramid for comparisons, with four faces inside the friction cone.
 const PYRAMID: Friction = Friction::Pyramid { sides: 4, inscribed: true };
 
 struct Options {
@@ -54,13 +55,13 @@ impl Options {
     }
 }
 
-/// Returns the entry of the sorted numbers below which this share of the numbers lies.
+/// Returns a quantile of the sorted numbers: the given fraction of the numbers is below it.
 fn quantile(sorted: &[f64], part: f64) -> f64 {
     sorted[(part * (sorted.len() - 1) as f64).round() as usize]
 }
 
-/// Returns the time (ms) of each tick in each replay: the time of `call` after `prepare`. Each replay has a new
-/// controller.
+/// Returns the time (ms) of each tick in each replay. For each tick, `prepare` runs first, and then `call` is timed.
+/// Each replay has a new controller.
 fn replay(
     ticks: &[Tick],
     replays: usize,
@@ -82,7 +83,8 @@ fn replay(
         .collect()
 }
 
-/// Returns p50, p99 and maximum of the least time of each tick, and p99 of all times.
+/// Returns p50, p99 and maximum over the ticks, where the time of a tick is the least time in all replays. Also returns
+/// p99 of the times in all replays.
 fn statistics(times: &[Vec<f64>]) -> serde_json::Value {
     let mut least: Vec<f64> =
         (0..times[0].len()).map(|k| times.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min)).collect();
@@ -108,8 +110,8 @@ fn print(robot: &Robot, motion: &str, what: serde_json::Value, times: &[Vec<f64>
     println!("{record}");
 }
 
-/// Times each back end with cones and with pyramids, in the back end's own form. Also times the assembly of the
-/// condensed program alone.
+/// Times each back end with cones and with pyramids, in the form of program that the back end uses. Also times the
+/// assembly of the condensed program alone.
 fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (friction, friction_name) in [(Friction::Cone, "cone"), (PYRAMID, "pyramid")] {
         let settings = Settings { friction, ..Robot::settings() };
@@ -146,7 +148,8 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     }
 }
 
-/// Times Condyle's back ends without the assembly, with pyramids, for comparison with other solvers.
+/// Times the solves of Condyle's back ends, with pyramids and without the assembly of the programs. Other solvers are
+/// compared with these times.
 fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (backend, formulation, name, form_name) in [
         (Backend::InteriorPoint, Formulation::Full, "condyle", "full"),
@@ -168,8 +171,8 @@ fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
 }
 
 /// Writes the programs of consecutive ticks with pyramids, in both forms, and Condyle's optimum. Sizes are written as
-/// JSON, one line for each tick. Numbers are doubles: P, c, A, b, G, l, u (matrices column by column) of the full form,
-/// the same of the condensed form, then Condyle's solutions in both forms.
+/// JSON, one line for each tick. The other numbers are doubles: P, c, A, b, G, l, u of the full form, then the same
+/// arrays of the condensed form, then Condyle's solutions in both forms. Matrices are stored column by column.
 fn export(robot: &Robot, motion: &str, ticks: &[Tick], folder: &Path) -> Result<(), Box<dyn Error>> {
     let settings = Settings { friction: PYRAMID, ..Robot::settings() };
     let mut controller = robot.controller(settings);

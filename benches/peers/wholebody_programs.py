@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 
 INFINITY = 1e20
-"""Value that the solvers treat as an infinite bound."""
+"""Bound that the solvers treat as infinite."""
 
 
 @dataclass
 class Program:
-    """The program min ½ xᵀ P x + cᵀ x with A x = b and lower ≤ G x ≤ upper, in all layouts that the solvers need."""
+    """Quadratic program min ½ xᵀ P x + cᵀ x with A x = b and lower ≤ G x ≤ upper, in all layouts that the solvers
+    need."""
 
     P: np.ndarray
     c: np.ndarray
@@ -32,7 +33,7 @@ class Program:
         self.all_upper = np.concatenate([self.b, np.minimum(self.upper, INFINITY)])
         self.sense = np.array([5] * len(self.b) + [0] * len(self.lower), dtype=np.int32)
         self.normals = np.ascontiguousarray(np.vstack([self.A, self.C]).T)
-        self.offsets = np.concatenate([self.b, -self.d])  # normalsᵀ x must equal or exceed offsets
+        self.offsets = np.concatenate([self.b, -self.d])  # constraints normalsᵀ x ≥ offsets
         self.minus_b = -self.b
 
     def objective(self, x: np.ndarray) -> float:

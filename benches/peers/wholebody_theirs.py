@@ -4,7 +4,7 @@ program.
     python wholebody_theirs.py FOLDER REPLAYS EIQUADPROG_LIBRARY
 
 All solvers solve the same program with pyramids to the same objective, in full and in condensed form, with warm starts
-if available. The times include a solve and the replacement of the program's numbers, but not the computation of these
+if available. Each time includes the solve and copying the program's numbers into the solver, but not computing these
 numbers.
 """
 
@@ -22,13 +22,14 @@ import quadprog
 from wholebody_programs import Program, read
 
 AGREEMENT = 1e-6
-"""Maximum difference between a solver's objective and Condyle's objective for a valid solution, relative to 1 +
-|objective|."""
+"""Maximum difference between the objectives of another solver and of Condyle, relative to 1 + |objective|. With a
+larger difference, a tick counts as not solved."""
 ACCURACY = 1e-9
-"""Tolerance for solvers that have a tolerance. Condyle's solver has the same one."""
+"""Tolerance for solvers that have a tolerance. Condyle's solver has the same tolerance."""
 ITERATIONS = 500, 50
-"""Maximum numbers of outer and inner iterations of ProxQP. With ProxQP's own maximum, a tick on which it stalls takes
-seconds. With these numbers such a tick counts as unsolved, unless the objective is near enough."""
+"""Maximum numbers of outer and inner iterations of ProxQP. With ProxQP's default maximum, a tick takes seconds if
+ProxQP does not converge. With these numbers, ProxQP stops earlier, and the tick counts as solved only if the objective
+is near enough to Condyle's objective."""
 Solver = Callable[[Program], np.ndarray]
 
 

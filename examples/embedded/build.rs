@@ -1,4 +1,4 @@
-//! Copies the description of the board's memory to a folder in which the linker searches.
+//! Copies `memory.x`, which describes the board's memory, to a folder in which the linker searches.
 
 use std::{env, fs, path::PathBuf};
 

@@ -1,5 +1,6 @@
-//! A robot on level ground, simulated by constrained dynamics. A foot that touches is held as long as the ground
-//! pushes. An impact stops a foot that lands. Friction is unbounded here: callers must check the forces.
+//! Simulation of a robot on level ground by constrained dynamics. A foot on the ground stays at its position as long as
+//! the ground pushes the foot. An impact stops a foot that lands. The friction force has no limit, so callers must
+//! check the forces.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Force, Model, ReferenceFrame, Vec3, constrained_dynamics,
@@ -51,7 +52,7 @@ impl<'m> Ground<'m> {
                 let row = set.range(i).start;
                 Vec3::new(lambda[row], lambda[row + 1], lambda[row + 2])
             };
-            // The ground cannot pull: feet that it would pull are released.
+            // The ground cannot pull. Release the foot with the largest pulling force, and compute the forces again.
             let pulled =
                 (0..feet.len()).filter(|&i| force(i).z < 0.0).min_by(|&i, &j| force(i).z.total_cmp(&force(j).z));
             if let Some(i) = pulled {

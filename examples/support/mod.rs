@@ -1,4 +1,4 @@
-//! Walking as an optimal control problem, and a page that shows it. `trot.rs` and `walk.rs` share this code.
+//! Walking as an optimal control problem. The examples `trot.rs`, `walk.rs` and `wholebody_trot.rs` share this code.
 
 use condyle::optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
@@ -11,7 +11,8 @@ const FRICTION: f64 = 0.7;
 /// Rate at which the slip of a foot decays (1/s).
 const HOLD: f64 = 40.0;
 
-/// Tolerance of the solver. Costs are several hundred, so it is below a millionth of the costs.
+/// Tolerance of the solver. The cost of a gait is several hundred, so the tolerance is less than a millionth of the
+/// cost.
 const TOLERANCE: f64 = 1e-4;
 
 /// Shape of the feet.
@@ -24,7 +25,8 @@ pub(crate) enum Foot {
     Sole([f64; 2]),
 }
 
-/// A gait while it is built: its knots so far, and the positions of feet and centre of mass at the last knot.
+/// Builder of a gait. It contains the knots so far, and the positions of the feet and of the centre of mass at the last
+/// knot.
 pub(crate) struct Gait {
     model: Arc<Model>,
     x0: Vec<f64>,
@@ -67,15 +69,17 @@ impl Gait {
         self.model.frames()[frame].name.clone()
     }
 
-    /// Returns the cost of the distance from the posture. The weights are for position and rotation of the trunk, for
-    /// the joints, and for the velocities of these three.
+    /// Returns the cost of the deviation from the posture. The first three weights are for the position of the trunk,
+    /// the rotation of the trunk, and the joint positions. The other three weights are for the corresponding
+    /// velocities.
     fn rest(&self, weights: [f64; 6]) -> Cost {
         let counts = [3, 3, self.model.nv() - 6].repeat(2);
         let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
         Cost::new("rest", 1e1, Residual::State { reference: self.x0.clone() }, Activation::Weighted(w))
     }
 
-    /// Returns the cost of the distance between a foot and a point. A sole should also be level.
+    /// Returns the cost of the distance between a foot and a point. For a sole, the cost also penalises the deviation
+    /// from level.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
         let moved = (&self.model.frames()[frame]).into();
         let residual = match self.foot {
@@ -108,8 +112,8 @@ impl Gait {
         costs
     }
 
-    /// Adds knots with the feet `support` on the ground. Knot k has the costs `costs(k)`. All knots have one common
-    /// action.
+    /// Adds knots with the feet `support` on the ground. Knot k has the costs `costs(k)`. All knots of the phase share
+    /// one action model.
     fn phase(
         &mut self,
         support: &[usize],
@@ -138,7 +142,7 @@ impl Gait {
         self.phase(&feet, knots, |gait, _| gait.costs(&feet, &[], gait.com))
     }
 
-    /// Swings the feet with these indices ahead by `length`, along an arc of this height, and sets them down.
+    /// Swings the feet with these indices ahead by `length`, along an arc of height `height`, and sets them down.
     pub(crate) fn step(&mut self, swinging: &[usize], length: f64, height: f64, knots: usize) -> Result<(), Error> {
         let swings = |k: &usize| swinging.contains(k);
         let support: Vec<_> = (0..self.feet.len()).filter(|k| !swings(k)).map(|k| self.feet[k].0).collect();

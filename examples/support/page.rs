@@ -1,4 +1,4 @@
-//! Writes a page that plays a motion, from the parts of the page of `condyle plan`.
+//! Writes a page that plays a motion. The page uses the template and the scripts of `condyle plan`.
 
 use condyle::optimal::Solution;
 use condyle::{Data, Model, Se3, forward_kinematics, spatial::Quaternion};
@@ -21,7 +21,8 @@ fn pose(placement: Se3<f64>) -> [f64; 7] {
     [p.x, p.y, p.z, q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Returns the bones of each body: segments to the joints and to the feet that the body carries.
+/// Returns the shapes that the page draws for each body: line segments to the joints and to the feet that the body
+/// carries.
 fn bodies(model: &Model, feet: &[&str]) -> Vec<Value> {
     let mut shapes = vec![Vec::new(); model.bodies().len()];
     let mut bone = |body: usize, to: [f64; 3], radius: f64| {

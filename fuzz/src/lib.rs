@@ -1,5 +1,6 @@
-//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`). There is one target for each format of robots,
-//! problems and meshes. The corpora begin with the robots of the repository, which are not copied.
+//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`). There is one fuzz target for each file format of
+//! robots, problems and meshes. Mutations begin with robots of the repository, which are compiled into the program. So
+//! the corpora need no copies of these robots.
 //!
 //! The test `tests/hostile.rs` uses the same mutations, and checks the same property for a fixed number of inputs.
 
@@ -10,8 +11,8 @@ use hostile::mutated;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// Mutates the first `size` bytes of `data`, and returns the new size, which is at most `data.len()`. A short input is
-/// replaced by a mutated seed of the kind. Some calls use libFuzzer's own mutations.
+/// Mutates the first `size` bytes of `data`, and returns the new size, which is at most `data.len()`. If the input has
+/// at most 64 bytes, writes a mutated seed of the same format instead. Some calls use libFuzzer's own mutations.
 pub fn mutate(kind: Kind, data: &mut [u8], size: usize, seed: u32) -> usize {
     let (room, mut rng) = (data.len(), StdRng::seed_from_u64(seed.into()));
     if seed.is_multiple_of(4) && size > 64 {
@@ -25,7 +26,7 @@ pub fn mutate(kind: Kind, data: &mut [u8], size: usize, seed: u32) -> usize {
     size
 }
 
-/// Defines a libFuzzer target for a kind of input.
+/// Defines a libFuzzer target for an input format.
 #[macro_export]
 macro_rules! target {
     ($kind:expr) => {

@@ -1,11 +1,11 @@
-//! Additions to the tree of a robot: actuators, springs, keyframes and constraints.
+//! Collects additions to the tree of a robot: actuators, springs, keyframes and constraints.
 
 use crate::terminal::{Table, heading, short};
 use condyle::Model;
 use condyle::tree::{Actuator, ModelConstraintKind, Transmission};
 use serde::Serialize;
 
-/// Additions to the tree of a robot.
+/// Additions to the tree of a robot, for example actuators and constraints.
 #[derive(Serialize)]
 pub(crate) struct Additions {
     actuators: Vec<ActuatorReport>,
@@ -16,7 +16,7 @@ pub(crate) struct Additions {
     constraints: Vec<ConstraintReport>,
 }
 
-/// An actuator. `null` in a range means no limit.
+/// Actuator. `null` in a range means that no limit exists.
 #[derive(Serialize)]
 struct ActuatorReport {
     name: String,
@@ -40,7 +40,7 @@ struct SpringReport {
 struct KeyframeReport {
     name: String,
     q: Vec<f64>,
-    /// Control of each actuator, one number per actuator.
+    /// Controls, one number per actuator.
     control: Vec<f64>,
 }
 
@@ -89,7 +89,7 @@ impl Additions {
         }
     }
 
-    /// Returns the additions as text, each kind under a heading.
+    /// Returns the additions as text, with a heading for each type of addition.
     pub(crate) fn text(&self) -> String {
         let mut text = String::new();
         if !self.actuators.is_empty() {

@@ -31,7 +31,7 @@ pub(crate) enum Error {
     /// Error in a line of a task file.
     #[error("{file}:{line}: {what}")]
     Task { file: String, line: usize, what: String },
-    /// Command that needs a feature without which this program was built.
+    /// Command that needs a feature of Cargo, with which this program was not built.
     #[cfg(not(feature = "generate"))]
     #[error(
         "{command}: this program was built without the feature `{command}`: cargo install condyle-cli --features {command}"
@@ -70,7 +70,8 @@ pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), Error> {
     }
 }
 
-/// Returns a suffix for an error message that names the most similar name; empty if there are no names.
+/// Returns a suffix for an error message, which suggests the most similar of the valid names. The suffix is empty if no
+/// names are given.
 pub(crate) fn nearest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let found = names.into_iter().min_by_key(|other| strsim::osa_distance(other, name));
     found.map_or(String::new(), |found| format!("; nearest is `{found}`"))

@@ -9,11 +9,11 @@ use serde::Serialize;
 /// Warning of the library or of this program.
 #[derive(Serialize)]
 pub(crate) struct Finding {
-    /// Kind of the finding, one of [`KINDS`].
+    /// Category of the finding, one of [`KINDS`].
     pub kind: &'static str,
     /// Name of the body, joint or element that the finding is about.
     pub name: String,
-    /// File that contains the element, if it is not the robot's own file: that file may include others.
+    /// File that contains the element, if this is an included file; `None` for the robot's own file.
     pub file: Option<String>,
     pub line: Option<u32>,
     pub what: String,
@@ -77,13 +77,13 @@ pub(crate) fn text(findings: &[Finding], source: &str) -> String {
     text
 }
 
-/// Ratio between a body and its parent, of masses or of moments of inertia, from which a finding is reported. Causes
-/// are a wrong unit, or a light tip that makes M ill-conditioned.
+/// Minimum ratio between the masses, or moments of inertia, of a body and its parent. A larger ratio is reported. Its
+/// cause can be a wrong unit, or a light tip, which makes M ill-conditioned.
 const APART: f64 = 1e3;
 /// Excess over a limit that counts as a rounding error.
 const ROUNDING: f64 = 1e-9;
 
-/// Returns all findings, ordered by line.
+/// Returns all findings, in the order of their line numbers.
 pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
     let mut found: Vec<Finding> = model.warnings().iter().map(|warning| warned(model, warning, lines)).collect();
     for (i, b) in model.bodies().iter().enumerate().skip(1) {
@@ -102,7 +102,7 @@ pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
 fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
     let (kind, subject, mut what) = (warning.kind().name(), warning.subject(), warning.to_string());
     if let Some(place) = warning.place() {
-        // the name of ``joint `loop` `` is `loop`
+        // Take the name between the backquotes: from ``joint `loop` ``, take `loop`.
         let name = subject.split('`').nth(1).unwrap_or(subject).to_owned();
         what.drain(..format!("{place}: ").len());
         return Finding { kind, name, file: Some(place.file.clone()), line: Some(place.line), what };
@@ -118,8 +118,8 @@ fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
     Finding::own(kind, subject, line, what)
 }
 
-/// Returns a finding if the mass of a body differs much from its parent's mass, or else if the largest moment of
-/// inertia does.
+/// Returns a finding if the mass of a body differs from its parent's mass by a large factor. Otherwise compares the
+/// largest moments of inertia in the same way.
 fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     let (b, parent) = (&model.bodies()[i], &model.bodies()[model.bodies()[i].parent]);
     if b.parent == 0 {
@@ -142,7 +142,7 @@ fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     apart(m, n).map(|ratio| ("moment_ratio", say(ratio, "greatest moment of inertia", m, n, "kg m²")))
 }
 
-/// Returns a text if a joint with one coordinate has limits that exclude its neutral position.
+/// Returns the text of a finding if a joint with one coordinate has limits that exclude its neutral position.
 fn neutral_outside(model: &Model, b: &Body) -> Option<String> {
     if b.mimic.is_some() || b.joint.nq() != 1 {
         return None;
@@ -153,7 +153,8 @@ fn neutral_outside(model: &Model, b: &Body) -> Option<String> {
     is_outside.then(|| format!("joint `{joint}`: the neutral position {q} is outside of its limits [{lower}, {upper}]"))
 }
 
-/// Returns the centre of mass (m) and the principal moments of inertia about it (kg m²), smallest first.
+/// Returns the centre of mass (m), and the principal moments of inertia about the centre of mass (kg m²), smallest
+/// first.
 pub(crate) fn moments(I: Inertia<f64>) -> ([f64; 3], [f64; 3]) {
     if I.mass <= 0.0 {
         return ([0.0; 3], [0.0; 3]);

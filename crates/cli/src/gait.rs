@@ -1,4 +1,4 @@
-//! Gaits as optimal control problems. A robot stands, steps and jumps on its feet.
+//! Converts a gait to an optimal control problem. In a gait, a robot stands, steps and jumps.
 
 use crate::budget::held;
 use crate::error::Error;
@@ -13,10 +13,11 @@ use condyle::{ContactConstraint, Data, Joint, Model, Se3, Vec3, forward_kinemati
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A gait while it is built: its knots so far, and the positions of feet and centre of mass at the last knot.
+/// Builder of a gait. It contains the knots so far, and the positions of the feet and of the centre of mass at the last
+/// knot.
 pub(crate) struct Gait {
     model: Arc<Model>,
-    /// State to which the robot returns; the next field is the initial state.
+    /// State to which the robot returns. (The next field is the initial state.)
     rest: Vec<f64>,
     x0: Vec<f64>,
     dt: f64,
@@ -29,13 +30,13 @@ pub(crate) struct Gait {
     us: Vec<f64>,
     times: Vec<f64>,
     touches: Vec<Vec<bool>>,
-    /// Limits of positions and speeds; the next field has the limits of efforts. Both are empty unless limits are
-    /// constraints.
+    /// Limits of positions and speeds that become constraints. (The next field has the limits of efforts.) Both lists
+    /// are empty if the problem has no limits as constraints.
     limits: Vec<Limit>,
     efforts: Vec<Limit>,
 }
 
-/// A gait as a problem with a warm start.
+/// Optimal control problem of a gait, with a warm start.
 pub(crate) struct Posed {
     pub problem: Problem,
     pub xs: Vec<f64>,
@@ -48,8 +49,8 @@ pub(crate) struct Posed {
 }
 
 impl Gait {
-    /// Creates a gait from the posture of a task, with the feet at an average height of 0. With `held`, the limits of
-    /// the robot become constraints.
+    /// Creates a gait from the posture of a task, with the feet at an average height of 0. If `held` is true, the
+    /// limits of the robot become constraints.
     pub(crate) fn new(model: Arc<Model>, task: &Task, dt: f64, held: bool) -> Result<Self, Error> {
         let floats = model.bodies().get(1).is_some_and(|b| b.joint == Joint::FreeFlyer);
         if !floats {
@@ -65,7 +66,8 @@ impl Gait {
             Some(start) => posture(&model, start, task)?,
             None => rest.clone(),
         };
-        // Shift posture and start, so that their feet have the same average position, at height 0.
+        // Shift the posture and the initial position of the robot. In both, the average position of the feet must be
+        // the same, at height 0.
         let middle = |q: &[f64]| {
             let feet = feet_at(&model, q, &frames);
             feet.iter().fold(Vec3::zero(), |sum, foot| sum + foot.1).scale(1.0 / feet.len() as f64)
@@ -110,15 +112,17 @@ impl Gait {
         frames.iter().map(|&frame| Contact::new(&self.name(frame), held(make(frame)))).collect()
     }
 
-    /// Returns the cost of the distance from the posture. The weights are for position and rotation of the trunk, for
-    /// the joints, and for the velocities of these three.
+    /// Returns the cost of the deviation from the posture. The first three weights are for the position of the trunk,
+    /// the rotation of the trunk, and the joint positions. The other three weights are for the corresponding
+    /// velocities.
     fn rest(&self, weights: [f64; 6]) -> Cost {
         let counts = [3, 3, self.model.nv() - 6].repeat(2);
         let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
         Cost::new("rest", 1e1, Residual::State { reference: self.rest.clone() }, Activation::Weighted(w))
     }
 
-    /// Returns the cost of the distance between a foot and a point. A sole should also be level.
+    /// Returns the cost of the distance between a foot and a point. For a sole, the cost also penalises the deviation
+    /// from level.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
         let named = (&self.model.frames()[frame]).into();
         let residual = match self.sole {
@@ -151,8 +155,8 @@ impl Gait {
         costs
     }
 
-    /// Adds `count` knots with the feet `support` on the ground. They have one common action. `costs` returns the costs
-    /// of knot k.
+    /// Adds `count` knots with the feet `support` on the ground. All these knots share one action model. `costs`
+    /// returns the costs of knot k.
     fn knots(
         &mut self,
         support: &[usize],
@@ -190,7 +194,7 @@ impl Gait {
     /// Adds an impact, in which feet land at their current positions.
     fn land(&mut self, landing: &[usize]) -> Result<(), Error> {
         let mut costs = vec![self.rest([1e0, 1e1, 1e0, 1e1, 1e1, 1e1])];
-        // The trunk has moved ahead, so only its height counts.
+        // The trunk has moved horizontally from the posture. So do not penalise its position.
         if let Activation::Weighted(w) = &mut costs[0].activation {
             w[..3].fill(0.0);
         }
@@ -213,7 +217,7 @@ impl Gait {
         let swinging = match &phase.kind {
             PhaseKind::Stand => {
                 let feet: Vec<_> = self.feet.iter().map(|foot| foot.0).collect();
-                // Before a jump, the robot is free to crouch.
+                // Before a jump, no cost acts on the centre of mass, so the robot can crouch.
                 let free = next.is_some_and(|next| next.kind == PhaseKind::Jump);
                 return self.knots(&feet, phase.knots, &|gait, _| gait.costs(&feet, &[], (!free).then_some(gait.com)));
             }
@@ -229,7 +233,8 @@ impl Gait {
             let s = (k + 1) as f64 / knots as f64;
             let lift = Vec3::new(0.0, 0.0, height * (core::f64::consts::PI * s).sin());
             if jumps {
-                // The centre of mass follows its arc. Only the cost of the posture acts on the feet.
+                // A cost moves the centre of mass along its arc. No cost acts on the positions of the feet, except the
+                // cost of the posture.
                 return gait.costs(&[], &[], Some(gait.com + ahead(s) + lift));
             }
             let moving: Vec<_> = swinging.iter().map(|&k| (gait.feet[k].0, gait.feet[k].1 + ahead(s) + lift)).collect();
@@ -243,7 +248,7 @@ impl Gait {
         self.land(&landing)
     }
 
-    /// Returns the gait as a problem. The warm start is standing still.
+    /// Returns the gait as an optimal control problem. In the warm start, the robot stands still.
     pub(crate) fn pose(self) -> Result<Posed, Error> {
         let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
         let end = FreeDynamics::terminal(self.model.clone(), terminal)?.with_limits(self.limits.clone())?;
@@ -261,8 +266,8 @@ fn feet_at(model: &Model, q: &[f64], frames: &[usize]) -> Vec<(usize, Vec3<f64>)
     frames.iter().map(|&frame| (frame, placements.frame(frame).translation)).collect()
 }
 
-/// Returns the position with the given joint values. The other coordinates are neutral, or mid-range if limits exclude
-/// neutral.
+/// Returns the position with the given joint values. The other coordinates are neutral. If limits exclude a neutral
+/// value, the coordinate gets the middle of its range.
 pub(crate) fn posture(model: &Model, joints: &BTreeMap<String, f64>, task: &Task) -> Result<Vec<f64>, Error> {
     let mut q = inside(model, neutral(model));
     for (name, &value) in joints {

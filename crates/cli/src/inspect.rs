@@ -1,4 +1,4 @@
-//! `condyle inspect`: shows the content of a robot's file, with warnings.
+//! `condyle inspect`: prints the content of a robot's file, with warnings.
 
 use crate::additions::Additions;
 use crate::error::Error;
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     allow: Vec<String>,
 }
 
-/// The full report on a robot.
+/// Report of `condyle inspect` on a robot.
 #[derive(Serialize)]
 struct Report {
     name: String,
@@ -58,7 +58,8 @@ struct Report {
     warnings: Vec<Finding>,
 }
 
-/// A body and the joint that moves it. Arrays of limits have one number per coordinate; `null` means no limit.
+/// Body, and the joint that moves the body. Arrays of limits have one number per coordinate; `null` means that no limit
+/// exists.
 #[derive(Serialize)]
 struct BodyReport {
     index: usize,
@@ -75,7 +76,7 @@ struct BodyReport {
     lower: Vec<Option<f64>>,
     upper: Vec<Option<f64>>,
     velocity: Vec<Option<f64>>,
-    /// Maximum magnitude of the effort.
+    /// Maximum magnitude of the effort of each coordinate (N m, N).
     effort: Vec<Option<f64>>,
     effort_lower: Vec<Option<f64>>,
     effort_upper: Vec<Option<f64>>,
@@ -90,18 +91,19 @@ struct BodyReport {
     merged: Vec<String>,
 }
 
-/// Order in which a single call computes the bodies.
+/// Order in which a single call of an algorithm computes the bodies of a robot.
 #[derive(Serialize)]
 struct Limbs {
     /// Whether bodies of different limbs share the lanes of a vector register.
     side_by_side: bool,
-    /// Number of consecutive steps from the root to the tips.
+    /// Number of consecutive steps from the root to the tips. Each step computes one body, or several bodies in SIMD
+    /// lanes.
     steps: usize,
-    /// Number of bodies that these steps compute.
+    /// Number of bodies that are computed in the consecutive steps from the root to the tips.
     bodies: usize,
 }
 
-/// A joint that follows another joint.
+/// Joint that follows another joint (mimic joint).
 #[derive(Serialize)]
 struct Follower {
     joint: String,
@@ -109,7 +111,7 @@ struct Follower {
     ratio: f64,
     offset: f64,
     line: Option<u32>,
-    /// Whether the joint follows. Without `--mimic` it does not follow, and has its own coordinate.
+    /// Whether the joint follows the other joint. Without `--mimic`, the joint has its own coordinate instead.
     follows: bool,
 }
 
@@ -217,7 +219,8 @@ impl Report {
         let mut children = vec![Vec::new(); self.bodies.len() + 1];
         self.bodies.iter().for_each(|b| children[b.parent].push(b.index));
         let mut text = "  world\n".to_owned();
-        // Depth first: the list has the bodies that are not yet drawn, with the prefix of their lines.
+        // Draw depth first. The stack `left` contains the bodies that are not yet drawn, with the prefix of their
+        // lines.
         let mut left: Vec<(usize, String, bool)> = Vec::new();
         let push = |left: &mut Vec<(usize, String, bool)>, of: usize, before: &str| {
             let last = children[of].last().copied();
@@ -323,7 +326,7 @@ impl BodyReport {
     }
 }
 
-/// Returns the joints that follow others, or would follow with `--mimic`.
+/// Returns the joints that follow another joint, or would follow another joint with `--mimic`.
 fn followers(robot: &Robot, arguments: &Arguments, lines: &Lines) -> Vec<Follower> {
     let follows = arguments.robot.options.mimic;
     let following = robot::ReadingOptions { mimic: true, ..arguments.robot.options.clone() };

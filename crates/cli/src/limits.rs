@@ -1,5 +1,5 @@
-//! Limits of a robot's joints: counts them, finds initial positions that respect them, and makes constraints of a
-//! problem from them.
+//! Limits of a robot's joints: counts the limits, finds initial positions within the limits, and converts limits to
+//! constraints of a problem.
 
 use crate::error::Error;
 use crate::robot::Robot;
@@ -8,7 +8,7 @@ use condyle::{Model, neutral};
 use serde::Serialize;
 use std::fmt;
 
-/// A coordinate with a limit.
+/// Limited quantity of a joint coordinate, with the limits.
 pub(crate) struct Limited<'a> {
     /// Limited quantity: `position`, `velocity` or `torque`.
     pub what: &'static str,
@@ -21,7 +21,7 @@ pub(crate) struct Limited<'a> {
 }
 
 /// Lists the limited positions, velocities and efforts of a robot, joint by joint. Positions are listed only for joints
-/// with as many positions as velocities. A limit of 0 for a velocity or an effort counts as no limit.
+/// with equal numbers of positions and velocities. A limit of 0 for a velocity or an effort counts as no limit.
 pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     let limits = model.limits();
     let mut all = Vec::new();
@@ -46,7 +46,7 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     all
 }
 
-/// Numbers of limited coordinates of a robot, and the source of the limits.
+/// Numbers of a robot's limited coordinates, and the source of the limits.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct LimitCounts {
     /// Source of all limits: path of the robot's file, or name of a built-in robot.
@@ -54,7 +54,7 @@ pub(crate) struct LimitCounts {
     pub positions: usize,
     pub velocities: usize,
     pub efforts: usize,
-    /// Number of all degrees of freedom of the robot, nv.
+    /// Number of all degrees of freedom of the robot (nv).
     pub of: usize,
 }
 
@@ -72,7 +72,7 @@ impl LimitCounts {
         }
     }
 
-    /// Returns the number of limited coordinates of all kinds.
+    /// Returns the total number of limited positions, velocities and efforts.
     pub(crate) fn total(&self) -> usize {
         self.positions + self.velocities + self.efforts
     }
@@ -105,7 +105,7 @@ pub(crate) fn check_start(model: &Model, q: &[f64]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Returns the last frame on the body that is farthest from the root. For an arm, this is the tip.
+/// Returns the last frame on the body with the most joints between it and the root. For an arm, this frame is the tip.
 pub(crate) fn last_frame(model: &Model) -> usize {
     let depth = |mut body: usize| {
         let mut depth = 0;
@@ -118,12 +118,12 @@ pub(crate) fn last_frame(model: &Model) -> usize {
     (0..model.frames().len()).max_by_key(|&f| depth(model.frames()[f].body)).unwrap_or(0)
 }
 
-/// Returns the neutral position. Coordinates whose limits exclude neutral are mid-range instead.
+/// Returns the neutral position. If limits exclude a neutral coordinate, this coordinate gets the middle of its range.
 pub(crate) fn start(model: &Model) -> Vec<f64> {
     inside(model, neutral(model))
 }
 
-/// Returns the position q. Coordinates whose limits exclude their value are mid-range instead.
+/// Returns the position q, changed to respect the limits. A coordinate outside its limits gets the middle of its range.
 pub(crate) fn inside(model: &Model, q: Vec<f64>) -> Vec<f64> {
     let limits = model.limits();
     let inside = |(k, q): (usize, f64)| {
@@ -133,12 +133,12 @@ pub(crate) fn inside(model: &Model, q: Vec<f64>) -> Vec<f64> {
     q.into_iter().enumerate().map(inside).collect()
 }
 
-/// Returns the limits of positions and speeds as constraints; the list is empty if no joint has limits.
+/// Returns the limits of positions and speeds as constraints. The list is empty if no joint has such limits.
 pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
     let (nv, limits) = (model.nv(), model.limits());
     let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; 2 * nv], vec![f64::INFINITY; 2 * nv]);
     for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1 && b.mimic.is_none()) {
-        // For such a joint, x ⊖ x_ref equals q − q_ref.
+        // For a joint with one coordinate, x ⊖ x_ref equals q − q_ref.
         (lower[body.idx_v], upper[body.idx_v]) =
             (limits.lower[body.idx_q] - q[body.idx_q], limits.upper[body.idx_q] - q[body.idx_q]);
     }

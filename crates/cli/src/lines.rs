@@ -2,14 +2,14 @@
 
 use std::collections::HashMap;
 
-/// Kind of element that has a name and a line in a robot's file.
+/// Type of an element that has a name and a line in a robot's file.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
     Body,
     Joint,
 }
 
-/// Line numbers of links (bodies) and joints, by kind and name. Elements of included files are missing.
+/// Line numbers of links (bodies) and joints, by type and name. Elements of included files are missing.
 pub(crate) struct Lines(HashMap<(Kind, String), u32>);
 
 impl Lines {
@@ -25,8 +25,8 @@ impl Lines {
                 _ => None,
             };
             if let (Some(kind), Some(name), false) = (kind, name(tag), is_comment) {
-                // In an SDF, the same tag also names a link inside a joint's <parent>. So the first tag with a name
-                // counts.
+                // In an SDF, a tag with the same name can also occur inside a joint's <parent>. So keep the line of the
+                // first tag with each name.
                 lines.entry((kind, name.to_owned())).or_insert(line);
             }
             is_comment &= !piece.contains("-->");

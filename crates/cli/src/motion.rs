@@ -1,4 +1,4 @@
-//! A planned motion: what was requested, and the result.
+//! Planned motion: the request and the result.
 
 use crate::robot::Robot;
 use condyle::optimal::{Iteration, Solution, Status};
@@ -16,12 +16,12 @@ pub(crate) struct Goal {
     pub nearest: f64,
 }
 
-/// A planned motion: what the user requested, and the result.
+/// Planned motion: the user's request, and the solver's result.
 pub(crate) struct Plan {
     pub model: Arc<Model>,
-    /// Robot's file, whose shapes the page draws.
+    /// Robot and its file. The page draws the shapes in this file.
     pub robot: Robot,
-    /// Whether the page draws the meshes that the program finds.
+    /// Whether the page draws the robot's meshes, as far as the program finds them.
     pub meshes: bool,
     pub title: String,
     pub goal: Option<Goal>,
@@ -35,8 +35,8 @@ pub(crate) struct Plan {
     pub dt: f64,
     pub budget_ms: f64,
     pub solution: Solution,
-    /// Expected decrease of the cost, relative to the cost. It is set only if the limits hold and the cost can hardly
-    /// decrease, although the solver did not reach its own tolerance.
+    /// Expected decrease of the cost, relative to the cost. The value is `None` unless the limits hold, the cost can
+    /// hardly decrease, and the solver did not reach its own tolerance.
     pub settled: Option<f64>,
     /// Iterations of all solves.
     pub trace: Vec<Iteration>,
@@ -53,7 +53,8 @@ impl Plan {
         self.times.len() - 1
     }
 
-    /// Returns the efforts of all degrees of freedom at a knot. The effort is 0 for undriven ones, and at an impact.
+    /// Returns the efforts of all degrees of freedom at a knot. The effort is 0 for degrees of freedom without a motor,
+    /// and at an impact.
     pub(crate) fn effort(&self, t: usize) -> Vec<f64> {
         let (u, nv) = (self.solution.u(t), self.model.nv());
         let undriven = if u.is_empty() { nv } else { nv - u.len() };

@@ -9,8 +9,8 @@ use condyle::{ConstraintSet, ContactConstraint, Data, Joint, Model, constrained_
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Placeholders of the template, and the texts that replace them, in this order. The data are inserted after all of
-/// them, so that placeholders in the data are not replaced.
+/// Placeholders of the template, and the texts that replace them, in this order. The data are inserted last. So text in
+/// the data is never replaced, even if it looks like a placeholder.
 const PARTS: [(&str, &str); 8] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),
@@ -22,7 +22,7 @@ const PARTS: [(&str, &str); 8] = [
     ("/*{{plan.js}}*/", include_str!("../page/plan.js")),
 ];
 
-/// Writes the page, and creates its folder. Returns one line about the meshes that are left out, if any.
+/// Writes the page, and creates its folder. If meshes are left out, returns one line of text about these meshes.
 pub(crate) fn write(
     path: &Path,
     plan: &Plan,
@@ -47,7 +47,8 @@ fn shown(model: &Model) -> impl Iterator<Item = &condyle::tree::Body> {
     model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none())
 }
 
-/// Returns the knots that the page shows. An impact has no duration, so the state before the impact is not shown.
+/// Returns the indices of the knots that the page shows. An impact has no duration, so the state before the impact is
+/// left out.
 fn with_time(plan: &Plan) -> Vec<usize> {
     let times = &plan.times;
     (0..times.len()).filter(|&t| t + 1 == times.len() || times[t + 1] > times[t]).collect()
@@ -92,7 +93,7 @@ fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> 
     Ok(json!({"feet": names, "trails": trails, "touches": touches, "forces": forces, "weight": weight}))
 }
 
-/// Returns all data of the page, and a note on the meshes that are left out. The comment at the top of `plan.js`
+/// Returns all data of the page, and a note about the meshes that are left out. The comment at the top of `plan.js`
 /// describes each entry of the data.
 fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Option<String>) {
     let Plan { model, solution, .. } = plan;
@@ -129,7 +130,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     }
     let driven = &knots[..knots.len() - 1];
     let efforts: Vec<Vec<f64>> = (0..plan.knots()).map(|t| plan.effort(t)).collect();
-    // If a knot is not shown, the next shown knot represents it.
+    // If the page does not show the knot of a violation, use the next knot that the page shows.
     let violations: Vec<Value> = violations
         .iter()
         .map(|v| {
@@ -166,7 +167,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
             "poses": poses,
             "trail": (!trail.is_empty()).then_some(trail),
         },
-        // The set of contacts is valid, because the solver has used the same contacts.
+        // Here, `contacts` cannot fail, because the solver has already used the same contacts.
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
         "limits": LimitCounts::new(&plan.robot),
         "violations": violations,

@@ -103,16 +103,18 @@ const DEFAULT_TARGET: [f64; 3] = [0.45, -0.25, 0.35];
 const DEFAULT_ROBOT: &str = "arm7";
 const DEFAULT_FRAME: &str = "tool";
 const DEFAULT_DT: f64 = 0.01;
-/// Tolerance of the solver for gaits. Their costs are several hundred, so less than a millionth of the cost is ignored.
+/// Tolerance of the solver for gaits. The cost of a gait is several hundred, so the tolerance is less than a millionth
+/// of the cost.
 const GAIT_TOLERANCE: f64 = 1e-4;
-/// Maximum entry of the Lagrangian's gradient if limits are constraints. The first number is for reaching (costs of
-/// about 1), the second for gaits (costs of hundreds).
+/// Maximum entry of the Lagrangian's gradient at a solution, for problems with limits as constraints. The first number
+/// is for reaching (costs of about 1), the second for gaits (costs of several hundred).
 const DUAL: [f64; 2] = [1e-4, 1e0];
-/// Maximum violation of a limit that still counts as held (rad, m, N m, N, and per second): half of `report::ROUNDING`.
+/// Maximum violation of a limit that still counts as held (rad, rad/s, m, m/s, N m, N). It is half of
+/// `report::ROUNDING`.
 const HELD: f64 = 5e-6;
-/// Maximum number of inner solves after which the limits must hold.
+/// Maximum number of inner solves. After these solves, the limits must hold.
 const SOLVES: usize = 15;
-/// Expected decrease of the cost, relative to the cost, below which a solve has settled.
+/// Maximum expected decrease of the cost, relative to the cost, of a solve that counts as settled.
 const SETTLED: f64 = 1e-7;
 
 /// Runs `condyle plan`.
@@ -145,7 +147,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     finish(arguments, &plan, record)
 }
 
-/// Writes the page, the record and the report. Returns an error if the result is not what was requested.
+/// Writes the page, the record and the report. Returns an error if the result does not meet the request.
 fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::Format)>) -> Result<(), Error> {
     let budget = report::measure(plan);
     let violations = report::violations(plan);
@@ -340,7 +342,8 @@ fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-/// Returns whether the solution exceeds limits, so that the problem must be solved again with constraints.
+/// Returns whether the solution exceeds limits. If it does, the problem must be solved again with the limits as
+/// constraints.
 fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
     let violations = report::violations(plan);
     if violations.is_empty() || watch::interrupted() {
@@ -357,8 +360,8 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
 
 /// Solves a problem with limits as constraints, starting from a solution that exceeds the limits.
 ///
-/// The second result is the expected decrease of the cost, relative to the cost. It is set only if the limits hold and
-/// the cost can hardly decrease, although the solver did not reach its own tolerance.
+/// The second result is the expected decrease of the cost, relative to the cost. It is `None` unless the limits hold,
+/// the cost can hardly decrease, and the solver did not reach its own tolerance.
 fn hold(
     arguments: &Arguments,
     plan: &Plan,
@@ -371,9 +374,9 @@ fn hold(
     (solver.settings.tolerance, solver.settings.tolerance_dual) = (HELD, dual);
     let (xs, us) = (&plan.solution.xs, &plan.solution.us);
     let solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
-    // For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance.
-    // The expected decrease of the cost is an equally good criterion: half of Newton's squared decrement, which FDDP
-    // also uses. If it is small, the limits hold and the cost can hardly decrease.
+    // For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance. So
+    // also accept a solution if the limits hold and the expected decrease of the cost is small. The expected decrease
+    // is half of Newton's squared decrement; FDDP uses the same criterion.
     let last = solution.trace.last().filter(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
     let settled = last.filter(|_| solution.status == Status::MaxIterations && solver.outcome().primal <= HELD);
     let settled = settled.map(|last| last.stop / solution.cost.abs());
@@ -393,8 +396,8 @@ fn heading(arguments: &Arguments) {
     }
 }
 
-/// Returns the options for reading the robot's file. Options on the command line take precedence over the task's
-/// options.
+/// Returns the options for reading the robot's file. An option on the command line takes precedence over the same
+/// option in the task file.
 fn options(arguments: &Arguments, task: Option<&Task>) -> ReadingOptions {
     let flags = &arguments.options;
     ReadingOptions {

@@ -8,14 +8,14 @@ use rand::{SeedableRng, rngs::StdRng};
 const STARTS: usize = 40;
 /// Maximum number of steps from each starting posture.
 const STEPS: usize = 100;
-/// Damping of a step (m): small compared with the size of an arm, large compared with rounding.
+/// Damping of a step (m). It is small compared with the size of an arm, and large compared with rounding errors.
 const DAMPING: f64 = 0.02;
-/// Distance from the target that counts as reached (m); the planner reduces the remaining distance.
+/// Maximum distance (m) at which the target counts as reached. The planner then reduces the remaining distance.
 const REACHED: f64 = 1e-4;
 
-/// Returns a posture within the limits whose frame is at the target, and the distance of its frame from the target (m).
-/// If several postures reach the target, the function returns the nearest one to `q0`. If no posture reaches it, the
-/// function returns the posture with the smallest distance.
+/// Returns a posture within the limits in which `frame` is at the target, and the distance (m) between frame and
+/// target. If several postures reach the target, returns the posture nearest to `q0`. If no posture reaches the target,
+/// returns the posture with the smallest distance.
 ///
 /// The method is damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), with coordinates clamped to their limits
 /// (Nakamura and Hanafusa 1986).

@@ -1,4 +1,4 @@
-//! Poses the task of reaching a point as an optimal control problem.
+//! Converts the task of reaching a point to an optimal control problem.
 
 use crate::error::Error;
 use crate::limits::{efforts_of, inside, limits_of};
@@ -7,18 +7,18 @@ use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residua
 use condyle::{Data, Model, Vec3, difference, integrate, neutral, rnea, terms::gravity};
 use std::sync::Arc;
 
-/// Weight of an effort that has no limit. It equals the weight of an effort with a limit of 100 N m or 100 N.
+/// Weight of an effort without a limit. This weight equals the weight of an effort with a limit of 100 N m or 100 N.
 const WITHOUT_LIMIT: f64 = 1e-4;
 
-/// A problem with a warm start: the problem, the states and the efforts.
+/// Problem with a warm start: the problem, the initial states and the initial efforts.
 pub(crate) type Posed = (Problem, Vec<f64>, Vec<f64>);
 
 /// Returns the optimal control problem and a warm start. The warm start is a straight path to a posture that reaches
 /// the target, with the efforts from inverse dynamics.
 ///
-/// Running costs are the speed and the deviation of the efforts from those efforts that hold the start, each relative
-/// to its limit. Barriers penalise positions, speeds and efforts outside of their limits. Terminal costs are the
-/// distance to the target and the speed. With `held`, the limits are also constraints.
+/// The running costs have two terms, each relative to its limit: the speed, and the difference between the efforts and
+/// the efforts that hold the start. Barriers penalise positions, speeds and efforts outside of their limits. Terminal
+/// costs are the distance to the target and the speed. If `held` is true, the limits are also constraints.
 pub(crate) fn problem(
     model: &Arc<Model>,
     frame: usize,
@@ -61,7 +61,7 @@ pub(crate) fn problem(
         Cost::new("stop", 1e0, state(), moving(1.0)),
         Cost::new("limits", 1e2, state(), within()),
     ];
-    // A straight path with minimum jerk is q0 ⊕ s(t) way, with s = 10 r³ − 15 r⁴ + 6 r⁵ and r = t/T.
+    // Compute the straight path with minimum jerk, q0 ⊕ s(t) way, with s = 10 r³ − 15 r⁴ + 6 r⁵ and r = t/T.
     let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
     difference(model, q0, q_end, &mut way);
     let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();

@@ -30,7 +30,7 @@ pub(crate) fn format(path: &Path) -> Result<Format, Error> {
     }
 }
 
-/// Returns the names of the components of a joint's position and velocity.
+/// Returns suffixes for the columns of a joint: one for each position component, and one for each velocity component.
 fn parts(joint: Joint) -> (&'static [&'static str], &'static [&'static str]) {
     match joint {
         Joint::FreeFlyer => (&["x", "y", "z", "qx", "qy", "qz", "qw"], &["vx", "vy", "vz", "wx", "wy", "wz"]),
@@ -57,7 +57,7 @@ fn columns(model: &Model) -> (Vec<String>, Vec<String>) {
     (q, v)
 }
 
-/// A trajectory as numbers: N + 1 states and N efforts.
+/// Numbers of a trajectory: N + 1 states and N efforts.
 struct Table<'a> {
     plan: &'a Plan,
     q: Vec<f64>,
@@ -164,7 +164,7 @@ fn npz(table: &Table) -> std::io::Result<Vec<u8>> {
     add("tau", "<f8", &[*knots, of_v.len()], &floats(tau))?;
     add("touches", "|b1", &[plan.touches.len(), feet.len()], &touches)?;
     for (name, texts) in [("q_names", &of_q), ("v_names", &of_v), ("feet", &feet)] {
-        // Texts have equal lengths in UTF-32, padded with zeros.
+        // NumPy stores an array of texts as UTF-32 with equal lengths. So pad the texts with zeros.
         let length = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
         let text = |text: &String| {
             let mut codes: Vec<u32> = text.chars().map(u32::from).collect();

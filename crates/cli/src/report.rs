@@ -9,9 +9,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Relative tolerance for limits: an excess below this fraction of the range (or of 1, if 1 is larger) is not reported.
+/// Relative tolerance for limits. An excess is not reported if it is below this fraction of the range, or below this
+/// number if the range is less than 1.
 const ROUNDING: f64 = 1e-5;
-/// Number of timed repetitions of a function; the median of their times counts.
+/// Number of timed repetitions of a function. The median of these times is reported.
 const REPETITIONS: usize = 11;
 
 pub(crate) const ITERATION_HEADER: &str = "iteration           cost        gap    step  regularisation\n";
@@ -39,7 +40,7 @@ pub(crate) struct Budget {
     pub rows: Vec<Row>,
     /// Sum of the times in all rows.
     pub total_ms: f64,
-    /// Times of the dynamics functions that the iteration calls, measured alone.
+    /// Times of single dynamics functions that a solver iteration calls. They do not count in `total_ms`.
     pub alone: Vec<Row>,
     #[serde(skip)]
     pub solve_ms: f64,
@@ -57,7 +58,8 @@ fn median(knots: usize, mut f: impl FnMut(usize)) -> Duration {
     times[REPETITIONS / 2]
 }
 
-/// Measures the dynamics on the planned motion. The times of sweep and rollout are those that the solver measured.
+/// Measures the dynamics on the planned motion. For backward sweep and rollout, takes the times that the solver
+/// measured.
 pub(crate) fn measure(plan: &Plan) -> Budget {
     let (model, solution) = (&plan.model, &plan.solution);
     let (nq, nv) = (model.nq(), model.nv());
@@ -137,7 +139,7 @@ pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
     found
 }
 
-/// Returns a text for the status with which the solve ended.
+/// Returns a short text for the status with which the solver stopped.
 pub(crate) fn status(plan: &Plan) -> &'static str {
     match plan.solution.status {
         _ if plan.settled.is_some() => "settled",
@@ -152,7 +154,7 @@ pub(crate) fn status(plan: &Plan) -> &'static str {
     }
 }
 
-/// Returns the text of the report that follows the list of iterations.
+/// Returns the part of the report that is printed after the list of iterations.
 pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> String {
     let (model, iterations) = (&plan.model, plan.trace.len());
     let ended = styled(if plan.is_solved() { Style::Good } else { Style::Bad }, status(plan));

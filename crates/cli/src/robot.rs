@@ -1,4 +1,4 @@
-//! The robot of a command: from a file in any supported format, or built in.
+//! Loads the robot of a command, from a file in any supported format or from the built-in robots.
 
 use crate::error::{Error, nearest};
 use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
@@ -40,7 +40,7 @@ pub(crate) struct ReadingOptions {
 }
 
 impl ReadingOptions {
-    /// Returns the library's options for a URDF.
+    /// Converts the options to the library's options for a URDF.
     fn urdf(&self) -> UrdfOptions {
         let (root_joint, mimic) = (self.root.and_then(Root::joint), self.mimic);
         let (packages, arguments) = (self.packages.clone(), self.arguments.clone());
@@ -48,13 +48,13 @@ impl ReadingOptions {
     }
 }
 
-/// Parses an argument for xacro: `name=value`, or `name:=value` as xacro writes it.
+/// Parses an argument for xacro: `name=value`, or xacro's own syntax `name:=value`.
 fn argument(text: &str) -> Result<(String, String), &'static str> {
     let (name, value) = text.split_once(":=").or_else(|| text.split_once('=')).ok_or("expected NAME=VALUE")?;
     Ok((name.to_owned(), value.to_owned()))
 }
 
-/// Kind of joint between the world and a root link.
+/// Type of the joint between the world and a root link.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(crate) enum Root {
     Fixed,
@@ -94,7 +94,7 @@ impl Format {
     }
 }
 
-/// A robot and its source.
+/// Robot with its source: file, format and text.
 pub(crate) struct Robot {
     pub model: Model,
     /// Path of the file, or name of the built-in robot.
@@ -102,7 +102,7 @@ pub(crate) struct Robot {
     pub format: Format,
     /// Text of the file.
     pub text: String,
-    /// Folders in which the robot's meshes are searched.
+    /// Folders in which the program searches for the robot's meshes.
     pub places: Places,
 }
 
@@ -150,7 +150,7 @@ pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Resu
     })
 }
 
-/// Loads a built-in robot. It has its usual root joint unless the options request another one.
+/// Loads a built-in robot. The robot has its usual root joint unless the options request another root joint.
 fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     let (text, free) = match name {
         "arm7" => (robots::ARM7, false),
@@ -167,7 +167,7 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned(), places: Places::default() })
 }
 
-/// Returns an error for a name that is neither a file nor a built-in robot. The message has the most similar name.
+/// Returns an error for a name that is neither a file nor a built-in robot. The message suggests the most similar name.
 fn unknown(name: &str) -> Error {
     let kinds = ["urdf", "xacro", "xml", "mjcf", "sdf"];
     if name.contains(['.', '/', '\\']) {
@@ -180,7 +180,8 @@ fn unknown(name: &str) -> Error {
     }
 }
 
-/// Returns an error for a missing file. The message has the most similar file name with one of these extensions.
+/// Returns an error for a missing file. The message suggests the most similar file name with one of the given
+/// extensions.
 pub(crate) fn no_such_file(name: &str, kinds: &[&str]) -> Error {
     let files = files_beside(name, kinds);
     let nearest = nearest(name, files.iter().map(|file| &**file));

@@ -1,5 +1,5 @@
-//! The scene on the page. It shows shapes and meshes from the robot's file; robots without shapes have bones between
-//! joints.
+//! Scene on the page. The scene contains the shapes and meshes of the robot's file. For a robot without shapes, it
+//! contains bones, which are segments between joints.
 
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
@@ -11,7 +11,7 @@ use condyle_meshes::{Drawn, Meshes, mjcf};
 use serde::Serialize;
 use std::collections::HashMap;
 
-/// A body, with the shapes that are drawn in its frame.
+/// Body, with the shapes that are drawn in the body's frame.
 #[derive(Serialize)]
 pub(crate) struct Body {
     name: String,
@@ -28,7 +28,7 @@ pub(crate) struct Shape {
     position: [f64; 3],
     quaternion: [f64; 4],
     color: Option<String>,
-    /// Index of the part of a mesh.
+    /// Index, in the list of meshes, of the mesh part that this shape draws.
     #[serde(skip_serializing_if = "Option::is_none")]
     part: Option<usize>,
 }
@@ -39,7 +39,7 @@ pub(crate) fn pose(placement: Se3<f64>) -> [f64; 7] {
     [p.x, p.y, p.z, q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Returns all bodies, the world first. If meshes are `wanted`, returns their meshes, too.
+/// Returns all bodies, the world first. If `wanted` is true, also returns the meshes of the bodies.
 pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool) -> (Vec<Body>, Meshes) {
     let mut meshes = Meshes::new(robot.places.clone());
     let mut shapes = match robot.format {
@@ -47,8 +47,8 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool)
         Format::Mjcf if wanted => shapes_of_mjcf(model, &robot.text, &mut meshes),
         Format::Mjcf | Format::Sdf => HashMap::new(),
     };
-    // Bones replace meshes that are left out. If at most half of the moving bodies have shapes, bones also replace all
-    // other shapes except meshes.
+    // Draw bones for bodies whose meshes are left out. If fewer than half of the moving bodies have shapes, also draw
+    // bones in place of all shapes except meshes.
     let drawn = |b: &usize| shapes.get(b).is_some_and(|shapes| !shapes.is_empty());
     let few = 2 * (1..model.bodies().len()).filter(drawn).count() < model.bodies().len() - 1;
     for (body, bones) in bones(model, ends) {
@@ -73,8 +73,8 @@ fn hex(color: &[f64]) -> String {
     "#".to_owned() + &color.iter().take(3).map(byte).collect::<String>()
 }
 
-/// Returns the shapes of each body, from the URDF's visuals: boxes, cylinders, spheres, capsules and meshes. If all
-/// meshes of a body are left out and it has no other shapes, its list is empty.
+/// Returns the shapes of each body, from the URDF's visuals: boxes, cylinders, spheres, capsules and meshes. The list
+/// of a body is empty if all its meshes are left out and the body has no other shapes.
 fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     for visual in visuals::read(urdf) {
@@ -129,7 +129,7 @@ fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: 
     meshes.get(file).into_iter().map(shape).collect()
 }
 
-/// Returns a shape at a pose, without any geometry yet.
+/// Returns a shape with a pose. The caller adds the geometry.
 fn at(pose: [f64; 7]) -> Shape {
     let [x, y, z, quaternion @ ..] = pose;
     Shape { kind: "", size: vec![], position: [x, y, z], quaternion, color: None, part: None }

@@ -9,7 +9,7 @@ pub(crate) fn source(seed: u64) -> StdRng {
     StdRng::seed_from_u64(seed)
 }
 
-/// Returns n numbers of mean 0 and variance 1 (Box and Muller, 1958).
+/// Returns n normally distributed random numbers with mean 0 and variance 1 (Box and Muller, 1958).
 pub(crate) fn normal(random: &mut StdRng, n: usize) -> Vec<f64> {
     let mut one = || {
         let (a, b): (f64, f64) = (random.random(), random.random());
@@ -18,7 +18,7 @@ pub(crate) fn normal(random: &mut StdRng, n: usize) -> Vec<f64> {
     (0..n).map(|_| one()).collect()
 }
 
-/// States that are stored one after another, in the layout of a batch.
+/// Random states, stored one after another in the layout of a batch.
 pub(crate) struct States {
     pub q: Vec<f64>,
     pub v: Vec<f64>,

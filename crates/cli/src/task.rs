@@ -1,4 +1,4 @@
-//! A task file in TOML. All its errors have line numbers.
+//! Reads and checks task files in TOML. Every error message contains a line number.
 
 use crate::error::{Error, nearest};
 use serde::Deserialize;
@@ -16,7 +16,7 @@ pub(crate) const EXAMPLES: [(&str, &str); 5] = [
     ("stand-up", include_str!("../tasks/stand-up.toml")),
 ];
 
-/// A task as it is stored in its file.
+/// Content of a task file, before its checks.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -73,7 +73,8 @@ struct PhaseFile {
 pub(crate) struct Phase {
     pub kind: PhaseKind,
     pub knots: usize,
-    /// Distances (m) that the feet move ahead and to the left, and height of their lift.
+    /// Distance (m) that the feet move ahead. (The next fields are the distance to the left and the height of the
+    /// lift.)
     pub length: f64,
     pub side: f64,
     pub height: f64,
@@ -81,15 +82,15 @@ pub(crate) struct Phase {
 
 #[derive(Clone, PartialEq)]
 pub(crate) enum PhaseKind {
-    /// A phase with all feet on the ground.
+    /// Phase with all feet on the ground.
     Stand,
-    /// A phase in which the feet with these indices are in the air.
+    /// Phase in which the feet with these indices are in the air.
     Step(Vec<usize>),
-    /// A phase with all feet in the air.
+    /// Phase with all feet in the air.
     Jump,
 }
 
-/// A valid task. The names of frames and joints are not yet looked up in the robot.
+/// Valid task. The names of frames and joints are not yet checked, because the robot is not yet loaded.
 pub(crate) struct Task {
     pub robot: String,
     pub root: Option<crate::robot::Root>,
@@ -106,7 +107,7 @@ pub(crate) struct Task {
     pub place: Place,
 }
 
-/// Line numbers of names in the task file, for errors that are found later.
+/// Line numbers of names in the task file. Errors that are found after reading the file use these line numbers.
 pub(crate) struct Place {
     file: String,
     lines: BTreeMap<String, usize>,
@@ -137,7 +138,7 @@ pub(crate) fn read(path: &Path) -> Result<Task, Error> {
     }
     let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
     let mut task = parse(&text, &file)?;
-    // The path of the robot's file is relative to the folder of the task.
+    // The path of the robot's file is relative to the folder of the task file.
     let beside = path.parent().unwrap_or(Path::new("")).join(&task.robot);
     if !crate::robot::EMBEDDED.contains(&&*task.robot) && !task.robot.contains("://") {
         task.robot = beside.display().to_string();

@@ -1,8 +1,8 @@
-//! Writes to the terminal: text, tables, and colours if standard output is a terminal.
+//! Writes text and tables to standard output, with colours if standard output is a terminal.
 
 use std::io::{IsTerminal, Write};
 
-/// Writes to standard output. A closed pipe (`| head`) is not an error.
+/// Writes a text to standard output. A closed pipe, as after `| head`, is not an error.
 pub(crate) fn say(text: &str) {
     let mut out = std::io::stdout().lock();
     if out.write_all(text.as_bytes()).and_then(|()| out.flush()).is_err() {
@@ -12,11 +12,12 @@ pub(crate) fn say(text: &str) {
 
 /// Writes a value to standard output as JSON.
 pub(crate) fn say_json(value: &impl serde::Serialize) {
-    // Numbers that are not finite become `null`, and no other value can fail here.
+    // Serialization cannot fail here: numbers that are not finite become `null`.
     say(&(serde_json::to_string_pretty(value).unwrap_or_default() + "\n"));
 }
 
-/// Returns whether colours are wanted: standard output is a terminal, and `NO_COLOR` is not set (no-color.org).
+/// Returns whether to print colours. They are printed if standard output is a terminal and `NO_COLOR` is not set
+/// (no-color.org).
 fn colours() -> bool {
     std::io::stdout().is_terminal()
         && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
@@ -33,7 +34,7 @@ pub(crate) enum Style {
     Bad,
 }
 
-/// Returns the text with the codes of a style, or unchanged if colours are off.
+/// Returns the text with the terminal codes of a style. Without colours, returns the text unchanged.
 pub(crate) fn styled(style: Style, text: &str) -> String {
     if !colours() {
         return text.to_owned();
@@ -53,8 +54,8 @@ pub(crate) fn heading(text: &str) -> String {
     format!("\n{}\n", styled(Style::Bold, text))
 }
 
-/// Formats a number with at most five significant digits. Very small or very large numbers have three digits and an
-/// exponent.
+/// Formats a number with at most five significant digits. A very small or very large number is written with three
+/// digits and an exponent.
 pub(crate) fn short(x: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
@@ -70,7 +71,7 @@ pub(crate) fn short(x: f64) -> String {
     }
 }
 
-/// A table with aligned columns. Columns of numbers are right-aligned, all others left-aligned.
+/// Table with aligned columns. Columns of numbers are right-aligned, and all other columns left-aligned.
 pub(crate) struct Table {
     head: Vec<String>,
     rows: Vec<Vec<String>>,

@@ -3,7 +3,7 @@
 use condyle::{Model, Se3};
 use roxmltree::{Document, Node};
 
-/// A visual: a shape on a link, its pose in the link's frame, and its colour.
+/// Visual of a URDF: a shape on a link, the shape's pose in the link's frame, and its colour.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Visual {
     pub(crate) link: String,
@@ -13,7 +13,7 @@ pub(crate) struct Visual {
     pub(crate) color: Option<[f64; 4]>,
 }
 
-/// A shape, with lengths in m.
+/// Shape of a visual, with lengths in m.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Geometry {
     Box([f64; 3]),
@@ -33,8 +33,8 @@ pub(crate) enum Geometry {
     },
 }
 
-/// Returns the visuals of all links, in the order of the file. Unreadable visuals are skipped: a missing picture is no
-/// reason to reject a robot.
+/// Returns the visuals of all links, in the order of the file. A visual that cannot be read is skipped, because a robot
+/// without this visual can still be used.
 pub(crate) fn read(urdf: &str) -> Vec<Visual> {
     let Ok(urdf) = Model::well_formed(urdf) else { return Vec::new() };
     let Ok(document) = Document::parse(&urdf) else { return Vec::new() };
@@ -95,7 +95,8 @@ fn origin(visual: Node<'_, '_>) -> Se3<f64> {
     nalgebra::Isometry3::from_parts(xyz.into(), rotation).into()
 }
 
-/// Returns the colour of a material. If it has none, returns the colour of the robot's material with the same name.
+/// Returns the colour of a material. If the material has no colour, returns the colour of the robot's material with the
+/// same name.
 fn color(material: Node<'_, '_>, robot: Node<'_, '_>) -> Option<[f64; 4]> {
     let own = |material| child(material, "color").and_then(|c| numbers(c, "rgba"));
     let name = material.attribute("name");
@@ -118,7 +119,7 @@ mod tests {
         <link name="b"><visual><geometry><cylinder radius="0.1" length="2"/></geometry></visual></link>
     </robot>"#;
 
-    /// Checks that each readable visual has its link, pose and colour.
+    /// Checks the link, pose and colour of each visual that can be read.
     #[test]
     fn visuals_of_each_link() {
         let visuals = read(ROBOT);
@@ -137,7 +138,7 @@ mod tests {
         assert_eq!(visuals[0].origin.translation.to_array(), [1.0, 2.0, 3.0]);
     }
 
-    /// Checks that a robot that the reader accepts has visuals, even if its text is not strict XML.
+    /// Checks that the visuals of a robot are read even if its text is not strict XML.
     #[test]
     fn visuals_of_robots_that_are_not_strict_xml() {
         let prolog = "<!------ a ------>\n<?xml version='1.0'?><!DOCTYPE robot>";

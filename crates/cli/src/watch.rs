@@ -1,4 +1,4 @@
-//! Observer of a solve. It shows the progress, and stops the solve on Ctrl-C.
+//! Observer of a solve, which shows the progress and stops the solve on Ctrl-C.
 
 use crate::report;
 use crate::terminal::say;
@@ -13,8 +13,8 @@ static STOP: AtomicBool = AtomicBool::new(false);
 /// Installs a handler for Ctrl-C. The first Ctrl-C makes the solver stop with its best iterate; the second ends the
 /// program.
 pub(crate) fn catch_interrupts() {
-    // An earlier call may have installed the same handler. Where signals cannot be caught, they end the program as
-    // usual.
+    // Ignore errors. An earlier call may have installed the same handler. If the handler cannot be installed, Ctrl-C
+    // ends the program as usual.
     let _ = ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::SeqCst) {
             std::process::exit(130);

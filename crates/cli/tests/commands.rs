@@ -1,5 +1,5 @@
-//! Tests `condyle inspect`, `budget`, `check` and the command-line options, as a user sees them. No test asserts a
-//! time.
+//! Tests the output and exit status of `condyle inspect`, `budget`, `check` and of the command-line options. No test
+//! asserts a computing time.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -192,7 +192,8 @@ fn all_checks_pass() {
     assert!(said(&["check", "arm7", "--states", "5"], 0).contains("34 of 34 checks pass"));
 }
 
-/// A tip without inertia has no forward dynamics. So it gets armature, and the report states this.
+/// Checks that a tip without inertia gets armature, and that the report states this. Without armature, the tip would
+/// have no forward dynamics.
 #[test]
 fn massless_tips_are_given_armature() {
     let file = folder("tip").join("chain.urdf");
@@ -229,7 +230,7 @@ fn budget_measures_everything() {
     }
 }
 
-/// A period of 100 s is long enough for every horizon, and a nanosecond is too short for any.
+/// Checks that every horizon fits into a period of 100 s, and that no horizon fits into a nanosecond.
 #[test]
 fn budget_ends_with_the_verdict() {
     let folder = folder("budget");
@@ -286,7 +287,8 @@ fn errors_are_one_line() {
     }
 }
 
-/// A program that was built without the feature `generate` names this feature, whatever the arguments are.
+/// Checks that a program built without the feature `generate` names this feature in its error message, for all
+/// arguments.
 #[cfg(not(feature = "generate"))]
 #[test]
 fn generate_is_a_feature() {
@@ -298,7 +300,7 @@ fn generate_is_a_feature() {
     }
 }
 
-/// `generate` writes the code that the library generates. Wrong arguments are named in the error.
+/// Checks that `generate` writes the same code as the library, and that an error message names a wrong argument.
 #[cfg(feature = "generate")]
 #[test]
 fn generate_writes_code() {

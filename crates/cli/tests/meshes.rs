@@ -1,10 +1,11 @@
-//! Tests meshes on the page of `condyle plan`. They are found, and drawn at their pose; missing meshes cause no error.
+//! Tests meshes on the page of `condyle plan`. The program must find the meshes and draw them at their poses. Missing
+//! meshes must cause no error.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Returns the folder that contains the robots made of boxes. It is also their package.
+/// Returns the folder that contains the robots made of boxes. This folder is also the robots' package.
 fn robots() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/boxes")
 }
@@ -25,7 +26,7 @@ fn plan(test: &str, robot: &Path, arguments: &[&str]) -> (Output, Value) {
     (output, data["scene"].clone())
 }
 
-/// Returns, for each body, the kinds of its shapes.
+/// Returns, for each body, the types of its shapes.
 fn kinds(scene: &Value) -> Vec<Vec<&str>> {
     let shapes = |body: &'_ Value| body["shapes"].as_array().unwrap().clone();
     let bodies = scene["bodies"].as_array().unwrap();
@@ -56,7 +57,7 @@ fn meshes_of_a_urdf_are_drawn_and_the_missing_one_is_a_bone() {
         notes.lines().any(|line| line.starts_with("note: 1 of 4 meshes are left out: there is no file")),
         "{notes}"
     );
-    // The colour of the mesh file is used. If the file has no colour, the colour of the URDF is used.
+    // The page must use the colour of the mesh file or, if the mesh file has no colour, the colour of the URDF.
     let shape = |body: usize| &scene["bodies"][body]["shapes"][0];
     assert_eq!([0, 1, 2].map(|b| shape(b)["color"].as_str().unwrap()), ["#666673", "#e6991a", "#1a8080"]);
     assert_eq!(

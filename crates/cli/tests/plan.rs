@@ -49,7 +49,7 @@ fn the_built_in_arm_reaches_its_target() {
     assert_eq!(data["scene"]["poses"][100].as_array().unwrap().len(), 8);
 }
 
-/// A user's robot without shapes is drawn as bones. Here it is made from the built-in arm.
+/// Checks that a robot from a file without shapes is drawn as bones. The file contains the built-in arm.
 #[test]
 fn a_robot_from_a_file_is_drawn_as_bones() {
     let folder = folder("file");
@@ -88,8 +88,8 @@ fn chain(folder: &Path, joints: [&str; 2]) -> String {
     file.to_str().unwrap().to_owned()
 }
 
-/// The report, the page and `inspect` state the number and the source of the limits. For a robot without limits, they
-/// do not claim that a limit holds.
+/// Checks that the report, the page and `inspect` state the number and the source of the limits. For a robot without
+/// limits, these texts must not claim that limits hold.
 #[test]
 fn limits_are_counted() {
     let all = "type=\"revolute\"><limit lower=\"-2\" upper=\"2\" velocity=\"9\" effort=\"90\"/>";
@@ -136,8 +136,8 @@ fn limits_are_counted() {
     }
 }
 
-/// A joint that is too weak falls out of its range. The report gives the number of exceeded limits and the number of
-/// all limits.
+/// Checks the report on a joint that is too weak to stay within its position limits. The report must state the number
+/// of exceeded limits and the number of all limits.
 #[test]
 fn limits_that_are_exceeded_are_counted() {
     let weak = "type=\"revolute\"><limit lower=\"1.19\" upper=\"1.21\" velocity=\"9\" effort=\"0.5\"/>";
@@ -217,7 +217,8 @@ fn example(name: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Each example task does what its description says, and all values stay within the robot's limits.
+/// Checks that each example task produces the motion of its description, and that all values stay within the robot's
+/// limits.
 #[test]
 fn the_examples_hold_their_limits() {
     for (name, robot, ahead) in [
@@ -270,8 +271,8 @@ fn the_examples_hold_their_limits() {
     }
 }
 
-/// The forces on the page carry the robot: the gait begins and ends at rest, so the mean of their sum equals the
-/// weight.
+/// Checks the contact forces on the page. The gait begins and ends at rest, so the mean of the total force must equal
+/// the weight.
 #[test]
 fn contact_forces_carry_the_robot() {
     let (_, record, ..) = solve_task("forces", &example("trot"), "motion.json");
@@ -316,7 +317,8 @@ fn the_record_is_named_after_the_joints() {
     );
 }
 
-/// A joint starts on its limit, where the solver could reduce the cost by exceeding the limit.
+/// Checks that a joint that starts at its limit stays within the limit, although exceeding the limit would reduce the
+/// cost.
 #[test]
 fn a_joint_that_starts_on_its_limit_stays_within() {
     let urdf = include_str!("../../model/models/arm7.urdf").replace(
@@ -379,7 +381,7 @@ fn errors_in_a_task_have_a_line_number() {
     }
 }
 
-/// On Ctrl-C the solver stops, and the best result so far is written.
+/// Checks that Ctrl-C stops the solver, and that the program writes the best result so far.
 #[test]
 #[cfg(unix)]
 fn interrupted_it_leaves_the_best_iterate() {

@@ -1,8 +1,9 @@
 //! Compares generated C with the library: operations, size, time to generate and to compile, and time of a call. Also
-//! compares the time per state of vectors of eight states and of a batch.
+//! compares the time per state of two variants: generated code for vectors of eight states, and a batch of the library.
 //!
 //! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free` reads these files. Without files,
-//! the benchmark uses the embedded robots. `CC` names the compiler, `CFLAGS` its flags.
+//! the benchmark uses the embedded robots. The environment variable `CC` names the compiler, and `CFLAGS` contains the
+//! compiler's flags.
 
 use condyle_codegen::{Function, Language, Settings, functions};
 use condyle_dynamics::{
@@ -14,8 +15,8 @@ use std::time::Instant;
 
 const NAMES: [&str; 6] = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives"];
 
-/// Number of measurements. The shortest one is the time of a call, since other work on the machine only lengthens a
-/// call.
+/// Number of measurements of a call's time. The result is the shortest time, because other programs on the machine can
+/// only lengthen a call.
 const MEASUREMENTS: usize = 20;
 
 /// Measures the time of a call (ns).
@@ -101,7 +102,7 @@ int main(void) {
 }
 "#;
 
-/// Costs of a compiled function.
+/// Size of a compiled function, and the time of a call.
 struct Compiled {
     text_kb: usize,
     seconds: f64,

@@ -1,4 +1,4 @@
-//! Derivatives of recorded functions. They are computed by dual numbers whose parts are expressions.
+//! Derivatives of recorded functions, computed with dual numbers whose components are expressions.
 
 use crate::expression::Expression;
 use condyle_model::{Model, integrate};
@@ -11,9 +11,9 @@ pub type DualExpression = LaneDual<Expression>;
 
 /// Records f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, inside of [`record`](crate::record).
 ///
-/// x has a position of nq numbers, then any other numbers, which form a vector space, as in
-/// [`condyle_dynamics::jacobian`]. f must be generic code on dual numbers. Values common to several directions are
-/// computed once.
+/// x begins with a position of nq numbers. All other numbers of x form a vector space, as in
+/// [`condyle_dynamics::jacobian`]. f must be generic code that accepts dual numbers. A value that several columns of
+/// the Jacobian need is computed once.
 ///
 /// ```
 /// use condyle_codegen::{jacobian, record};
@@ -32,8 +32,8 @@ pub type DualExpression = LaneDual<Expression>;
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, if f returns different numbers of results for different directions, or if no
-/// recording is in progress.
+/// If x has fewer than nq numbers, if the number of results of f differs between directions, or if no recording is in
+/// progress.
 pub fn jacobian<R>(
     model: &Model<R>,
     x: &[Expression],

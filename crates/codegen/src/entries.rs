@@ -1,5 +1,6 @@
-//! Adjacent entries of a result with the same structure: sums of products with the same common factors, such as entries
-//! of a product of matrices. A loop computes these entries. Compilers vectorise the loop, and its code is much shorter.
+//! Loops for adjacent entries of a result. The entries must be sums of products with the same structure, and
+//! corresponding products must have a common factor. For example, a column of a matrix product consists of such
+//! entries. Compilers vectorise the loop, and the loop's code is much shorter than one line for each product.
 
 use crate::graph::{Id, Node};
 use crate::step::{Entries, Step, Term};
@@ -7,12 +8,13 @@ use crate::step::{Entries, Step, Term};
 /// Minimum number of entries that a loop computes.
 const FEWEST: usize = 4;
 
-/// Term of one sum: whether it is subtracted, and its factors. A term that is a single value has one factor.
+/// Term of one sum: whether the term is subtracted, and the term's two factors. If the term is a single value, the
+/// second factor is `None`.
 type Of = (bool, [Option<Id>; 2]);
 
-/// Replaces steps by loops, where adjacent results have the same structure.
+/// Replaces steps by a loop wherever adjacent results have the same structure.
 ///
-/// places: for each result, its array and its index in this array.
+/// `places` contains, for each result, the index of the result's array and the index within this array.
 pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], places: &[(usize, usize)]) {
     let mut gatherer = Gatherer::new(steps, results);
     let (mut loops, mut start) = (Vec::new(), 0);
@@ -40,7 +42,7 @@ pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], places: &[(usize, us
     steps.extend(replaced.into_iter().flatten());
 }
 
-/// Returns the product that a step computes: whether it is subtracted, and its factors.
+/// Returns the product in a step: whether the product is subtracted, and its factors.
 fn product(step: &Step) -> Option<Of> {
     match *step {
         Step::MulAdd(_, [a, b, _]) | Step::Plain(_, Node::Mul(a, b)) => Some((false, [Some(a), Some(b)])),
@@ -59,15 +61,15 @@ fn rest(step: &Step) -> Option<Id> {
 
 /// Properties of each value that the search for loops needs.
 struct Gatherer {
-    /// Index of the step that computes each value; `usize::MAX` if no step does.
+    /// Index of the step that computes each value; `usize::MAX` if no step computes the value.
     maker: Vec<usize>,
     /// Terms of each value that is a sum of products, the last term first. At most one term is a single value.
     sums: Vec<Option<Vec<Of>>>,
-    /// Whether no step uses the value, and the value is not yet an entry of a loop.
+    /// Whether each value is free: no step uses it, and no loop computes it yet.
     is_free: Vec<bool>,
-    /// Value that must follow each value in the work space.
+    /// For each value, the value that must directly follow it in the work space.
     next: Vec<Option<Id>>,
-    /// Whether the work space has a fixed index for a value, next to another value.
+    /// Whether each value must directly follow another value in the work space.
     has_place: Vec<bool>,
 }
 
@@ -94,7 +96,8 @@ impl Gatherer {
         Self { maker, sums, is_free, next: vec![None; n], has_place: vec![false; n] }
     }
 
-    /// Returns a loop for the longest run of similar entries, beginning with the first one, which is result `place`.
+    /// Returns a loop for the longest run of entries with the same structure. The run begins with `entries[0]`, which
+    /// is the result with index `place`.
     fn alike(&mut self, entries: &[Id], place: usize) -> Option<Entries> {
         let sum = |of: &Self, id: Id| of.sums[id as usize].clone().filter(|_| of.is_free[id as usize]);
         let first = sum(self, entries[0]).filter(|sum| sum.len() > 1)?;
@@ -134,7 +137,8 @@ impl Gatherer {
         Some(Entries { ids, first: place, terms })
     }
 
-    /// Places a value directly after another value in the work space, if possible. Returns whether it is there.
+    /// Requires that value `id` directly follows value `last` in the work space, if this is possible. Returns whether
+    /// `id` follows `last`.
     fn follows(&mut self, last: Id, id: Id) -> bool {
         match self.next[last as usize] {
             Some(next) => next == id,
@@ -148,7 +152,7 @@ impl Gatherer {
     }
 }
 
-/// Returns the factor of a product that is not the common factor; `None` if there is no such factor.
+/// Returns the factor of a product besides the common factor; `None` if the product does not have such a factor.
 fn other([a, b]: [Option<Id>; 2], common: Option<Id>) -> Option<Id> {
     match (a == common, b == common) {
         (true, false) => b,

@@ -10,7 +10,7 @@ pub enum Error {
         /// The given name.
         name: String,
     },
-    /// A function was named twice. The code would define it twice.
+    /// A function name was given twice. The generated code would define this function twice.
     #[error("{name}: named twice")]
     Twice {
         /// Name of the function.
@@ -24,7 +24,7 @@ pub enum Error {
         /// Whether frames or constraints are missing, in words.
         needs: &'static str,
     },
-    /// M is singular, but the function needs its inverse.
+    /// The joint-space inertia matrix M is singular, but the function needs M⁻¹.
     #[error("{name}: the inertia matrix is singular, because of joint `{joint}`")]
     Singular {
         /// Name of the function.

@@ -9,16 +9,16 @@ use std::cell::{Cell, RefCell};
 /// and leaves a graph of all its operations. [`record`](crate::record) makes a [`Function`](crate::Function) from this
 /// graph.
 ///
-/// An expression belongs to the recording in which it was made; its use in another recording panics. Two expressions
-/// are equal if they are computed in the same way.
+/// An expression belongs to the recording in which it was made. Using the expression in another recording panics. Two
+/// expressions are equal if they are computed in the same way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expression {
-    /// Number of the recording. It is 0 for the constants 0 and 1, which are the same in each recording.
+    /// Ordinal of the recording; 0 for the constants 0 and 1, which are valid in every recording.
     session: u32,
     id: Id,
 }
 
-/// Result of a comparison of two [`Expression`]s, which is recorded, too.
+/// Recorded result of a comparison of two [`Expression`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mask(Expression);
 
@@ -30,7 +30,7 @@ struct Session {
 
 thread_local! {
     static SESSION: RefCell<Option<Session>> = const { RefCell::new(None) };
-    /// Number of recordings that were begun so far.
+    /// Number of recordings begun so far.
     static COUNT: Cell<u32> = const { Cell::new(0) };
 }
 
@@ -61,8 +61,8 @@ impl Drop for Open {
     }
 }
 
-/// Panics because an expression is used outside of its recording. The function is not inlined, to keep its callers
-/// small.
+/// Panics with the message that an expression is used outside of its recording. The function is not inlined, to keep
+/// its callers small.
 #[cold]
 #[inline(never)]
 fn outside() -> ! {
@@ -84,7 +84,7 @@ impl Expression {
         Self { session: if id <= ONE { 0 } else { session }, id }
     }
 
-    /// Records an input number, given by its index among the numbers of all arguments.
+    /// Records an input number. `place` is the number's index among the numbers of all arguments.
     pub(crate) fn input(place: u32) -> Self {
         SESSION.with_borrow_mut(|session| {
             let Some(Session { number, graph }) = session else { outside() };
@@ -135,7 +135,8 @@ impl SubAssign for Expression {
 
 impl Scalar for Expression {
     type Mask = Mask;
-    /// At least 2: an expression represents the numbers of many calls, and has no single value.
+    /// Number of lanes. It is at least 2, because an expression does not have a single value: generated code computes a
+    /// different value in each call.
     const LANES: usize = 2;
 
     #[inline(never)]

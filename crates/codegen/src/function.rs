@@ -21,7 +21,7 @@ pub struct Array {
 }
 
 impl Array {
-    /// Returns the number of numbers in the array.
+    /// Returns the length of the array: the count of its numbers.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.rows * self.columns
@@ -41,43 +41,46 @@ pub struct Function {
     pub inputs: Vec<Array>,
     /// Results.
     pub outputs: Vec<Array>,
-    /// Values that the outputs need. Each value is after the values from which it is computed.
+    /// Values that the outputs need. Each value follows the values from which it is computed.
     pub(crate) nodes: Vec<Node>,
-    /// Values of all outputs, one array after the other. A partition has only its own values.
+    /// Indices, in `nodes`, of the values of all outputs, one array after the other. A partition has only its own
+    /// results.
     pub(crate) results: Vec<Id>,
     /// For each result, its output array and its index in this array.
     pub(crate) places: Vec<(usize, usize)>,
-    /// Limb of each result, 0 for the trunk; empty if unknown. Shares divide the results by limbs (see
-    /// `partitions.rs`).
+    /// Limb of each result; 0 for the trunk. The list is empty if the limbs are unknown. Partitions divide the results
+    /// by limbs (see `partitions.rs`).
     pub(crate) limbs: Vec<usize>,
     /// Number of partitions that the settings request.
     pub(crate) partitions: Option<NonZero<usize>>,
 }
 
-/// Numbers of operations in a function, by kind.
+/// Numbers of arithmetic operations in a function, for each type of operation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
-    /// Sums and differences, except those fused with a product.
+    /// Number of sums and differences that are not fused with a product.
     pub sums: usize,
-    /// Products, except those fused with a sum.
+    /// Number of products that are not fused with a sum.
     pub products: usize,
-    /// Products fused with a sum or difference; each is one instruction if the processor has it.
+    /// Number of products fused with a sum or difference. Each is one instruction on processors with fused
+    /// multiply-add.
     pub fused: usize,
-    /// Quotients and square roots.
+    /// Number of quotients and square roots.
     pub quotients: usize,
-    /// Angles whose sine, cosine or both are computed, and angles of points (atan2).
+    /// Number of angles whose sine, cosine or both are computed, plus the number of calls of atan2.
     pub angles: usize,
-    /// Signs, absolute values, comparisons and selections.
+    /// Number of changes of sign, absolute values, comparisons and selections.
     pub others: usize,
 }
 
 impl Operations {
-    /// Returns the number of all operations, each counted once.
+    /// Returns the total number of operations. A fused product and sum counts as one operation.
     pub fn total(self) -> usize {
         self.sums + self.products + self.fused + self.quotients + self.angles + self.others
     }
 
-    /// Returns the number of additions and multiplications. A product fused with a sum counts as two.
+    /// Returns the number of floating-point operations: sums, products, quotients and square roots. A product fused
+    /// with a sum counts as two operations.
     pub fn flops(self) -> usize {
         self.sums + self.products + 2 * self.fused + self.quotients
     }
@@ -154,12 +157,12 @@ pub(crate) fn is_identifier(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
-/// Records the function that a closure computes: the closure runs once, on [`Expression`]s, and the values that its
-/// outputs need are kept.
+/// Records the function that a closure computes. The closure runs once, with [`Expression`]s as numbers. The function
+/// keeps only the values that the outputs need.
 ///
 /// The closure may call any code that is generic over [`Scalar`]: algorithms of this library, a user's own cost, and
-/// dual numbers of expressions ([`jacobian`](crate::jacobian)). It may depend on the values of its inputs only by
-/// [`Scalar::select`].
+/// dual numbers of expressions ([`jacobian`](crate::jacobian)). The closure must not branch on the values of its
+/// inputs; [`Scalar::select`] selects between two values.
 ///
 /// ```
 /// use condyle_codegen::{Language, record};
@@ -213,7 +216,7 @@ pub(crate) fn is_needed(all: &[Node], results: impl Iterator<Item = Id>) -> Vec<
     is_needed
 }
 
-/// Returns the values that the results need, in recording order, and the results as indices of these values.
+/// Returns the values that the results need, in recording order, and the indices of the results among these values.
 pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
     let is_needed = is_needed(all, results.iter().copied());
     let (mut nodes, mut new) = (Vec::new(), vec![Id::MAX; all.len()]);

@@ -7,7 +7,8 @@ use crate::text::Language;
 use condyle_model::Model;
 use std::path::{Path, PathBuf};
 
-/// Writes functions of a robot into files of a folder. The folder is created if needed. For programs and build scripts.
+/// Writes functions of a robot into files of a folder. The folder is created if it does not exist. Programs and build
+/// scripts can call this function.
 ///
 /// Names of files and functions begin with the robot's name, as an identifier, and the language's suffix
 /// ([`Language::stem`]). Examples: `panda.h` and `panda.c` with `panda_aba` and other functions, `panda_float_x8.h` and

@@ -1,8 +1,8 @@
-//! The graph of a recording. It contains each value once. Values are simplified while they are recorded.
+//! Graph of a recording. The graph contains each value once. Each value is simplified when it is recorded.
 //!
-//! A value that exists is found again, even if it is written differently: operands of sums and products are sorted, and
-//! signs are moved from products to the sum that follows. Operations on constants are computed at once, and a product
-//! with 0 is 0. (So an infinite number or NaN, times 0, is 0 here.)
+//! Two formulas for the same value often become one entry of the graph, because the graph uses a normal form. Operands
+//! of sums and products are sorted, and a minus sign moves from a product to the sum that uses the product. Operations
+//! on constants are computed during recording. A product with 0 is 0, even if the other factor is infinite or NaN.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -18,28 +18,28 @@ pub(crate) const ONE: Id = 1;
 /// Operation that computes a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {
-    /// A constant, by its bits.
+    /// Constant, stored as the bits of the `f64`.
     Constant(u64),
-    /// An input, by its index among the numbers of all arguments.
+    /// Input, stored as its index among the numbers of all arguments.
     Input(u32),
     Add(Id, Id),
     Sub(Id, Id),
     Mul(Id, Id),
     Div(Id, Id),
     Neg(Id),
-    /// −a as a separate value, whose sign is not moved.
+    /// Negated value −a whose minus sign must not move to a later operation.
     Minus(Id),
     Sqrt(Id),
     Sin(Id),
     Cos(Id),
-    /// The angle of the point (x, y), where y is the first operand and x the second.
+    /// Angle of the point (x, y). The first operand is y, the second is x.
     Atan2(Id, Id),
     Abs(Id),
-    /// The mask that is true if the first operand is less than the second.
+    /// Mask that is true if the first operand is less than the second.
     Less(Id, Id),
     And(Id, Id),
     Or(Id, Id),
-    /// The second operand where the mask holds, otherwise the third.
+    /// Second operand if the mask (first operand) is true, otherwise the third operand.
     Select(Id, Id, Id),
 }
 
@@ -105,7 +105,7 @@ impl Graph {
         graph
     }
 
-    /// Returns the value that this operation computes, and adds it if it is new.
+    /// Returns the value that this operation computes. Adds the value to the graph if it is new.
     fn find(&mut self, node: Node) -> Id {
         match self.known.entry(node) {
             Entry::Occupied(found) => *found.get(),
@@ -166,7 +166,7 @@ impl Graph {
         }
     }
 
-    /// Returns a value without its minus sign, and whether it had one.
+    /// Returns a value without its minus sign, and whether the value had a minus sign.
     fn unsigned(&mut self, a: Id) -> (Id, bool) {
         match (self.negated(a), self.value(a)) {
             (Some(x), _) => (x, true),
@@ -187,7 +187,7 @@ impl Graph {
         }
     }
 
-    /// Returns a value whose minus sign is not moved out of products.
+    /// Returns an equal value whose minus sign must not move to a later operation.
     pub(crate) fn kept(&mut self, a: Id) -> Id {
         self.negated(a).map_or(a, |x| self.find(Node::Minus(x)))
     }
@@ -286,7 +286,7 @@ impl Graph {
         }
     }
 
-    /// Returns a times the constant x. The index of x is c.
+    /// Returns the product of the value a and the constant x, whose index in the graph is c.
     fn scale(&mut self, x: f64, c: Id, a: Id) -> Id {
         if c == ONE {
             return a;

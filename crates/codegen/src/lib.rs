@@ -12,11 +12,11 @@
 //! # Ok::<(), condyle_codegen::Error>(())
 //! ```
 //!
-//! [`record`] runs any closure that is generic over the scalar on [`Expression`]s. They leave a graph in which
-//! constants are folded, zeros are removed, and each value is computed once. [`functions`] records the algorithms for a
-//! robot, [`Language`] writes the graph as C, Rust or CUDA, and [`generate`] writes files. Values that do not depend on
-//! the robot's position are not computed at run time. The code has no branches and allocates no memory. It has loops
-//! only for entries of a result with the same structure.
+//! [`record`] runs any closure that is generic over the scalar on [`Expression`]s. The operations on these expressions
+//! form a graph, in which constants are folded, zeros are removed, and each value is computed once. [`functions`]
+//! records the algorithms for a robot, [`Language`] writes the graph as C, Rust or CUDA, and [`generate`] writes files.
+//! Values that depend only on constants of the robot are computed during the recording, not at run time. The code has
+//! no branches and allocates no memory. It has loops only for entries of a result with the same structure.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![allow(non_snake_case)]
 

@@ -5,7 +5,7 @@ use crate::step::Step;
 use crate::steps::Steps;
 use std::collections::BTreeSet;
 
-/// Number of a processor's registers. In a good order, not more than this number of values are needed at the same time.
+/// Number of a processor's registers. In a good order, at most this number of values is needed at the same time.
 const REGISTERS: usize = 16;
 
 /// Applies the better of two orders: the order of the recording, or an order in which each value is computed
@@ -17,7 +17,8 @@ pub(crate) fn order(steps: &mut Steps) {
     steps.all = best.into_iter().map(|k| steps.all[k].clone()).collect();
 }
 
-/// Returns the order in which each step is taken when a result first needs it, for one result after the other.
+/// Returns an order of the steps: for one result after the other, the steps that this result needs and no earlier
+/// result needed.
 fn on_demand(steps: &Steps) -> Vec<usize> {
     let mut order = Vec::with_capacity(steps.all.len());
     let mut taken = vec![false; steps.all.len()];
@@ -38,7 +39,7 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
                 continue;
             }
             stack.push((k, true));
-            // The step that needs the most registers comes first: it is on top of the stack.
+            // Compute the operand that needs the most registers first: its step is pushed last onto the stack.
             let mut before: Vec<usize> = steps.all[k].takes().map(|id| maker[id as usize]).collect();
             before.retain(|&j| j != usize::MAX);
             before.sort_by_key(|&j| (weight[j], j));
@@ -48,8 +49,9 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
     order
 }
 
-/// Returns the number of registers that each step and all steps before it need, if no values were shared (Sethi and
-/// Ullman, *The generation of optimal code for arithmetic expressions*, 1970).
+/// Returns, for each step, the number of registers needed to compute the step and all its operands. This number assumes
+/// that no two steps share an operand (Sethi and Ullman, *The generation of optimal code for arithmetic expressions*,
+/// 1970).
 fn weights(steps: &Steps, maker: &[usize]) -> Vec<u32> {
     let mut weight: Vec<u32> = Vec::with_capacity(steps.all.len());
     for step in &steps.all {
@@ -61,13 +63,14 @@ fn weights(steps: &Steps, maker: &[usize]) -> Vec<u32> {
     weight
 }
 
-/// Returns the number of transfers between registers and memory in this order. The value that moves to memory is always
-/// the one whose next use is last (Belady, *A study of replacement algorithms for a virtual-storage computer*, 1966).
+/// Returns the number of transfers between registers and memory in this order. If all registers are full, the value
+/// whose next use is latest moves to memory (Belady, *A study of replacement algorithms for a virtual-storage
+/// computer*, 1966).
 fn transfers(steps: &Steps, order: &[usize]) -> usize {
     let never = order.len();
     let mut uses: Vec<Vec<usize>> = vec![Vec::new(); steps.values];
     for (time, &k) in order.iter().enumerate().rev() {
-        steps.all[k].takes().for_each(|id| uses[id as usize].push(time)); // the next use is last in the list
+        steps.all[k].takes().for_each(|id| uses[id as usize].push(time)); // the last entry is the next use
     }
     let mut is_free = vec![true; steps.values]; // inputs and constants are in memory anyway, so moving them is free
     steps.all.iter().flat_map(Step::makes).for_each(|id| is_free[id as usize] = false);

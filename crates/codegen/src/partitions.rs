@@ -3,28 +3,28 @@
 //!
 //! Results are divided by limbs. A limb is a subtree without forks that is attached to a body with several children, or
 //! to the world. The bodies that carry limbs are the trunk. In matrices a limb owns the columns of its coordinates, and
-//! in vectors the entries of its coordinates; the trunk owns the rest. A value that is stored at several indices, as in
-//! a symmetric matrix, is computed once. It belongs to the limb of the first such index. Only if the trunk owns all of
-//! these indices does the value belong to the trunk.
+//! in vectors the entries of its coordinates; the trunk owns the rest. A value can be stored at several indices, for
+//! example in a symmetric matrix. Such a value is computed once, and belongs to the limb that owns the first of these
+//! indices. The value belongs to the trunk only if the trunk owns all of these indices.
 //!
-//! A partition is a function like any other: the original function without the results of the other partitions, and
-//! without the values that only these results need. So threads neither wait for each other nor share memory. Values
-//! that several partitions need, such as values along the trunk, are computed by each of these partitions. The size of
-//! this common part determines the value of a split. With few states, the GPU is not full, and a call takes as long as
-//! the largest share. With many states, a call takes as long as all partitions together:
+//! Each partition is itself a function: the original function without the results of the other partitions, and without
+//! the values that only those results need. So threads neither wait for each other nor share memory. A value that
+//! several partitions need, such as a value of the trunk, is computed by each of these partitions. The number of such
+//! values determines whether a split saves time. With few states, some threads of the GPU are idle, and a call takes as
+//! long as the largest partition. With many states, a call takes as long as all partitions together:
 //!
 //! ```text
 //! gain = whole / largest partition      loss = sum of partitions / whole      worth = gain / loss      in operations
 //! ```
 //!
 //! The search begins with a partition for each limb, and repeatedly merges the two partitions whose union gives the
-//! greatest worth. The best of all these splits is used; the last split is the whole function. For efforts and
-//! accelerations the whole function is best, since the trunk needs the values of all limbs. For derivatives, most limbs
-//! have their own partition.
+//! greatest worth (gain / loss). The best of all splits in this sequence is used. The last of them is the whole
+//! function. For efforts and accelerations the whole function is best, since the trunk needs the values of all limbs.
+//! For derivatives, most limbs have their own partition.
 //!
 //! All partitions together cost more than the whole function. So a kernel contains both the whole function and its
-//! partitions, and each launch selects one of these forms. States are split as long as all threads fit on the device at
-//! the same time.
+//! partitions, and each launch selects one of these forms. A launch uses the partitions if the threads of all
+//! partitions and states fit on the device at the same time.
 
 use crate::function::{Function, is_needed, needed};
 use crate::graph::{Id, Node};
@@ -33,11 +33,11 @@ use condyle_model::Model;
 use core::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap};
 
-/// Number of a thread's registers that can hold values, of 32 bits each.
+/// Maximum number of registers, of 32 bits each, in which a thread can hold values.
 const REGISTERS: usize = 255;
 
-/// Returns the limb of each result of a robot's function. It is 0, the trunk, for a result that is neither a column nor
-/// an entry of a limb's coordinate.
+/// Returns the limb of each result of a robot's function. A result belongs to the trunk (0) if no limb owns its column
+/// or its entry.
 pub(crate) fn limbs_of_results(model: &Model, function: &Function) -> Vec<usize> {
     let of_coordinate = limbs(model);
     let own = |&(array, place): &(usize, usize)| {
@@ -67,7 +67,7 @@ fn limbs(model: &Model) -> Vec<usize> {
     let nodes = model.nodes();
     let mut children = vec![0; nodes.len()];
     nodes.iter().skip(1).for_each(|node| children[node.parent] += 1);
-    // The trunk consists of the bodies from the forks to the world.
+    // The trunk consists of the bodies with several children, and of all bodies between these and the world.
     let mut bears_limbs: Vec<bool> = children.iter().map(|&n| n > 1).collect();
     for i in (1..nodes.len()).rev() {
         bears_limbs[nodes[i].parent] |= bears_limbs[i];
@@ -84,7 +84,7 @@ fn limbs(model: &Model) -> Vec<usize> {
     of_coordinate
 }
 
-/// One or several limbs, and the operations that their results need.
+/// Set of limbs, and the operations that the results of these limbs need.
 #[derive(Clone)]
 struct Partition {
     limbs: Vec<usize>,
@@ -112,7 +112,7 @@ impl Partition {
     }
 }
 
-/// Returns whether a value needs an operation; a change of sign does not count.
+/// Returns whether an operation computes the value. A change of sign does not count as an operation.
 fn is_operation(node: Node) -> bool {
     !matches!(node, Node::Constant(_) | Node::Input(_) | Node::Neg(_) | Node::Minus(_))
 }

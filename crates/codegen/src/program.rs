@@ -1,5 +1,5 @@
-//! A function as a program. Its ordered steps are cut into parts of bounded size; values shared between parts are
-//! stored.
+//! Program of a function: the function's ordered steps, cut into parts of bounded size. Values that several parts use
+//! are stored in an array, the work space.
 
 use crate::function::Function;
 use crate::graph::Id;
@@ -9,19 +9,19 @@ use crate::steps::Steps;
 use core::iter::successors;
 use core::ops::Range;
 
-/// Maximum number of steps in a part. With twice as many steps, the time of compilers more than doubles.
+/// Maximum number of steps in a part. If this number is doubled, compilers need more than twice the time.
 const LONGEST: usize = 2000;
 /// Minimum number of steps in a part. The last part may be shorter.
 const SHORTEST: usize = 1000;
 
-/// Storage of a value: how the code keeps the value.
+/// Storage of a value in the generated code.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Place {
-    /// An input or a constant.
+    /// Input or constant, which needs no storage.
     Given,
-    /// A variable of the only part that computes and uses it.
+    /// Local variable. One part computes the value, and no other part uses it.
     Local,
-    /// A number in the work space. In the part that computes the number, it is also a variable.
+    /// Slot of the work space, given by its index. In the part that computes the value, it is also a variable.
     Work(usize),
 }
 
@@ -30,16 +30,17 @@ pub(crate) enum Place {
 pub(crate) struct Program<'f> {
     pub function: &'f Function,
     pub steps: Steps<'f>,
-    /// Steps of each part.
+    /// Range of the steps of each part.
     pub parts: Vec<Range<usize>>,
-    /// Index of the part that computes each value; `usize::MAX` if no part does.
+    /// Index of the part that computes each value; `usize::MAX` if no part computes the value.
     pub part_of: Vec<usize>,
     pub places: Vec<Place>,
     /// Whether any step uses each value.
     pub taken: Vec<bool>,
     /// Maximum number of values that are needed at the same time.
     pub most_alive: usize,
-    /// Size of the work space. It holds the sines of all early angles, then their cosines, then other numbers.
+    /// Size of the work space, the array for intermediate values. It holds the sines of all early angles, then the
+    /// cosines, then other values.
     pub work: usize,
 }
 
@@ -60,7 +61,7 @@ impl<'f> Program<'f> {
         Self { function, steps, parts, part_of, places, taken, most_alive, work }
     }
 
-    /// Returns the early angles: their sines and cosines are computed before all steps.
+    /// Returns the early angles, whose sines and cosines are computed before all steps.
     pub(crate) fn angles(&self) -> &[Angle] {
         &self.steps.angles
     }
@@ -111,7 +112,8 @@ fn cut(alive: &[usize]) -> Vec<Range<usize>> {
     parts
 }
 
-/// Returns the values from which loops compute entries. Each value directly follows the value of the previous entry.
+/// Returns the values from which loops compute entries, in the order in which the work space stores the values. The
+/// values that a loop reads one after the other are adjacent.
 fn side_by_side(steps: &Steps) -> Vec<Id> {
     let (mut next, mut is_first) = (vec![None; steps.values], vec![true; steps.values]);
     let mut all = Vec::new();
@@ -134,7 +136,7 @@ fn side_by_side(steps: &Steps) -> Vec<Id> {
     placed
 }
 
-/// Returns the places where all values are stored, and the size of the work space.
+/// Returns the storage of each value, and the size of the work space.
 fn place(steps: &Steps, parts: &[Range<usize>], part_of: &[usize]) -> (Vec<Place>, usize) {
     let mut places = vec![Place::Given; steps.values];
     let n = steps.angles.len();

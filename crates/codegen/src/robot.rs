@@ -37,7 +37,7 @@ pub const FUNCTIONS: [&str; 16] = [
     "impulse_dynamics_derivatives",
 ];
 
-/// Names of the functions that need M⁻¹.
+/// Names of the functions that need the inverse of the joint-space inertia matrix M.
 const INVERTING: [&str; 8] = [
     "aba",
     "minv",
@@ -120,7 +120,7 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
             match name {
                 _ if is_constrained => return robot.constrained(r, name),
                 "frames" => robot.frames(r, &frames),
-                // Keep the world's frame here: in second derivatives of accelerations, M⁻¹ amplifies the rounding
+                // Keep the world's frame here: in second derivatives of accelerations, M⁻¹ would amplify the rounding
                 // errors of another frame beyond the tolerance of the tests.
                 "centroidal" | "aba_hessian" => robot.unconstrained(r, name),
                 _ => {
@@ -172,7 +172,7 @@ fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&Matrix<Expression>; 4], last: &
     r.matrix(&format!("d{last}dq"), xq, &format!("derivative by {last} (rows) and q (columns)"));
 }
 
-/// A robot whose constants are expressions, and the inputs that all functions of the robot have.
+/// Robot whose constants are expressions, and the inputs that all functions of the robot have.
 struct Robot<'s> {
     model: Model<Expression>,
     data: Data<Expression>,
@@ -204,11 +204,11 @@ impl<'s> Robot<'s> {
         Ok(Self { data: Data::new(&model), model, settings, q })
     }
 
-    /// Replaces the world's frame by the frame that the first body has in its neutral position. The dynamics of the
-    /// joints are the same there, if gravity is rotated accordingly. The position of the first joint cancels from all
-    /// other results.
+    /// Computes the dynamics in a frame that moves with the first joint: replaces the position of this joint by the
+    /// neutral position, and rotates gravity accordingly. The joint dynamics are the same in this frame. Except for the
+    /// rotation of gravity, no result depends on the position of the first joint.
     ///
-    /// Nothing changes if the world carries several bodies, or if another joint follows the first one.
+    /// The function changes nothing if the world carries several bodies, or if another joint follows the first one.
     fn in_frame_of_first_body(&mut self) -> Result<(), Error> {
         let Self { model, data, q, .. } = self;
         let [_, first, others @ ..] = model.nodes() else { return Ok(()) };
@@ -232,7 +232,7 @@ impl<'s> Robot<'s> {
         self.input(r, "v", "velocity")
     }
 
-    /// Returns the external forces; none if they are not arguments.
+    /// Returns the external forces on the bodies. The list is empty if external forces are not an argument.
     fn forces(&self, r: &mut Recorder) -> Vec<Force<Expression>> {
         if !self.settings.external_forces {
             return Vec::new();

@@ -5,15 +5,15 @@ use crate::graph::{Id, Node};
 /// Step of a function.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Step {
-    /// A value, computed by the operation of the graph.
+    /// Computation of a value by one operation of the graph.
     Plain(Id, Node),
-    /// a b + c.
+    /// Computation of a b + c. The array holds the operands a, b and c, in this order.
     MulAdd(Id, [Id; 3]),
-    /// a b − c.
+    /// Computation of a b − c. The array holds the operands a, b and c, in this order.
     MulSub(Id, [Id; 3]),
-    /// c − a b.
+    /// Computation of c − a b. The array holds the operands a, b and c, in this order.
     SubMul(Id, [Id; 3]),
-    /// The sine and the cosine of an angle.
+    /// Computation of the sine and the cosine of an angle.
     SinCos(Angle),
     /// A loop that computes several entries.
     Entries(Entries),
@@ -47,7 +47,7 @@ impl Step {
     }
 }
 
-/// An angle, with its sine and its cosine if they are needed.
+/// Angle, with the values of its sine and its cosine if a step needs them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Angle {
     pub angle: Id,
@@ -55,14 +55,14 @@ pub(crate) struct Angle {
     pub cos: Option<Id>,
 }
 
-/// Sums Σ ± `each`ₖ · `common` over the terms, one sum for each k.
+/// Loop over an index k. For each k, the loop computes the sum Σ ± `each`ₖ · `common` over all terms.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entries {
-    /// The sums. No other value uses them.
+    /// Computed sums. No step uses these values.
     pub ids: Vec<Id>,
-    /// Index of the first sum among all results. The other sums follow directly.
+    /// Index of the first sum among all results. The other sums are the results that follow directly.
     pub first: usize,
-    /// Terms of each sum. The first term is added, not subtracted.
+    /// Terms of the sums. The first term is added, not subtracted.
     pub terms: Vec<Term>,
 }
 
@@ -71,8 +71,8 @@ pub(crate) struct Entries {
 pub(crate) struct Term {
     /// Whether the term is subtracted.
     pub minus: bool,
-    /// Value of the term in each sum. These values are adjacent in the work space.
+    /// Individual factor of the term in each sum. These factors are adjacent in the work space.
     pub each: Vec<Id>,
-    /// Common factor of the term in all sums. The first term may have no common factor.
+    /// Factor of the term that all sums have in common. The first term may lack a common factor.
     pub common: Option<Id>,
 }

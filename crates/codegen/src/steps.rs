@@ -15,13 +15,15 @@ pub(crate) struct Steps<'f> {
     /// Number of values.
     pub values: usize,
     pub all: Vec<Step>,
-    /// Early angles, such as joint angles. A loop computes their sines and cosines before all other steps.
+    /// Early angles: angles whose sines and cosines a loop computes before all other steps. An example is a joint
+    /// angle.
     pub angles: Vec<Angle>,
     /// Values of all outputs.
     pub results: &'f [Id],
 }
 
-/// Maximum number of operations that compute an early angle.
+/// Maximum number of operations that compute an early angle from inputs. (The sine and cosine of an early angle are
+/// computed before all other steps.)
 const AT_ONCE: usize = 4;
 
 /// Returns the number of operations that compute a value from inputs and constants. Returns `None` if the number
@@ -57,7 +59,7 @@ impl<'f> Steps<'f> {
                 *half = Some(id as Id);
             }
         }
-        // Sine and cosine are computed where the first of them was recorded.
+        // Compute the sine and cosine of an angle in one step, at the index where the first of the two was recorded.
         all.retain_mut(|step| match *step {
             Step::Plain(_, Node::Sin(angle) | Node::Cos(angle)) => match halves.remove(&angle) {
                 Some(both) => {
@@ -97,7 +99,7 @@ impl<'f> Steps<'f> {
         self.all.retain(|_| kept.next() == Some(true));
     }
 
-    /// Returns the numbers of operations of all steps.
+    /// Returns the number of operations of all steps together, for each type of operation.
     pub(crate) fn operations(&self) -> Operations {
         let mut n = Operations { angles: self.angles.len(), ..Operations::default() };
         for step in &self.all {
@@ -119,7 +121,7 @@ impl<'f> Steps<'f> {
 }
 
 impl Function {
-    /// Returns the numbers of operations of the function, by kind.
+    /// Returns the number of operations of the function, for each type of operation.
     ///
     /// ```
     /// use condyle_codegen::record;

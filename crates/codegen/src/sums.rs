@@ -1,9 +1,9 @@
-//! Sums of products: steps that compute a sum of any length, and products that are fused into the sum.
+//! Steps that compute sums of any length, with products fused into the sums.
 //!
-//! If only one other sum needs a sum, it becomes part of that sum. So a sum is a list of terms; each term is a value or
-//! a product of two values. A product is fused with the addition that follows it. So a sum that begins with a value
-//! takes one step for each other term, wherever the brackets are; x − (a b + c d) takes two steps. Terms are added in
-//! recording order, as soon as they are available.
+//! If a sum is used only once, as an operand of a larger sum, its terms become terms of the larger sum. So a sum is a
+//! list of terms; each term is a value or a product of two values. A product is fused with the addition that follows
+//! it. So a sum that begins with a value takes one step for each other term, independent of brackets. For example, x −
+//! (a b + c d) takes two steps. Terms are added in recording order, as soon as they are available.
 
 use crate::graph::{Graph, Id, Node};
 use crate::step::Step;
@@ -51,7 +51,7 @@ pub(crate) struct Sums<'f> {
     uses: Vec<u32>,
     /// Number of uses of each value by sums.
     by_sums: Vec<u32>,
-    /// Whether each product has its own step.
+    /// Whether each value has a step of its own if it is a product.
     has_step: Vec<bool>,
 }
 
@@ -69,13 +69,15 @@ impl<'f> Sums<'f> {
         Self { nodes, uses, by_sums, has_step }
     }
 
-    /// Returns whether a value is a sum that only one other sum uses, so that it becomes part of that sum.
+    /// Returns whether a value is a sum that is used only once, in a larger sum. The terms of such a sum become terms
+    /// of the larger sum.
     fn is_part(&self, id: Id) -> bool {
         let id = id as usize;
         is_sum(self.nodes[id]) && self.uses[id] == 1 && self.by_sums[id] == 1
     }
 
-    /// Returns whether a value is a product that is used only in sums, so that it has no step of its own.
+    /// Returns whether a value is a product that is fused into the sums that use it. Such a product has no step of its
+    /// own.
     fn is_fused(&self, id: Id) -> bool {
         matches!(self.nodes[id as usize], Node::Mul(..)) && !self.has_step[id as usize]
     }
@@ -129,7 +131,7 @@ impl<'f> Sums<'f> {
     /// Adds the steps of a sum. Partial results get the ids of the smaller sums that became parts of it.
     fn sum(&mut self, root: Id, steps: &mut Vec<(Id, Step)>) {
         let (mut terms, parts) = self.terms(root);
-        // Begin with a value. If all terms are products, begin with one that is used only here, otherwise with any
+        // Begin with a value. If all terms are products, begin with a product that only this sum uses, or else with any
         // product.
         let is_single = |term: &Term| self.uses[term.id as usize] == 1;
         let first = terms.iter().position(|term| !self.is_fused(term.id));

@@ -23,13 +23,15 @@ use std::process::Command;
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use trees::Tree;
 
-/// Tolerance for sums in another order, whose rounding errors M⁻¹ amplifies; relative to the largest number.
+/// Tolerance, relative to the largest number of an array. A kernel adds in another order than the library, and M⁻¹
+/// amplifies the rounding errors.
 const ROUNDING: f64 = 1e-11;
 
-/// Maximum error of an `f32` kernel relative to `f64`, as a multiple of the library's `f32` error for the same states.
+/// Maximum error of an `f32` kernel, divided by the error of the library in `f32` for the same states. Both errors are
+/// differences from `f64` results.
 const FURTHER: f64 = 4.0;
 
-/// The fake driver and the fake compiler, with access to the records that the fake driver keeps.
+/// Fake driver and fake compiler, with access to the calls and objects that the fake driver records.
 struct Fake {
     driver: Driver,
     compiler: Compiler,
@@ -38,7 +40,7 @@ struct Fake {
 }
 
 impl Fake {
-    /// Builds the libraries once, and loads them for one test at a time. Returns `None` if no compiler exists.
+    /// Builds the fake libraries once, and loads them for one test at a time. Returns `None` if no C compiler exists.
     fn new() -> Option<Self> {
         static FILES: OnceLock<Option<[PathBuf; 2]>> = OnceLock::new();
         static ALONE: Mutex<()> = Mutex::new(());
@@ -66,24 +68,24 @@ impl Fake {
 
     /// Returns the numbers of memory blocks, streams, events, modules and contexts that exist now.
     fn live(&self) -> [c_long; 5] {
-        // SAFETY: the type is the type of the function in the fake driver.
+        // SAFETY: the declared type equals the function's type in the fake driver.
         let live = unsafe { self.library.get::<unsafe extern "C" fn(c_int) -> c_long>(b"fake_live\0") }.unwrap();
-        // SAFETY: the function takes a kind from 0 to 4.
+        // SAFETY: the function accepts the indices 0 to 4 of object types.
         core::array::from_fn(|kind| unsafe { live(kind as c_int) })
     }
 
     fn complaint(&self) -> String {
-        // SAFETY: the type is the type of the function in the fake driver, and the function returns a string.
+        // SAFETY: the declared type equals the function's type in the fake driver, and the function returns a string.
         unsafe {
             let complaint = self.library.get::<unsafe extern "C" fn() -> *const c_char>(b"fake_complaint\0").unwrap();
             CStr::from_ptr(complaint()).to_string_lossy().into_owned()
         }
     }
 
-    /// Makes the next call of a function return this status.
+    /// Makes the next call of `function` in the fake driver return `status`.
     fn fail(&self, function: &str, status: c_int) {
         let name = CString::new(function).unwrap();
-        // SAFETY: the type is the type of the function in the fake driver.
+        // SAFETY: the declared type equals the function's type in the fake driver.
         unsafe {
             let fail = self.library.get::<unsafe extern "C" fn(*const c_char, c_int)>(b"fake_fail\0").unwrap();
             fail(name.as_ptr(), status);
@@ -94,7 +96,7 @@ impl Fake {
     /// launches.
     fn launches(&self) -> ([c_uint; 3], c_long) {
         let mut last = [0; 3];
-        // SAFETY: the type is the type of the function in the fake driver.
+        // SAFETY: the declared type equals the function's type in the fake driver.
         unsafe {
             let launches = self.library.get::<unsafe extern "C" fn(*mut c_uint) -> c_long>(b"fake_launches\0").unwrap();
             let count = launches(last.as_mut_ptr());
@@ -109,7 +111,7 @@ impl Fake {
     }
 }
 
-/// Computes the function's results with the library.
+/// Computes the results of a function with the library, as reference for the kernel.
 fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec<Vec<S>> {
     let data = &mut Data::new(model);
     match name {
@@ -130,7 +132,8 @@ fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec
     }
 }
 
-/// Returns the arrays of all states in the layout of kernels: the first numbers of all states come first.
+/// Returns the arrays of all states in the layout of kernels: the first number of every state, then the second number
+/// of every state, and so on.
 fn side_by_side<T: Copy>(states: &[Vec<Vec<T>>]) -> Vec<Vec<T>> {
     let of = |a: usize, k: usize| states.iter().map(move |state| state[a][k]);
     (0..states[0].len()).map(|a| (0..states[0][a].len()).flat_map(|k| of(a, k)).collect()).collect()
@@ -152,7 +155,7 @@ impl Number for f32 {
     }
 }
 
-/// Calls a kernel for each of these numbers of states, and compares all results with the library.
+/// Calls a kernel once for each number of states in `counts`, and compares all results with the library.
 fn check<T: Number>(device: &Device, kernels: &Kernels<T>, model: &Model, name: &str, counts: &[usize]) {
     let (stream, kernel) = (device.stream().unwrap(), kernels.kernel(name).unwrap());
     for &n in counts {
@@ -213,7 +216,7 @@ fn kernels_compute_what_the_library_computes() {
     fake.end();
 }
 
-/// Returns functions whose kernels have this number of partitions, or fewer if there are not enough limbs.
+/// Returns functions whose kernels have `partitions` partitions, or fewer if the robot does not have enough limbs.
 fn in_partitions(model: &Model, names: &[&str], partitions: usize) -> Vec<Function> {
     functions(model, names, &Settings { partitions: NonZero::new(partitions), ..Settings::default() }).unwrap()
 }
@@ -249,7 +252,7 @@ fn states_are_shared_out_while_they_are_few() {
     let kernels = device.compile::<f64>(&fake.compiler, "quadruped", &of(&quadruped, &["rnea_derivatives"])).unwrap();
     let partitions = kernels.kernel("rnea_derivatives").unwrap().partitions();
     assert_eq!(partitions, of(&quadruped, &["rnea_derivatives"])[0].partitions(Language::Cuda));
-    // The device runs eight blocks of 256 threads at the same time.
+    // The fake device runs eight blocks of 256 threads at the same time.
     let most = 2048 / partitions;
     for (n, rows) in [(1, partitions), (most, partitions), (most + 1, 1), (3000, 1)] {
         check(&device, &kernels, &quadruped, "rnea_derivatives", &[n]);
@@ -265,7 +268,8 @@ fn shares_are_as_many_as_pay() {
         let function = &of(model, &[name])[0];
         [Language::Cuda, Language::CudaFloat, Language::C, Language::Rust].map(|language| function.partitions(language))
     };
-    // An arm has one limb. For efforts of the trunk and for all accelerations, every limb must be computed.
+    // These functions are not split. An arm has only one limb. In the other robots, efforts of the trunk and all
+    // accelerations need the values of all limbs.
     assert_eq!(partitions(&robots::arm7(), "aba_derivatives"), [1; 4]);
     for model in [robots::quadruped(), robots::humanoid()] {
         for name in ["rnea", "aba", "gravity", "nonlinear_effects"] {
@@ -276,7 +280,7 @@ fn shares_are_as_many_as_pay() {
             assert!(double > 2 && single > 2 && others == [1; 2], "{name}: {double}, {single}, {others:?}");
         }
     }
-    // Two arms that are attached to the world have no common values.
+    // Two arms that are attached to the world have no common values, so each arm is one partition.
     let arm = robots::arm7();
     let two = &of(&arm.append(0, Se3::identity(), &arm, "other_").unwrap(), &["aba_derivatives"])[0];
     let text = Language::Cuda.text("robot", core::slice::from_ref(two)).remove(0).text;
@@ -310,12 +314,12 @@ fn a_split_kernel_says_how_it_is_launched() {
     assert_eq!(split, text(3), "the same functions give the same text");
     let whole = text(1);
     assert!(!whole.contains("hare") && !whole.contains("blockIdx.y"));
-    // Without a requested number, the launch decides whether states are split.
+    // Without a requested number, the launch selects the whole function or the partitions.
     let as_pays = Language::CudaFloat.text("robot", &of(&quadruped, &["rnea_derivatives"])).remove(0).text;
     assert!(as_pays.contains("if (gridDim.y == 1) return robot_float_rnea_derivatives_whole(n, i, q, v, a, "));
 }
 
-/// If a launch has fewer rows of blocks than partitions, all partitions are computed nevertheless.
+/// Checks that all partitions are computed even if a launch has fewer rows of blocks than partitions.
 #[test]
 fn shares_without_a_row_of_their_own_are_not_left_out() {
     let Some(fake) = Fake::new() else { return };
@@ -333,7 +337,8 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
         let (mut from, mut to) = (q.as_ptr(), M.as_mut_ptr());
         let mut parameters = [(&raw mut n).cast(), (&raw mut from).cast(), (&raw mut to).cast()];
         for row in 0..rows {
-            // SAFETY: the type is the type of the function, and the arrays have the lengths that it reads and writes.
+            // SAFETY: the declared type equals the function's type, and the arrays have the lengths that the function
+            // reads and writes.
             unsafe {
                 let thread = library.get::<Thread>(b"fake_thread_robot_crba\0").unwrap();
                 thread(parameters.as_mut_ptr(), [1, rows].as_ptr(), [0, row].as_ptr(), 0, 1);
@@ -346,7 +351,7 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
     fake.end();
 }
 
-/// Tests trees with every kind of joint, and with joints that follow other joints.
+/// Compares partitioned kernels with the library for random trees with every type of joint and with mimic joints.
 #[test]
 fn trees_of_any_form_are_shared_out() {
     let Some(fake) = Fake::new() else { return };
@@ -377,12 +382,13 @@ fn blocks_keep_every_multiprocessor_busy() {
     let Some(fake) = Fake::new() else { return };
     let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["rnea"])).unwrap();
-    // The device has four multiprocessors, and at most 256 threads in a block.
+    // The fake device has four multiprocessors, and at most 256 threads per block.
     for (n, [blocks, threads]) in [(1, [1, 32]), (100, [4, 32]), (129, [3, 64]), (1024, [4, 256]), (3000, [12, 256])] {
         check(&device, &kernels, &arm, "rnea", &[n]);
         assert_eq!(fake.launches().0, [blocks, threads, 1], "{n} states");
     }
-    // Rows of blocks also occupy multiprocessors.
+    // With partitions, a launch has several rows of blocks. Each row occupies multiprocessors, so the blocks are
+    // larger.
     let quadruped = robots::quadruped();
     let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_partitions(&quadruped, &["rnea"], 4)).unwrap();
     for (n, [blocks, threads]) in [(1, [1, 32]), (30, [1, 32]), (100, [1, 128]), (129, [1, 160]), (3000, [12, 256])] {
@@ -556,7 +562,7 @@ fn several_threads_may_call_at_a_time() {
     fake.end();
 }
 
-/// Compiles with NVIDIA's own compiler, if it is installed. This compiler needs no GPU.
+/// Checks that NVIDIA's own compiler accepts the generated code, if this compiler is installed. Compiling needs no GPU.
 #[test]
 fn nvidias_compiler_takes_the_code() {
     let Ok(compiler) = Compiler::new() else {

@@ -1,4 +1,4 @@
-//! Tests the recorded forms of algorithms on plain numbers.
+//! Tests, with plain numbers, the algorithms that are otherwise used only for recording.
 #![allow(non_snake_case)] // matrices are named M and X
 
 use condyle_codegen::{Branches, Carried, JointPlacement};
@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 /// Tolerance for the rounding errors of several dozen products of numbers of size 1.
 const ROUNDING: f64 = 1e-13;
 
-/// Tests two trees at once: a trunk of two indices with three branches, one of which branches again, and a single
-/// index.
+/// Checks solutions and the inverse for a factor of two trees. In the first tree, a trunk of two indices carries three
+/// branches, and one of these branches forks again. The second tree is a single index.
 #[test]
 fn solutions_and_inverse_are_those_of_the_factor() {
     let tree = [None, Some(0), Some(1), Some(2), Some(1), Some(4), Some(5), Some(5), Some(0), None];
@@ -45,7 +45,7 @@ fn is_equal(a: Force<f64>, b: Force<f64>) -> bool {
     a.to_array().iter().zip(b.to_array()).all(|(a, b)| (a - b).abs() < FEW)
 }
 
-/// The short form of a rotation about z must give the same results as a general pose.
+/// Checks that the short form of a rotation about z gives the same results as a general pose.
 #[test]
 fn about_z_is_a_pose() {
     let (sin, cos) = 0.7_f64.sin_cos();

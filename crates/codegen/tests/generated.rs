@@ -21,7 +21,7 @@ use rand::{RngExt, SeedableRng};
 use std::process::Command;
 use trees::Tree;
 
-/// Tolerance for sums in another order. Recorded code and the library's lanes have different rounding errors.
+/// Tolerance for rounding errors. Recorded code adds in another order than the library, which computes in SIMD lanes.
 const ROUNDING: f64 = 1e-12;
 
 /// Coefficient of restitution in impacts.
@@ -48,7 +48,7 @@ fn all_robots() -> [(&'static str, Model, Settings); 3] {
     [("arm", arm, a), ("quadruped", quadruped, q), ("humanoid", humanoid, h)]
 }
 
-/// Returns q, v, numbers that serve as a or τ, and numbers that serve as λ.
+/// Returns random q and v, random numbers that serve as a or τ, and random numbers that serve as λ.
 fn state(model: &Model, rng: &mut StdRng) -> [Vec<f64>; 4] {
     let mut numbers = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
     let [v, x, lambda] = [(); 3].map(|()| numbers(model.nv()));
@@ -60,7 +60,7 @@ fn matrix(m: &DenseMatrix<f64, impl Dense<f64>>) -> Vec<f64> {
     m.as_slice().to_vec()
 }
 
-/// Computes the function's results with the library.
+/// Computes the results of a function with the library, as reference for the generated code.
 fn expected(
     model: &Model,
     settings: &Settings,
@@ -148,7 +148,7 @@ fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
     }
 }
 
-/// Returns whether the test may run compilers for several minutes: only `./test full` does.
+/// Returns whether the test may run compilers for several minutes. Only `./test full` permits this.
 fn is_full() -> bool {
     std::env::var_os("CONDYLE_FULL").is_some()
 }
@@ -197,7 +197,7 @@ fn what_is_recorded_is_what_the_library_computes() {
     );
 }
 
-/// Tests trees with every kind of joint, and with joints that follow other joints.
+/// Compares recorded functions with the library for random trees with every type of joint and with mimic joints.
 #[test]
 fn random_robots() {
     for seed in 0..4 {
@@ -274,7 +274,7 @@ fn rust_computes_what_the_library_does() {
     });
 }
 
-/// In vectors of four and eight states, each state gets the same results as in a single call.
+/// Checks that each state in a vector of four or eight states gets the same results as in a single call.
 #[test]
 fn vectors_compute_what_the_library_does() {
     if !is_there("cc") {
@@ -348,7 +348,8 @@ fn floats_are_near() {
     }
 }
 
-/// One folder can contain the files of all languages for one robot, and one program can contain all C functions.
+/// Checks that one folder can contain a robot's files of all languages, and that one program can contain all C
+/// functions.
 #[test]
 fn languages_share_a_folder_and_a_program() {
     let arm = robots::arm7();
@@ -382,7 +383,7 @@ fn languages_share_a_folder_and_a_program() {
     assert_eq!(said, format!("{second:.3}\n").repeat(6));
 }
 
-/// For a robot without joints, functions have arrays without numbers. Compilers must report nothing.
+/// Checks a robot without joints, whose functions have arrays of length 0. Compilers must print no warning.
 #[test]
 fn robots_without_joints() {
     let stone = ModelBuilder::new("stone").build().unwrap();
@@ -402,7 +403,7 @@ fn robots_without_joints() {
     }
 }
 
-/// Rejects a function that is named twice, since compilers would reject its code.
+/// Checks that a function name given twice is rejected, because compilers would reject the generated code.
 #[test]
 fn functions_are_named_once() {
     let error = functions(&robots::arm7(), &["aba", "rnea", "aba"], &Settings::default()).unwrap_err();
@@ -410,7 +411,8 @@ fn functions_are_named_once() {
     assert_eq!(error.to_string(), "aba: named twice");
 }
 
-/// Computes a function of the user: a cost with selections, angles and roots. Its Jacobian comes from dual numbers.
+/// Computes a function that a user could write: a cost with selections, angles and square roots. The test computes the
+/// cost's Jacobian with dual numbers.
 fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     let reach = (tool.x * tool.x + tool.y * tool.y).sqrt();
     let is_low = tool.z.lt(S::splat(0.4));
@@ -420,8 +422,8 @@ fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     vec![penalty * penalty + both, tool.y.atan2(tool.x), q[1].abs() * S::splat(3.0)]
 }
 
-/// Records three cases: a product of a matrix and vectors, computed in loops; sums that begin with a value; and a copy
-/// of an entry.
+/// Checks the loops for adjacent entries of a result. The function has products of a matrix and a vector, sums that
+/// begin with another product, and a copy of an entry.
 #[test]
 fn entries_that_are_alike_are_computed_in_loops() {
     let function = record("alike", "Products with a matrix of squares.", |r| {
@@ -511,7 +513,7 @@ fn the_text_is_the_same_every_time() {
     assert_eq!(text(), text());
 }
 
-/// Computes the rows about generated code in the table of the book's page on complexity.
+/// Checks the rows about generated code in the table of `docs/complexity.md`.
 #[test]
 fn the_book_has_these_figures() {
     let page = include_str!("../../../docs/complexity.md");

@@ -1,4 +1,5 @@
-//! Conversions to and from the conventions of other libraries: order of components, and frames.
+//! Conversions to and from the conventions of other libraries. They change the order of components and the frame of
+//! vectors.
 //!
 //! In Rust, the linear and angular parts of motions and forces have names. Only plain arrays of six numbers, and the
 //! position and velocity of a free body, need conversion.
@@ -68,12 +69,14 @@ impl MuJoCo {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Converts Condyle's q and v to MuJoCo's qvel: the velocity R v of the origin in the world, then ω.
+    /// Converts Condyle's q and v to MuJoCo's qvel: the origin's velocity, rotated by R to the world's axes, then ω
+    /// along the body's axes.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         joined(rotation(q) * vec3(&v[..3]), vec3(&v[3..]))
     }
 
-    /// Converts MuJoCo's qpos and qvel to Condyle's v: Rᵀ ṗ, with ṗ from the world's axes to the body's, then ω.
+    /// Converts MuJoCo's qpos and qvel to Condyle's v: the origin's velocity ṗ, rotated by Rᵀ to the body's axes, then
+    /// ω.
     pub fn velocity_from(qpos: &[f64; 7], qvel: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(qpos));
         joined(R.transpose() * vec3(&qvel[..3]), vec3(&qvel[3..]))
@@ -104,13 +107,15 @@ impl Drake {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Converts Condyle's q and v to Drake's v: R ω, then R v, along the world's axes.
+    /// Converts Condyle's q and v to Drake's v: the angular velocity, then the origin's velocity, both rotated by R to
+    /// the world's axes.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(q);
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))
     }
 
-    /// Converts Drake's q and v to Condyle's v: Rᵀ ṗ, then Rᵀ ω, along the body's axes.
+    /// Converts Drake's q and v to Condyle's v: the origin's velocity, then the angular velocity, both rotated by Rᵀ to
+    /// the body's axes.
     pub fn velocity_from(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(q)).transpose();
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))

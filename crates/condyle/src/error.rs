@@ -1,7 +1,7 @@
 //! Error type of this crate. The errors of all re-exported crates convert to this type.
 
-/// Error of this library. The errors of all re-exported crates convert to this type, so that one function can use `?`
-/// on all of them.
+/// Error of this library. The errors of all re-exported crates convert to this type, so that one function can apply `?`
+/// to the results of all crates.
 ///
 /// Each re-exported crate keeps its own error type: [`ModelError`](crate::ModelError) for models and dynamics,
 /// `optimal::Error`, `wholebody::Error` and `wholebody::Status`. The message and the source of an error are passed on
@@ -52,7 +52,7 @@ pub enum Error {
     #[cfg(feature = "optimal")]
     #[error(transparent)]
     Optimal(#[from] condyle_optimal::Error),
-    /// Sweep that stopped before it reached the first knot.
+    /// Backward sweep of a solver that stopped before it reached the first knot.
     #[cfg(feature = "optimal")]
     #[error(transparent)]
     Sweep(#[from] condyle_optimal::SweepError),
@@ -60,7 +60,7 @@ pub enum Error {
     #[cfg(feature = "wholebody")]
     #[error(transparent)]
     WholeBody(#[from] condyle_wholebody::Error),
-    /// Step of a whole-body controller whose quadratic program was not solved.
+    /// Unsolved quadratic program in a step of a whole-body controller.
     #[cfg(feature = "wholebody")]
     #[error(transparent)]
     Step(#[from] condyle_wholebody::Status),

@@ -2,8 +2,8 @@
 //!
 //! # Where to begin
 //!
-//! A [`Model`] is a robot: it is read from a file or built, and never changes. A [`Data`] is the memory in which one
-//! thread computes. Every algorithm is a function of a `Model`, a `Data` and the state:
+//! A [`Model`] describes a robot. A model is read from a file or built in code, and never changes. A [`Data`] contains
+//! the memory in which one thread computes. Every algorithm is a function of a `Model`, a `Data` and the state:
 //!
 //! ```
 //! use condyle::{Data, aba, aba_derivatives, robots};
@@ -16,8 +16,8 @@
 //! assert_eq!((a.len(), d.da_dq.shape()), (7, (7, 7))); // ∂q̈/∂q, and ∂q̈/∂v, ∂q̈/∂τ
 //! ```
 //!
-//! The names used most are at the top of this crate; the others are in modules by theme. [`dynamics`] has all names of
-//! models and algorithms in one module.
+//! The most common names are exported at the root of this crate. The other names are in modules by theme. [`dynamics`]
+//! has all names of models and algorithms in one module.
 //!
 //! | theme | names |
 //! | --- | --- |
@@ -51,8 +51,8 @@ pub use error::Error;
 #[cfg(all(feature = "optimal", feature = "wholebody"))]
 pub use plan::plan_of;
 
-/// Models and algorithms in one module. The names used most are at the top of this crate, the others in modules by
-/// topic.
+/// All names of models and algorithms in one module. The most common names are also at the root of this crate, and the
+/// others in modules by theme.
 #[doc(no_inline)]
 pub use condyle_dynamics as dynamics;
 #[cfg(feature = "optimal")]
@@ -60,7 +60,8 @@ pub use condyle_optimal as optimal;
 #[cfg(feature = "wholebody")]
 pub use condyle_wholebody as wholebody;
 
-/// Other crates whose types are part of the public interface, in the matching versions.
+/// Crates whose types appear in the public interface of this crate. They are re-exported in the versions that this
+/// crate uses.
 #[doc(no_inline)]
 pub use condyle_dynamics::{nalgebra, num_dual, rand};
 
@@ -125,7 +126,7 @@ pub mod divide_conquer {
     pub use condyle_dynamics::{AssemblySize, DivideConquer};
 }
 
-/// Factors of the inertia matrix, and forward dynamics that use these factors.
+/// Factorisations of the inertia matrix, and forward dynamics computed from these factors.
 pub mod factors {
     pub use condyle_dynamics::{Cholesky, ColumnTree, ForwardDynamicsMethod, Ltdl, forward_dynamics};
 }
@@ -147,12 +148,13 @@ pub mod spatial {
     pub use condyle_dynamics::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Matrix, Quaternion, lie};
 }
 
-/// Coriolis, gravity and passive efforts, and all terms of the equations of motion in one pass.
+/// Functions for Coriolis, gravity and passive efforts, and one function that computes all terms of the equations of
+/// motion.
 pub mod terms {
     pub use condyle_dynamics::{AllTerms, compute_all_terms, coriolis_matrix, gravity, passive_torque, static_torque};
 }
 
-/// Parts of a robot's description.
+/// Types for the elements of a robot's description.
 pub mod tree {
     pub use condyle_dynamics::{
         Actuator, Body, BodyId, Frame, FrameKind, FrameParent, GravityCompensation, Keyframe, Mimic, ModelConstraint,

@@ -4,14 +4,16 @@ use condyle_dynamics::Model;
 use condyle_optimal::Solution;
 use condyle_wholebody::{Error, Plan, PlanData};
 
-/// Returns the plan of a solution, for [`WholeBodyController::track`](condyle_wholebody::WholeBodyController::track).
+/// Converts a solution of an optimal control problem to a plan for
+/// [`WholeBodyController::track`](condyle_wholebody::WholeBodyController::track).
 ///
 /// - `times`: times of the N + 1 knots (s); the two knots of an impact have the same time.
-/// - `touches`: for each interval between two knots, whether each contact of the controller touches. Length: N · number
-///   of contacts.
+/// - `touches`: for each interval between two knots, whether each contact of the controller touches the ground. Length:
+///   N · number of contacts.
 /// - `fade`: duration over which contacts are loaded and unloaded (s).
 ///
-/// Controls and gains are copied from knots that have one control per actuated coordinate. Impacts have no controls.
+/// Controls and gains are copied from the solution. An impact has no controls, so the plan contains zeros for the
+/// impact.
 ///
 /// ```
 /// use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};

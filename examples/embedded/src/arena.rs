@@ -1,4 +1,5 @@
-//! Memory without an operating system. Each allocation takes the next bytes of a fixed array, and nothing is freed.
+//! Memory allocator for a program without an operating system. Each allocation takes the next bytes of a fixed array,
+//! and memory is never freed.
 
 use core::alloc::{GlobalAlloc, Layout};
 use core::cell::UnsafeCell;
@@ -7,7 +8,7 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 /// Size of the array (bytes).
 const SIZE: usize = 1 << 20;
 
-/// A fixed array of memory, the number of bytes in use, and the number of allocations.
+/// Fixed array of memory, with the number of bytes in use and the number of allocations.
 #[repr(align(16))]
 pub(crate) struct Arena {
     memory: UnsafeCell<[u8; SIZE]>,

@@ -1,11 +1,11 @@
-//! An arm of six joints. It is described in code, since the board has no files.
+//! Model of an arm with six joints. The arm is described in code, because the board has no file system.
 
 use condyle_dynamics::{Inertia, Joint, JointOptions, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD};
 
 /// Number of joints of the arm.
 pub(crate) const JOINTS: usize = 6;
 
-/// A link, and the joint that moves it.
+/// Link, and the joint that moves the link.
 struct Link {
     name: &'static str,
     /// Axis of the joint, in the link's frame.
@@ -17,7 +17,7 @@ struct Link {
     mass: f64,
     com: [f64; 3],
     moments: [f64; 3],
-    /// Inertia of the rotor, as seen at the joint (kg m²).
+    /// Inertia of the motor's rotor, referred to the joint (kg m²).
     rotor: f64,
 }
 

@@ -1,5 +1,5 @@
-//! Inverse and forward dynamics of an arm of six joints, without an operating system. Memory is a fixed array, and
-//! nothing is allocated after construction.
+//! Inverse and forward dynamics of an arm of six joints, without an operating system. Memory is a fixed array. After
+//! the model and its data are constructed, nothing is allocated.
 //!
 //! ```text
 //! rustup target add thumbv7em-none-eabihf
@@ -18,7 +18,7 @@ use cortex_m_semihosting::{debug, hprintln};
 #[global_allocator]
 static ARENA: arena::Arena = arena::Arena::new();
 
-/// Entry point of the board. The debugger prints the text; qemu emulates a debugger.
+/// Entry point of the program. A debugger prints the output; qemu emulates this debugger.
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let empty = (ARENA.bytes(), ARENA.allocations());

@@ -1,7 +1,7 @@
 //! Hostile input: seeds, mutations of seeds, and a property that must hold for every input.
 //!
-//! A reader either rejects an input with an error, or returns a robot or problem that can be used. Nothing panics,
-//! nothing hangs, and accepted input gives finite numbers.
+//! The property: a reader either rejects an input with an error, or returns a robot, problem or mesh that can be used.
+//! Neither reading nor computing panics or hangs, and accepted input gives finite numbers.
 
 mod mutations;
 
@@ -21,28 +21,28 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Format of an input: a robot, a problem or a mesh from outside.
+/// Format of an input file, which contains a robot, a problem or a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A robot as URDF.
+    /// Robot in URDF.
     Urdf,
-    /// A robot as MJCF.
+    /// Robot in MJCF.
     Mjcf,
-    /// A robot as SDF.
+    /// Robot in SDF.
     Sdf,
-    /// A model in JSON.
+    /// Model in JSON.
     Model,
-    /// A problem in JSON.
+    /// Optimal control problem in JSON.
     Problem,
-    /// A model in the format of Python's pickles.
+    /// Model in the binary format that Python's pickles use.
     Pickle,
-    /// Named positions as SRDF.
+    /// Named positions in SRDF.
     Srdf,
-    /// A mesh as STL.
+    /// Mesh in STL.
     Stl,
-    /// A mesh as OBJ.
+    /// Mesh in OBJ.
     Obj,
-    /// A mesh as DAE.
+    /// Mesh in DAE (COLLADA).
     Dae,
 }
 
@@ -58,7 +58,7 @@ macro_rules! mesh {
     };
 }
 
-/// MJCF whose elements copy subtrees, and which has meshes with mass.
+/// MJCF text with elements that copy subtrees, and with meshes that have mass.
 const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default class="c"><joint damping="1"/></default></default>
 <asset><mesh name="m" inertia="exact" scale="1 -2 3" vertex="0 0 0 1 0 0 0 2 0 0 0 3" face="0 2 1 0 1 3 0 3 2 1 2 3"/>
 <mesh name="s" builtin="supersphere" params="5 0.5 1.5"/></asset><worldbody><replicate count="3" offset="1 0 0" euler="0 0 30" sep="-">
@@ -68,12 +68,12 @@ const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default clas
 <intvelocity joint="j" kp="3" actrange="-1 1"/><pid joint="j" kp="1" ki="2"/></actuator><keyframe>
 <key name="k" ctrl="1 2 3" act="0.5"/></keyframe></mujoco>"#;
 
-/// MJCF that consists of several files; [`FILES`] contains the other files.
+/// MJCF text that consists of several files; [`FILES`] contains the other files.
 const INCLUDES: &str = r#"<mujoco><asset><model name="m" file="child.xml"/><mesh name="o" file="face.obj"/></asset><worldbody>
 <body name="b"><joint name="i"/><geom type="mesh" mesh="o"/><include file="part.xml"/><frame pos="0 0 1"><attach model="m" body="c" prefix="x-"/>
 </frame></body></worldbody></mujoco></mujoco>"#;
 
-/// SDF that consists of several files; [`FILES`] contains the other files.
+/// SDF text that consists of several files; [`FILES`] contains the other files.
 const MODELS: &str = r#"<sdf version="1.9"><world name="w"><include><uri>part.sdf</uri><name>a</name><pose>1 0 0 0 0 0</pose></include>
 <include merge="true"><uri>part.sdf</uri><name>b</name></include><joint name="j" type="ball"><parent>world</parent><child>a::l</child></joint>
 </world></sdf>"#;
@@ -90,7 +90,7 @@ const FILES: [(&str, &str); 4] = [
     ("face.obj", POLYGONS),
 ];
 
-/// OBJ with faces of many corners that are concave and in no plane.
+/// OBJ text whose faces have many corners, are concave, and do not lie in a plane.
 const POLYGONS: &str = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\nf 6 2 1\nf 6 3 2\nf 6 4 3\nf 6 5 4\n\
 f 6 1 5\nf 5 4 6 3 2 1\n";
 
@@ -142,8 +142,8 @@ impl Kind {
             Self::Urdf | Self::Mjcf | Self::Sdf | Self::Srdf => Model::decoded(input.to_vec()).into(),
             _ => String::from_utf8_lossy(input),
         };
-        // Options that a user may choose. Here the length of the input chooses them, because mutations also change the
-        // length.
+        // Select the reader's options by the length of the input. Mutations change the length, so all options are
+        // tested.
         let (some, other) = (input.len().is_multiple_of(2), input.len().is_multiple_of(3));
         let root_joint = some.then_some(Joint::FreeFlyer);
         let said = match self {
@@ -222,7 +222,7 @@ const URDF: &str = r#"<!------ a robot ------>
   <gazebo reference="b"><turnGravityOff>true</turnGravityOff><sensor:camera name="x"/></gazebo>
 </robot>"#;
 
-/// Returns robots with all features that the file of a model can have.
+/// Returns robots with every feature that a model file can contain.
 fn models() -> Vec<Model> {
     let mimic = UrdfOptions { mimic: true, ..UrdfOptions::default() };
     let mimic = Model::from_urdf_str(file!("mimic.urdf"), &mimic).expect("is a good robot");
@@ -230,7 +230,7 @@ fn models() -> Vec<Model> {
     vec![robots::arm7(), robots::quadruped(), mimic, linkage]
 }
 
-/// Returns problems with all kinds of dynamics, and with all terms that the file of a problem can have.
+/// Returns problems with every type of dynamics, and with every cost and constraint that a problem file can contain.
 fn problems() -> Vec<RobotProblem> {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
     let state = |model: &Model| [neutral(model), vec![0.0; model.nv()]].concat();
@@ -300,8 +300,8 @@ fn in_folder(kind: Kind, text: &str) -> PathBuf {
     path
 }
 
-/// Writes the robot, and the robot with another armature, into a copy of its file. This must succeed, or return an
-/// error with a message.
+/// Writes the robot into a copy of its file, then writes the robot with another armature into another copy. Each write
+/// must succeed, or return an error with a message.
 fn write<E: ToString>(kind: Kind, model: &Model, text: &str, write: impl Fn(&Model, &Path, &Path) -> Result<(), E>) {
     let original = in_folder(kind, text);
     let new = original.with_extension("new");
@@ -334,7 +334,7 @@ fn use_positions(all: &[(String, Vec<f64>)]) {
     assert!(all.iter().all(|(_, q)| q.len() == 19 && q.iter().all(|x| x.is_finite())), "{all:?}");
 }
 
-/// Checks the rollout of a problem that could be built: it gives finite numbers or an error.
+/// Builds a problem and checks its rollout, which must give finite numbers or an error.
 fn use_problem(data: &RobotProblem) -> Result<(), String> {
     let mut problem = data.build().map_err(|e| e.to_string())?;
     let us = vec![0.0; (0..problem.horizon()).map(|t| problem.nu(t)).sum()];
@@ -343,7 +343,7 @@ fn use_problem(data: &RobotProblem) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks a mesh as a page draws it: triangles have valid vertex indices, and boxes are finite.
+/// Checks a mesh that a page would draw: triangles have valid vertex indices, and bounding boxes are finite.
 fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     if let Ok((points, triangles)) = condyle_meshes::triangles(format, bytes) {
         assert!(

@@ -1,4 +1,4 @@
-//! Mutations of an input: of its bytes, of words and elements of its text, and of values in JSON.
+//! Mutations of an input: changes of bytes, of words, of XML elements, and of values in JSON.
 
 use super::Kind;
 use rand::RngExt;
@@ -49,7 +49,7 @@ const NUMBERS: &[&str] = &[
     "null",
 ];
 
-/// Words that have a meaning in XML or in one of the formats.
+/// Characters and words that have a meaning in XML or in an input format.
 const PIECES: &[&str] = &[
     "<",
     ">",
@@ -162,7 +162,7 @@ fn mutate_tokens(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// Replaces a number or a name by another one; sometimes replaces all equal numbers or names.
+/// Replaces a number or a name by another; sometimes replaces all equal numbers or names.
 fn mutate_words(text: &str, rng: &mut StdRng) -> String {
     let words = words(text);
     let is_number = |&(from, to): &(usize, usize)| text[from..to].parse::<f64>().is_ok();
@@ -210,7 +210,7 @@ fn mutate_elements(text: &str, rng: &mut StdRng) -> String {
     if elements.is_empty() {
         return text.to_owned();
     }
-    // Prefer small elements: the root and other large elements would be copied too often.
+    // Prefer small elements. Otherwise, the root and other large elements would be copied too often.
     let pick = |rng: &mut StdRng| {
         let (a, b) = (any(&elements, rng), any(&elements, rng));
         if a.1 - a.0 < b.1 - b.0 { a } else { b }

@@ -1,4 +1,4 @@
-//! Draws a chart: computing time over the number of knots.
+//! Draws a chart of the computing time over the number of knots.
 
 use super::Report;
 use std::fmt::Write;

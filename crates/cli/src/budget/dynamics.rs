@@ -7,14 +7,14 @@ use rayon::ThreadPool;
 use serde::Serialize;
 use std::hint::black_box;
 
-/// Times of an algorithm for all knots of a horizon, computed in three variants.
+/// Times of an algorithm for all knots of a horizon, measured in three variants.
 #[derive(Serialize)]
 pub(crate) struct Row {
     pub name: &'static str,
     pub knots: usize,
     /// Times with one call per knot.
     pub single: Times,
-    /// Times of a batch on one thread: several knots are computed in SIMD lanes.
+    /// Times of a batch on one thread. A batch computes several knots at once in SIMD lanes.
     pub lanes: Times,
     /// Times of a batch on all threads; `None` if there is only one thread.
     pub threads: Option<Times>,
@@ -29,7 +29,7 @@ enum Work {
     Minv,
     RneaDerivatives,
     AbaDerivatives,
-    /// ABA, its derivatives, and RNEA.
+    /// ABA, the derivatives of ABA, and RNEA, one after the other.
     Horizon,
 }
 
@@ -108,7 +108,7 @@ impl Work {
     }
 }
 
-/// A robot with random states, and memory for the computations.
+/// Robot with random states, and memory for the computations.
 pub(crate) struct Bench<'a> {
     model: &'a Model,
     states: States,

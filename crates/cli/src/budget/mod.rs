@@ -66,10 +66,10 @@ pub(crate) struct Arguments {
 
 /// Maximum duration of a measurement.
 const TIME: Duration = Duration::from_millis(500);
-/// Armature added to joints without inertia, so that forward dynamics can be measured (kg m², kg).
+/// Armature (kg m², kg) added to joints without inertia. Otherwise forward dynamics could not be measured.
 const ARMATURE: f64 = 1e-2;
 
-/// All measurements.
+/// Report of `condyle budget`: all measurements and results.
 #[derive(Serialize)]
 struct Report {
     robot: String,
@@ -85,12 +85,12 @@ struct Report {
     verdicts: Vec<Verdict>,
 }
 
-/// Result for a horizon: whether the iterations fit into the period, and what would fit.
+/// Result for a horizon: whether the iterations fit into the period, and which rate and number of knots would fit.
 #[derive(Serialize)]
 struct Verdict {
     knots: usize,
     name: &'static str,
-    /// Time of one iteration (s), as the 99th percentile.
+    /// 99th percentile of the time of one iteration (s).
     iteration_s: f64,
     /// Highest rate (Hz) at which the requested iterations still fit into a period.
     highest_rate: f64,
@@ -142,7 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let model = Arc::new(model.clone());
     let iterate = solver::Bench { q: limits::start(&model), model: model.clone(), contacts, pool: &pool, effort };
     let mut iterations = Vec::new();
-    // A line needs two points: if there is only one horizon, half of this horizon is measured, too.
+    // The linear regression needs two points. If only one horizon is given, measure half of this horizon, too.
     let half = (knots.len() == 1 && most > 1).then_some(most / 2);
     for in_contact in [false, true] {
         if !in_contact || !iterate.contacts.is_empty() {
@@ -193,7 +193,8 @@ fn nearest(numbers: &[usize], wanted: usize) -> usize {
     numbers.iter().copied().min_by_key(|n| n.abs_diff(wanted)).unwrap_or(wanted)
 }
 
-/// Returns the result for each horizon. It is in contact if the arguments name contacts, otherwise free.
+/// Returns the result for each horizon. The results are for horizons in contact if the arguments name contacts,
+/// otherwise for free horizons.
 fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) -> Vec<Verdict> {
     let counted = iterations.last().map_or("free", |row| row.name);
     let rows: Vec<&solver::Row> = iterations.iter().filter(|row| row.name == counted).collect();
@@ -216,8 +217,8 @@ fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) 
     rows.iter().filter(|row| knots.contains(&row.knots)).map(verdict).collect()
 }
 
-/// Returns the maximum number of knots for which an iteration takes at most `time`. The line a + b N is fitted to the
-/// measured times by relative errors.
+/// Returns the maximum number N of knots for which an iteration takes at most `time`. The function fits the line a + b
+/// N to the measured times, and minimises relative errors.
 fn largest(rows: &[&solver::Row], time: f64) -> u64 {
     // Minimise Σ ((a + b N)/t − 1)² by normal equations with the weights 1/t².
     let (mut w, mut wn, mut wnn, mut wt, mut wnt) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -232,7 +233,7 @@ fn largest(rows: &[&solver::Row], time: f64) -> u64 {
         true => ((wt * wnn - wnt * wn) / det, (w * wnt - wn * wt) / det),
         false => (0.0, wnt / wnn),
     };
-    // Noise may tilt the line. It must not fall, and must begin at 0 or above.
+    // Measured times contain noise. If the fitted line falls or begins below 0, fit a line through 0 instead.
     let (a, b) = if a < 0.0 || b <= 0.0 { (0.0, wnt / wnn) } else { (a, b) };
     ((time - a) / b).max(0.0) as u64
 }

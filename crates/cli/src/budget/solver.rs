@@ -1,4 +1,5 @@
-//! Measures the time of an FDDP iteration as in MPC: it starts from the last solution, with a new initial state.
+//! Measures the time of an FDDP iteration as in MPC: each iteration starts from the last solution, with a new initial
+//! state.
 
 use super::clock::{Effort, Times, timed};
 use crate::error::Error;
@@ -17,14 +18,14 @@ use std::time::Instant;
 /// Times of one iteration.
 #[derive(Serialize)]
 pub(crate) struct Row {
-    /// Kind of horizon: `free` or `in contact`.
+    /// Name of the horizon's dynamics: `free` or `in contact`.
     pub name: &'static str,
     pub knots: usize,
     /// Times on one thread.
     pub one: Times,
     /// Times on all threads; `None` if there is only one thread.
     pub threads: Option<Times>,
-    /// Whether all solves remained finite.
+    /// Whether the numbers of all solves remained finite.
     pub finite: bool,
 }
 
@@ -38,11 +39,11 @@ impl Row {
     }
 }
 
-/// Minimum number of threads for which a sweep in segments may be faster.
+/// Minimum number of threads for which a backward sweep in segments can be faster than a single sweep.
 const SEGMENTS_FROM: usize = 4;
 /// Time between knots (s).
 const DT: f64 = 0.01;
-/// Standard deviation of the random change of the initial state: rad and m, and per second for velocities.
+/// Standard deviation of the random change of the initial state (rad and m; rad/s and m/s for velocities).
 const DISTURBANCE: f64 = 1e-3;
 /// Rate at which the slip of a contact decays (1/s).
 const HOLD: f64 = 40.0;
@@ -50,7 +51,7 @@ const HOLD: f64 = 40.0;
 const DAMPING: f64 = 1e-6;
 const FRICTION: f64 = 0.7;
 
-/// A robot, a posture and contacts, for which iterations are measured.
+/// Robot, posture and contacts for which iterations are measured.
 pub(crate) struct Bench<'a> {
     pub model: Arc<Model>,
     pub q: Vec<f64>,
@@ -71,7 +72,8 @@ impl Bench<'_> {
         }
         let (one, finite) = one?;
         let mut threads: Option<Times> = None;
-        // A sweep that runs at the same time as the derivatives, or a sweep in segments.
+        // Measure two variants: a backward sweep that runs at the same time as the derivatives, and a sweep in
+        // segments.
         let segments = [(2, 1), (SEGMENTS_FROM, cores)];
         for (_, segments) in segments.into_iter().filter(|(least, _)| cores >= *least) {
             let (times, _) = self.pool.install(|| self.times(knots, [cores, segments], in_contact, damping))?;
@@ -146,7 +148,7 @@ impl Bench<'_> {
     }
 }
 
-/// Returns the contact with the gains that measurements and plans use.
+/// Returns the contact with the reference frame and the damping gain that measurements and plans use.
 pub(crate) fn held(constraint: condyle::ContactConstraint) -> condyle::ContactConstraint {
     condyle::ContactConstraint { kd: HOLD, reference: condyle::ReferenceFrame::LocalWorldAligned, ..constraint }
 }

@@ -8,12 +8,12 @@ use std::fmt::Write;
 /// Width of the bar that represents a period, in characters.
 const BAR: usize = 40;
 
-/// Formats p50 and p99 of a horizon, in µs.
+/// Formats the p50 and p99 times of a horizon, in µs.
 fn pair(times: Option<Times>) -> [String; 2] {
     times.map_or([String::new(), String::new()], |t| [format!("{:.1}", 1e6 * t.p50), format!("{:.1}", 1e6 * t.p99)])
 }
 
-/// Formats p50 and p99 per knot, in µs.
+/// Formats the p50 and p99 times of a horizon, divided by the number of knots, in µs.
 fn per_knot(times: Option<Times>, knots: usize) -> [String; 2] {
     let each = |t: f64| format!("{:.3}", 1e6 * t / knots as f64);
     times.map_or([String::new(), String::new()], |t| [each(t.p50), each(t.p99)])
@@ -59,7 +59,7 @@ impl Report {
         table.text()
     }
 
-    /// Returns text with bars that shows what fits into the period.
+    /// Returns text with bars that compare the computing time of each horizon with the period.
     fn verdict(&self, arguments: &Arguments) -> String {
         let Some(first) = self.verdicts.first() else { return String::new() };
         let mut text = heading(&match first.period_s {

@@ -10,12 +10,12 @@ use condyle::{Data, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_der
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Bound for two results that are exact except for rounding.
+/// Bound for the difference of two results that have only rounding errors.
 const ROUNDING: f64 = 1e-10;
 /// Bound for the error of a central difference with step 1e-6.
 const DIFFERENCE: f64 = 1e-5;
-/// Allowed error of a central difference, as a multiple of the change between the steps h and 2h. If the step is too
-/// long, the error is a third of this change; if it is too short, the error is smaller than the change.
+/// Allowed error of a central difference, divided by the difference between the results with the steps h and 2h. If h
+/// is too long, the error is a third of this difference. If h is too short, the error is less than this difference.
 const UNCERTAIN: f64 = 10.0;
 const STEP: f64 = 1e-6;
 
@@ -115,8 +115,8 @@ fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]
     }
 }
 
-/// Returns derivatives of RNEA with one column per variable. Each column is the ε part of rnea(q ⊕ ε δ, v, q̈), or the
-/// same for v and q̈.
+/// Returns the derivatives of RNEA by dual numbers. For q, column k is the ε part of rnea(q ⊕ ε δ, v, q̈), where δ is
+/// unit vector k. For v and q̈, ε δ is added to v or to q̈ instead.
 fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) -> DMatrix<f64> {
     let nv = model.nv();
     let mut J = DMatrix::zeros(nv, nv);
@@ -138,8 +138,8 @@ fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) ->
     J
 }
 
-/// Returns derivatives with one column per variable. Each column is a difference, for q (f(q ⊕ h δ, v, x) − f(q ⊖ h δ,
-/// v, x)) / 2h.
+/// Returns the derivatives of a function f by central differences. For q, column k is (f(q ⊕ h δ, v, x) − f(q ⊕ (−h δ),
+/// v, x)) / 2h, where δ is unit vector k. For v and x, h δ is added to v or to x instead.
 fn by_differences(
     function: Function,
     by: By,

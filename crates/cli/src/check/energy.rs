@@ -1,4 +1,4 @@
-//! Checks the integrators: the energy of a robot without drive and friction stays constant.
+//! Checks that the integrators conserve the energy of a robot without motor efforts and friction.
 
 use super::ledger::Row;
 use crate::error::Error;
@@ -7,11 +7,13 @@ use crate::states::{normal, source};
 use condyle::simulation::{Integrator, Settings, Simulation};
 use condyle::{Data, Model, forward_velocities};
 
-/// Step lengths (s) that are tried in this order: light links may swing faster than a long step can follow.
+/// Step lengths (s), in the order in which they are tried. Light links can oscillate too fast for a long step.
 const STEPS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
-/// Number of steps. Half of the step length needs twice as many steps, and a quarter four times as many.
+/// Number of steps of the first simulation. Two further simulations cover the same duration with half and a quarter of
+/// the step length.
 const COUNT: usize = 200;
-/// Drift below which the error consists of rounding, so that the order of the integrator cannot be measured.
+/// Relative energy error that consists only of rounding. The order of the integrator cannot be measured from smaller
+/// errors.
 const ROUNDING: f64 = 1e-13;
 /// Initial speed of the joints (rad/s, m/s).
 const SPEED: f64 = 0.1;
@@ -19,16 +21,16 @@ const SPEED: f64 = 0.1;
 type Rule = (&'static str, Integrator, f64, f64);
 
 /// Rules for each integrator. A check passes if max |E(t) − E(0)| at the shortest step, relative to the largest kinetic
-/// energy, is within the bound. It also passes if the error falls at least with the given order. Light links may swing
-/// faster than any step; then only the order is meaningful.
+/// energy, is within the bound. It also passes if the error falls at least with the given order. Light links can
+/// oscillate too fast for every step length; then only the order is meaningful.
 const RULES: [Rule; 3] = [
     ("energy, RK4", Integrator::RungeKutta4, 1e-7, 3.0),
     ("energy, variational", Integrator::Variational, 1e-3, 1.5),
     ("energy, semi-implicit Euler", Integrator::SemiImplicitEuler, 1e-2, 0.7),
 ];
 
-/// Returns a row for each integrator. If limbs are too light for any step, all joints receive armature, and the row
-/// notes the armature.
+/// Returns a row for each integrator. If limbs are too light for every step length, all joints receive armature, and a
+/// note in the row states the armature.
 pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
     let mut heavier = model.armature().to_vec();
     for body in model.bodies()[1..].iter().filter(|body| body.joint.nv() == 1) {
@@ -47,7 +49,7 @@ pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
     Ok(RULES.into_iter().map(row).collect())
 }
 
-/// Measures the drift of an integrator with the longest step length for which the check passes.
+/// Measures the energy error of an integrator with the longest step length for which the check passes.
 fn measure(model: &Model, (name, integrator, bound, order): Rule) -> Row {
     let q = limits::start(model);
     let v: Vec<f64> = normal(&mut source(3), model.nv()).into_iter().map(|x| SPEED * x).collect();
@@ -77,7 +79,7 @@ fn measure(model: &Model, (name, integrator, bound, order): Rule) -> Row {
     row
 }
 
-/// Returns max |E(t) − E(0)| / max T; `None` if a step failed.
+/// Returns max |E(t) − E(0)| / max T, with the energy E and the kinetic energy T. Returns `None` if a step failed.
 fn drift(model: &Model, integrator: Integrator, dt: f64, count: usize, q: &[f64], v: &[f64]) -> Option<f64> {
     let mut data = Data::new(model);
     let mut energy = |q: &[f64], v: &[f64]| {

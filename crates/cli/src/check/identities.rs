@@ -1,7 +1,7 @@
 //! Checks identities that hold for every robot in every state.
 //!
-//! An error is max |found − expected|, relative to 1 + the largest number involved. Results that contain M⁻¹ may have
-//! an error of the condition number κ(M) times rounding, if this is larger than the other bound.
+//! An error is max |found − expected|, relative to 1 + the largest number involved. For results that contain M⁻¹, the
+//! bound is proportional to the condition number κ(M), if this bound is larger than the usual bound.
 
 use super::ledger::Row;
 use crate::states::States;
@@ -22,14 +22,15 @@ use num_dual::Dual64;
 
 /// Bound for the rounding of several hundred operations.
 const ROUNDING: f64 = 1e-12;
-/// Bound for results of the same operations on the same numbers.
+/// Bound for the difference of results that two functions compute by the same operations on the same numbers.
 const EXACT: f64 = 1e-14;
 /// Bound for results that use a factorisation of M, or sums of the results of several algorithms.
 const INVERTED: f64 = 1e-10;
-/// Bound for a central difference with step h = 1e-6: h² from the function, ε/h from rounding.
+/// Bound for the error of a central difference with step h = 1e-6. The error consists of a term h² from the function
+/// and a term ε/h from rounding.
 const DIFFERENCE: f64 = 1e-6;
 const STEP: f64 = 1e-6;
-/// Maximum relative error of M⁻¹; three digits are then still correct.
+/// Maximum relative error of M⁻¹. With this error, three digits are still correct.
 const LOST: f64 = 1e-3;
 /// Rounding error of a solve with M, in units of ε κ(M).
 const ROUNDINGS: f64 = 100.0;
@@ -42,7 +43,7 @@ pub(super) const SOLVES: &str = "100 ε κ(M), at least 1e-10";
 const STEPS: &str = "central differences";
 const DIGITS: &str = "three digits of M⁻¹ are left";
 
-/// Returns the allowed error of results that contain M⁻¹, for this condition number of M.
+/// Returns the allowed error of results that contain M⁻¹. `condition` is the condition number of M.
 pub(super) fn inverted(condition: f64) -> f64 {
     INVERTED.max(ROUNDINGS * f64::EPSILON * condition)
 }
@@ -53,8 +54,8 @@ pub(super) fn spectrum(M: &Matrix<f64>) -> (f64, f64) {
     (values.min(), if values.min() > 0.0 { values.max() / values.min() } else { f64::INFINITY })
 }
 
-/// Returns whether the first body floats and carries all other bodies. A base with armature does not count as floating:
-/// armature is mass without weight.
+/// Returns whether the first body floats and carries all other bodies. A base with armature does not count as floating,
+/// because gravity does not act on armature.
 fn floats(model: &Model) -> bool {
     let bodies = model.bodies();
     let floats = bodies.len() > 1 && bodies[1].joint == Joint::FreeFlyer && bodies[2..].iter().all(|b| b.parent > 0);
@@ -114,7 +115,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         }
 
         let qdd = aba(model, &mut data, q, v, tau, &[]).to_vec();
-        // |M| |q̈| + |h|, an upper bound of the terms that add up to τ
+        // Compute |M| |q̈| + |h|, an upper bound of the terms whose sum is τ.
         let parts = largest((M.abs() * vector(&qdd).abs()).as_slice()) + largest(&h);
         round.compare(rnea(model, &mut data, q, v, &qdd, &[]), tau, parts, bound);
         let again = aba(model, &mut data, q, v, &tau_of_a, &[]);
@@ -159,7 +160,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         if floats && mass > 0.0 {
             let R = forward_kinematics(model, &mut data, q).body(1).rotation;
             let mut fall = zero.clone();
-            // This is the acceleration of free fall, along the axes of the base.
+            // Expect the acceleration of free fall, in the axes of the base.
             fall[..3].copy_from_slice(&R.transpose_mul(g0).to_array());
             falling.compare(
                 rnea(model, &mut data, q, &zero, &fall, &[]),
@@ -189,7 +190,7 @@ pub(super) fn largest(x: &[f64]) -> f64 {
     x.iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Returns Ṁ along v: the ε part of M(q ⊕ ε v).
+/// Returns Ṁ, the derivative of M along v: the ε part of M(q ⊕ ε v).
 fn inertia_rate(model: &Model, q: &[f64], v: &[f64]) -> DMatrix<f64> {
     let q: Vec<Dual64> = q.iter().map(|&q| Dual64::from(q)).collect();
     let way: Vec<Dual64> = v.iter().map(|&v| Dual64::new(0.0, v)).collect();

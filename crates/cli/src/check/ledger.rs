@@ -1,8 +1,8 @@
-//! Results of a check: for each identity, the worst case and its bound.
+//! Results of a check: for each identity, the case with the largest error relative to its bound.
 
 use serde::Serialize;
 
-/// An identity, and its largest error relative to the bound in all states.
+/// Result for an identity: the largest error, relative to its bound, in all states.
 #[derive(Serialize)]
 pub(crate) struct Row {
     /// Name of the check.
@@ -11,14 +11,14 @@ pub(crate) struct Row {
     pub equation: &'static str,
     /// Measured relative error, as defined in the module that checks the equation; `null` if it is not a number.
     pub error: f64,
-    /// Allowed error in the state with this error.
+    /// Allowed error in the state in which `error` was measured.
     pub bound: f64,
-    /// Reason why the bound has this size.
+    /// Reason for the size of the bound.
     pub because: &'static str,
     /// Number of checked cases.
     pub cases: usize,
     pub pass: bool,
-    /// Further remarks on the result.
+    /// Additional remarks on the result; may be empty.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
@@ -28,7 +28,7 @@ impl Row {
         Self { name, equation, because, error: 0.0, bound: 0.0, cases: 0, pass: true, note: String::new() }
     }
 
-    /// Counts a case. Stores its error if it is the largest so far, relative to its bound.
+    /// Counts a case. Stores the case's error and bound if the quotient error / bound is the largest so far.
     pub(super) fn see(&mut self, error: f64, bound: f64) {
         let (now, before) = (error / bound, if self.cases == 0 { -1.0 } else { self.error / self.bound });
         // Keep an error that is NaN.
@@ -39,7 +39,8 @@ impl Row {
         self.pass &= error <= bound;
     }
 
-    /// Compares lists of numbers: max |x − y|, relative to the larger of 1 + max |y| and 1 + `scale`.
+    /// Compares the numbers x in `found` with the numbers y in `expected`. The error is max |x − y|, divided by the
+    /// larger of 1 + max |y| and 1 + `scale`.
     pub(super) fn compare(&mut self, found: &[f64], expected: &[f64], scale: f64, bound: f64) {
         let largest = expected.iter().fold(1.0 + scale, |most: f64, y| most.max(1.0 + y.abs()));
         // f64::max would ignore NaN.

@@ -1,4 +1,4 @@
-//! `condyle check`: checks the numbers that are computed for a robot on this machine.
+//! `condyle check`: checks the results of the library's algorithms for a robot on this machine.
 
 mod derivatives;
 mod energy;
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Armature added to joints without inertia, so that forward dynamics can be checked (kg m², kg).
+/// Armature (kg m², kg) added to joints without inertia. Otherwise forward dynamics could not be checked.
 const ARMATURE: f64 = 1e-2;
 
 #[derive(Serialize)]

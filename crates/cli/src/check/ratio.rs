@@ -1,4 +1,4 @@
-//! Checks forward dynamics with a mass ratio of 10⁶. With heavy tips on light limbs it loses most digits.
+//! Checks forward dynamics with a mass ratio of 10⁶. Heavy tips on light limbs cause the largest rounding errors.
 
 use super::identities::{SOLVES, inverted, largest, spectrum};
 use super::ledger::Row;
@@ -11,8 +11,8 @@ use nalgebra::DVector;
 /// Mass of a tip relative to the body that carries it.
 const RATIO: f64 = 1e6;
 
-/// Checks ABA of the robot with heavy tips against RNEA, and against a solve with M. Returns no rows if no body with
-/// mass carries another body with mass.
+/// Checks ABA of the robot with heavy tips. Compares ABA with RNEA, and with the solution of a linear system with M.
+/// Returns no rows if no body with mass carries another body with mass.
 pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> Result<Vec<Row>, Error> {
     let mut round = Row::new("mass ratio 10⁶", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
     let mut forward = Row::new("mass ratio 10⁶", "aba(q, v, τ) = M⁻¹ (τ − h)", SOLVES);
@@ -21,7 +21,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> R
         return Ok(Vec::new());
     }
     let scaled = |i: usize, I: Inertia<f64>| {
-        // An inertia is linear in its parameters.
+        // Scale the parameters, because an inertia is linear in its parameters.
         inertial_parameters::to_inertia(inertial_parameters::from_inertia(I).map(|x| x * factors[i]))
     };
     let (model, _) = robot::regular(model.with_inertias(scaled)?, armature)?;

@@ -9,7 +9,7 @@ use core::marker::PhantomData;
 
 /// Number type of kernels: `f64` or `f32`.
 pub trait Real: Copy + Default + sealed::Sealed + 'static {
-    /// Language of kernels with this number type.
+    /// Language in which kernels for this number type are written.
     const LANGUAGE: Language;
 }
 
@@ -27,7 +27,8 @@ mod sealed {
     impl Sealed for f32 {}
 }
 
-/// Numbers in the memory of a device. Number k of state i of n is stored at index `[k * n + i]`.
+/// Array of numbers in the memory of a device. It contains the numbers of n states. Number k of state i is stored at
+/// index `[k * n + i]`.
 ///
 /// Dropping the array frees its memory, after all streams have finished with it.
 pub struct DeviceArray<T: Real> {
@@ -47,7 +48,7 @@ impl<T: Real> fmt::Debug for DeviceArray<T> {
 impl<T: Real> Drop for DeviceArray<T> {
     fn drop(&mut self) {
         if let (true, Ok(_current)) = (self.is_owned, self.device.0.current()) {
-            let _ = call!(self.device.0.driver, cuMemFree_v2(self.address)); // freeing waits for all streams
+            let _ = call!(self.device.0.driver, cuMemFree_v2(self.address)); // this call waits for all streams
         }
     }
 }
@@ -76,11 +77,11 @@ impl<T: Real> DeviceArray<T> {
         Ok(array)
     }
 
-    /// Uses memory of another library. The memory is neither copied nor freed.
+    /// Makes an array from memory that another library allocated. The array neither copies nor frees this memory.
     ///
     /// # Safety
-    /// `len` numbers of type `T` must be stored at this address of the device, in memory that outlives the array. A
-    /// stream that is not ordered with the array's streams must neither write to this memory nor read results from it.
+    /// `len` numbers of type `T` must be stored at this address of the device, in memory that outlives the array. Any
+    /// other stream that reads or writes this memory must be ordered with the streams that use the array.
     pub unsafe fn from_raw(device: &Device, address: u64, len: usize) -> Self {
         Self { device: device.clone(), address, len, is_owned: false, number: PhantomData }
     }
@@ -90,7 +91,7 @@ impl<T: Real> DeviceArray<T> {
         self.address
     }
 
-    /// Returns the number of numbers.
+    /// Returns the length of the array: the count of its numbers.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len

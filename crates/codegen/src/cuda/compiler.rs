@@ -47,7 +47,7 @@ impl fmt::Debug for Compiler {
     }
 }
 
-/// Program of NVRTC; dropping it destroys the program.
+/// Program of NVRTC. Dropping this object destroys the program.
 struct Open<'a>(&'a CompilerTable, Program);
 
 impl Drop for Open<'_> {
@@ -97,10 +97,11 @@ impl Compiler {
         Ok(Self { table: CompilerTable::load(&LIBRARY, Some(library))? })
     }
 
-    /// Compiles the kernels of the functions to PTX. It runs on all devices with at least this compute capability, for
-    /// example (7, 0).
+    /// Compiles the kernels of the functions to PTX, NVIDIA's intermediate code. The PTX code runs on all devices with
+    /// at least this compute capability, for example (7, 0).
     ///
-    /// [`Device::load`](crate::cuda::Device::load) loads the result, also on a machine without the compiler.
+    /// [`Device::load`](crate::cuda::Device::load) loads the PTX code. The machine that loads the code does not need
+    /// the compiler.
     ///
     /// # Errors
     /// [`Error::Compile`] with the compiler's log.
@@ -112,8 +113,8 @@ impl Compiler {
         self.compile(name, &text::<T>(name, functions), &architecture)
     }
 
-    /// Compiles to machine code for devices of this compute capability. If the compiler does not know the capability,
-    /// compiles to PTX for the newest earlier one that it knows.
+    /// Compiles kernels to machine code for devices of this compute capability. If the compiler does not know this
+    /// capability, it compiles to PTX for the highest lower capability that it knows.
     pub(super) fn image<T: Real>(
         &self,
         name: &str,
@@ -135,7 +136,7 @@ impl Compiler {
         // SAFETY: the function writes one number to `count`.
         unsafe { (self.table.nvrtcGetNumSupportedArchs)(&raw mut count) };
         let mut all = vec![0; usize::try_from(count).unwrap_or(0)];
-        // SAFETY: the function writes as many entries as the earlier call counted.
+        // SAFETY: the function writes `count` entries, and `all` has `count` entries.
         unsafe { (self.table.nvrtcGetSupportedArchs)(all.as_mut_ptr()) };
         all
     }
@@ -156,16 +157,16 @@ impl Compiler {
         let status = unsafe { (self.table.nvrtcCompileProgram)(open.1, 1, [option.as_ptr()].as_ptr()) };
         let table = &self.table;
         if status != 0 {
-            // SAFETY: the second function writes as many bytes as the first one returns.
+            // SAFETY: `nvrtcGetProgramLog` writes as many bytes as `nvrtcGetProgramLogSize` returns.
             let log = unsafe { open.bytes(table.nvrtcGetProgramLogSize, table.nvrtcGetProgramLog) };
             let log = String::from_utf8_lossy(&log);
             return Err(failed(format!("status {status}: {}", log.trim_end_matches('\0').trim())));
         }
         let image = if architecture.starts_with("sm_") {
-            // SAFETY: the second function writes as many bytes as the first one returns.
+            // SAFETY: `nvrtcGetCUBIN` writes as many bytes as `nvrtcGetCUBINSize` returns.
             unsafe { open.bytes(table.nvrtcGetCUBINSize, table.nvrtcGetCUBIN) }
         } else {
-            // SAFETY: the second function writes as many bytes as the first one returns.
+            // SAFETY: `nvrtcGetPTX` writes as many bytes as `nvrtcGetPTXSize` returns.
             unsafe { open.bytes(table.nvrtcGetPTXSize, table.nvrtcGetPTX) }
         };
         if image.is_empty() { Err(failed("nothing was made".to_owned())) } else { Ok(image) }

@@ -7,7 +7,7 @@ use core::fmt;
 use core::ptr::null_mut;
 use std::sync::Arc;
 
-/// Attributes of a device; the numbers are from CUDA's header.
+/// Identifiers of a device's attributes, from CUDA's header.
 const MULTIPROCESSORS: c_int = 16;
 const CAPABILITY_MAJOR: c_int = 75;
 const CAPABILITY_MINOR: c_int = 76;
@@ -18,9 +18,10 @@ const NON_BLOCKING: u32 = 1;
 /// Flag of an event without timing.
 const DISABLE_TIMING: u32 = 2;
 
-/// A GPU with its primary context. The context is retained while this handle or any object of the device exists.
+/// Handle of a GPU and of the GPU's primary context. The context exists as long as this handle or any object of the
+/// device exists.
 ///
-/// Clones of the handle are the same device. Several threads may use it at the same time.
+/// Clones of the handle refer to the same device. Several threads may use the handle at the same time.
 #[derive(Clone)]
 pub struct Device(pub(super) Arc<Inner>);
 
@@ -77,7 +78,7 @@ impl fmt::Debug for Device {
 }
 
 impl PartialEq for Device {
-    /// Returns whether both handles are the same GPU.
+    /// Returns whether both handles refer to the same GPU.
     fn eq(&self, other: &Self) -> bool {
         self.0.context == other.0.context
     }
@@ -141,8 +142,8 @@ impl Device {
         Ok(Stream { device: self.clone(), handle, is_owned: true })
     }
 
-    /// Returns the legacy default stream. It is ordered with all streams of other libraries, except streams that were
-    /// created as non-blocking.
+    /// Returns the legacy default stream. The default stream is ordered with all streams of other libraries, except
+    /// streams that were created as non-blocking.
     pub fn default_stream(&self) -> Stream {
         Stream { device: self.clone(), handle: null_mut(), is_owned: false }
     }
@@ -150,7 +151,7 @@ impl Device {
 
 /// A queue of work. Copies and kernels in the same stream run one after the other.
 ///
-/// Each copy and each call names its stream. Several threads may use a stream at the same time.
+/// Each copy and each kernel call takes a stream as an argument. Several threads may use a stream at the same time.
 pub struct Stream {
     pub(super) device: Device,
     pub(super) handle: Handle,
@@ -177,7 +178,8 @@ impl Drop for Stream {
 }
 
 impl Stream {
-    /// Uses a stream of another library, given as `CUstream` or `cudaStream_t`. The stream is not destroyed.
+    /// Makes an object for a stream of another library, given as `CUstream` or `cudaStream_t`. Dropping the object does
+    /// not destroy the stream.
     ///
     /// # Safety
     /// The stream must belong to the device's primary context and outlive this object.

@@ -52,8 +52,8 @@ library_functions! { DriverTable:
 macro_rules! call {
     ($driver:expr, $function:ident($($argument:expr),* $(,)?)) => {{
         let driver: &$crate::cuda::Driver = &$driver;
-        // SAFETY: handles live as long as their owners; callers pass valid pointers to results, and the sizes of
-        // results.
+        // SAFETY: each handle is valid while its owner exists. Callers pass valid pointers to results, and the correct
+        // sizes of the results.
         let status = unsafe { (driver.table.$function)($($argument),*) };
         driver.check(stringify!($function), status)
     }};
@@ -93,8 +93,8 @@ impl Driver {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Library`] if the driver cannot be loaded; [`Error::Call`] if it cannot be used, for example without a
-    /// device.
+    /// [`Error::Library`] if the driver cannot be loaded; [`Error::Call`] if the driver cannot be used, for example
+    /// without a device.
     pub fn new() -> Result<Self, Error> {
         Self::load(None)
     }
@@ -123,7 +123,7 @@ impl Driver {
         Ok(usize::try_from(count).unwrap_or(0))
     }
 
-    /// Converts the status that a function returned to a result.
+    /// Converts the status that a driver function returned to a `Result`.
     pub(super) fn check(&self, function: &'static str, status: c_int) -> Result<(), Error> {
         if status == 0 {
             return Ok(());

@@ -65,7 +65,7 @@ pub enum Error {
     Arrays {
         /// Name of the kernel.
         kernel: String,
-        /// `inputs` or `outputs`.
+        /// Arrays whose count is wrong: `inputs` or `outputs`.
         arrays: &'static str,
         /// Number of arrays that the kernel has.
         expected: usize,
@@ -87,7 +87,7 @@ pub enum Error {
     States {
         /// Name of the kernel.
         kernel: String,
-        /// Maximum number of states; indices in the largest array have 32 bits.
+        /// Maximum number of states. It is limited because indices in the largest array have 32 bits.
         most: usize,
         /// Number of states.
         found: usize,

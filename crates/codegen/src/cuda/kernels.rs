@@ -16,14 +16,14 @@ use std::sync::Arc;
 /// Number of threads in a warp. A smaller block would leave some threads of the warp idle.
 const WARP: usize = 32;
 
-/// Attributes of a kernel, and options of the driver's assembler; the numbers are from CUDA's header.
+/// Identifiers of a kernel's attributes and of options of the driver's assembler, from CUDA's header.
 const LOCAL_BYTES: c_int = 3;
 const REGISTERS: c_int = 4;
 const ERROR_LOG: c_int = 5;
 const ERROR_LOG_BYTES: c_int = 6;
 const LOG: usize = 16 * 1024;
 
-/// Compiled and loaded code. It stays loaded until all of its kernels are dropped.
+/// Compiled and loaded code. The code stays loaded until all of its kernels are dropped.
 struct Module {
     device: Device,
     handle: Handle,
@@ -46,8 +46,8 @@ impl Drop for Module {
 impl Device {
     /// Compiles the kernels of the functions for this device, with numbers of type `T`.
     ///
-    /// If the compiler does not know the device, it makes PTX for the newest device that it knows. The driver then
-    /// compiles this PTX.
+    /// If the compiler does not know the device, the compiler makes PTX (intermediate code) for the newest device that
+    /// it knows. The driver then compiles this PTX.
     ///
     /// # Errors
     /// [`Error::Compile`] with the compiler's log; [`Error::Load`]; [`Error::Call`].
@@ -64,7 +64,8 @@ impl Device {
         Kernels::load(self, name, functions, &image)
     }
 
-    /// Loads the kernels of the functions from PTX or CUBIN that a compiler made earlier; NVRTC is not needed.
+    /// Loads the kernels of the functions from PTX or CUBIN that a compiler made earlier. Loading does not need
+    /// NVIDIA's run-time compiler.
     ///
     /// # Safety
     /// `image` must be the complete output of [`Compiler::ptx`] (or of another compiler) for the same functions, the
@@ -124,11 +125,11 @@ pub struct Kernel<T: Real> {
     outputs: Vec<Array>,
     module: Arc<Module>,
     handle: Handle,
-    /// Number of threads that can share a state; each of them is in another row of blocks.
+    /// Number of threads that can compute one state together. Each of these threads is in a separate row of blocks.
     partitions: usize,
-    /// Largest number of states for which each state is split among `partitions` threads.
+    /// Maximum number of states for which a call splits each state among `partitions` threads.
     most_partitioned: usize,
-    /// Number of threads in a block, chosen so that the most warps run on a multiprocessor at the same time.
+    /// Number of threads in a block, chosen to run as many warps as possible on a multiprocessor at the same time.
     threads: usize,
     registers: usize,
     local_bytes: usize,
@@ -188,7 +189,8 @@ impl<T: Real> Kernel<T> {
         &self.outputs
     }
 
-    /// Returns the number of threads that share a state if there are few states; see [`Function::partitions`].
+    /// Returns the number of threads that compute one state together if a call has few states; see
+    /// [`Function::partitions`].
     pub fn partitions(&self) -> usize {
         self.partitions
     }
@@ -203,13 +205,14 @@ impl<T: Real> Kernel<T> {
         self.local_bytes
     }
 
-    /// Returns the maximum number of states in a call; indices in the largest array have 32 bits.
+    /// Returns the maximum number of states in a call. It is limited because indices in the largest array have 32 bits.
     pub fn most_states(&self) -> usize {
         let largest = self.inputs.iter().chain(&self.outputs).map(Array::len).max().unwrap_or(1);
         i32::MAX as usize / largest.max(1)
     }
 
-    /// Computes n states on a stream. The function returns at once; later work in the stream finds the results.
+    /// Launches the kernel on a stream, for n states. The function returns at once. Later work in the same stream can
+    /// use the results.
     ///
     /// Number k of state i is stored at index `[k * n + i]` of its array; matrices are stored column by column. The
     /// call writes all numbers of all outputs.
@@ -249,8 +252,8 @@ impl<T: Real> Kernel<T> {
         )
     }
 
-    /// Returns the number of threads in a block, for n threads in all blocks together. It is smaller than the optimum
-    /// for large n if larger blocks would leave multiprocessors idle.
+    /// Returns the number of threads per block for n threads in total. This number is less than `self.threads` if such
+    /// large blocks would leave multiprocessors idle.
     fn threads_for(&self, n: usize) -> usize {
         let portion = n.div_ceil(self.module.device.0.multiprocessors).next_multiple_of(WARP);
         portion.min(self.threads)

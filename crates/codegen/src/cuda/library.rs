@@ -6,7 +6,7 @@ use libloading::Library;
 use std::ffi::OsString;
 use std::path::Path;
 
-/// Name of a library, and the files in which it may be.
+/// Name of a library, and the names of files that may contain the library.
 pub(super) struct Named {
     pub(super) library: &'static str,
     pub(super) variable: &'static str,
@@ -14,8 +14,8 @@ pub(super) struct Named {
 }
 
 impl Named {
-    /// Loads the library from the given file. Without a file, loads it from the file named by the environment variable
-    /// or, if that is missing, from the system's search path.
+    /// Loads the library from the given file. Without a file, loads the library from the file named by the environment
+    /// variable. Without this variable, searches the system's path.
     pub(super) fn load(&self, file: Option<&Path>) -> Result<Library, Error> {
         let given = file.map(|file| file.as_os_str().to_owned()).or_else(|| std::env::var_os(self.variable));
         let files = match given {
@@ -38,7 +38,7 @@ impl Named {
     }
 }
 
-/// Returns the message of the system.
+/// Returns the system's message about a failed load.
 pub(super) fn said(error: &libloading::Error) -> String {
     error.source().map_or_else(|| error.to_string(), ToString::to_string)
 }
@@ -61,7 +61,7 @@ macro_rules! library_functions {
                 let library = named.load(file)?;
                 let table = Self {
                     $($function: {
-                        // SAFETY: the type is the type of the function in NVIDIA's header.
+                        // SAFETY: the declared type equals the function's type in NVIDIA's header.
                         let found = unsafe { library.get(concat!(stringify!($function), "\0").as_bytes()) };
                         *found.map_err(|error| named.failed($crate::cuda::library::said(&error)))?
                     },)*

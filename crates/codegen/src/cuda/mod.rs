@@ -19,10 +19,11 @@
 //! # Ok::<(), condyle_codegen::cuda::Error>(())
 //! ```
 //!
-//! Building a program that uses this module needs nothing of CUDA. At run time, [`Driver::new`] loads the driver's
-//! library, and [`Compiler::new`] loads NVIDIA's run-time compiler (NVRTC). Both search the system's path, or take the
-//! files named by the environment variables `CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY`. Without NVRTC,
-//! [`Device::load`] takes PTX that [`Compiler::ptx`] made elsewhere; making PTX needs no GPU.
+//! A program that uses this module can be built without CUDA. At run time, [`Driver::new`] loads the driver's library,
+//! and [`Compiler::new`] loads NVIDIA's run-time compiler (NVRTC). Each library is searched in the system's path, or
+//! loaded from a file named by an environment variable: `CONDYLE_CUDA_LIBRARY` or `CONDYLE_NVRTC_LIBRARY`. On a machine
+//! without NVRTC, [`Device::load`] loads PTX code that [`Compiler::ptx`] made on another machine. Making PTX code needs
+//! no GPU.
 //!
 //! All work uses the device's primary context, which other libraries in the process also use. [`DeviceArray::from_raw`]
 //! and [`Stream::from_raw`] use arrays and streams of other libraries.

@@ -1,10 +1,10 @@
 //! Forward dynamics by the articulated-body algorithm, in the bodies' own frames.
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, line by line. As in RNEA, the classical
-//! acceleration of each origin replaces the spatial acceleration, so no linear velocity is needed. This form is for
-//! code that is recorded for one robot. A joint rotates the quantities of its body about one axis, so constants and
-//! zeros of placements and inertias fold. In the world's frame (`aba.rs` of `dynamics`), every number depends on all
-//! joints between the body and the world. Generated code is tested against `aba.rs`.
+//! acceleration of each origin replaces the spatial acceleration, so no linear velocity is needed. This form is used
+//! only for code that is recorded for one robot. In a body's frame, placements and inertias have many constants and
+//! zeros, which the recording simplifies. In the world's frame (`aba.rs` of `dynamics`), every number depends on all
+//! joints between the body and the world. Tests compare generated code with `aba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::kinematics::JointSinCos;
@@ -12,7 +12,7 @@ use condyle_model::joint::{ClassicalMotion, Joint, JointMotion};
 use condyle_model::layout::Layout;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 
-/// Computes q̈ by the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
+/// Computes q̈ with all passes of the algorithm. The function allocates vectors: a recording also allocates memory.
 pub(super) fn pass<L: Layout>(l: &L, q: &[L::S], qd: &[L::S], tau: &[L::S], f_ext: &[Force<L::S>], qdd: &mut [L::S]) {
     let n = l.bodies().end;
     let mut angles = JointSinCos::new(n);

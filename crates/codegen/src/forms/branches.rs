@@ -1,16 +1,17 @@
-//! The inverse of M, and products with it, from the factor of a tree. The forms here have few operations, for recorded
-//! numbers.
+//! M⁻¹, and products with M⁻¹, from the factor L of M = Lᵀ D L. The tree of the robot determines the non-zero entries
+//! of L. These algorithms need few operations, which makes recorded code short.
 //!
-//! Let L x = b. If all entries of b on the path from k to an ancestor are zero, x_k depends on b only through that
-//! ancestor:
+//! Let L x = b. Let the entries of b be zero from index k back to an ancestor of k. Then x_k depends only on the
+//! entries of x at the ancestor and at the indices before the ancestor:
 //!
 //! ```text
 //! x_k = −Σ L_ke x_e = Σ G_ke x_e     with G_ke = −L_ke − Σ L_kf G_fe
 //! ```
 //!
-//! Here e runs over the ancestor and the indices before it, and f runs over the indices between the ancestor and k.
-//! Rows of G are as short as the branches' common path to the root. They serve every b whose non-zero entries are in
-//! other branches. Rows of one branch give sums with the same structure, which compilers can vectorise.
+//! Here e runs over the ancestor and the indices before it, and f runs over the indices between the ancestor and k. A
+//! row of G has one entry for each index that two branches have in common on their paths to the root. So the row is
+//! short. The same row applies to every b whose non-zero entries are in other branches. All rows of a branch give sums
+//! with the same structure, which compilers can vectorise.
 
 use condyle_linalg::elimination_tree::NONE;
 use condyle_linalg::{Ltdl, check};
@@ -20,18 +21,18 @@ use std::collections::BTreeMap;
 /// Rows of G. The key of a row is the index k and the number of indices before k that the row covers.
 pub struct Branches<'f, S> {
     factor: &'f Ltdl<S>,
-    /// Indices before each index, on its path from the root.
+    /// For each index, the indices before it on the path from the root.
     before: Vec<Vec<usize>>,
-    /// Number of indices before each index that are not in its branch. A branch begins after the last index with
-    /// several children.
+    /// For each index, the number of indices before it that belong to other branches. A branch begins after the last
+    /// index with several children.
     before_branch: Vec<usize>,
-    /// −D⁻¹.
+    /// Entries of the diagonal matrix −D⁻¹.
     minus_inverse_diagonal: Vec<S>,
     rows: BTreeMap<(usize, usize), Vec<S>>,
 }
 
 impl<'f, S: Scalar> Branches<'f, S> {
-    /// Creates the object for a factor. Rows are computed when they are needed.
+    /// Creates `Branches` for a factor. Each row of G is computed when it is first needed.
     pub fn new(factor: &'f Ltdl<S>) -> Self {
         let parents = &factor.tree().parent;
         let (mut before, mut before_branch): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
@@ -76,7 +77,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         (0..m).fold(start, |sum, p| sum + G[p] * x(self.before[k][p]))
     }
 
-    /// Replaces b by x = −M⁻¹ b. Zeros are skipped.
+    /// Replaces b by x = −M⁻¹ b. Zeros of b cost no operations.
     ///
     /// # Panics
     /// If `b` does not have nv numbers.
@@ -94,7 +95,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         let (mut x, mut own) = (vec![S::zero(); n], vec![S::zero(); n]);
         for k in 0..n {
             let (way, L) = (&self.before[k][..], factor.row_from_root(k));
-            // L x = −D⁻¹ y. First add the contribution of k's own branch, then the contribution of the indices before
+            // L x = −D⁻¹ y. Add the contribution of k's own branch first, then the contribution of the indices before
             // this branch.
             let m = if is_given[k] {
                 let m = self.before_branch[k];
@@ -111,8 +112,8 @@ impl<'f, S: Scalar> Branches<'f, S> {
         }
     }
 
-    /// Computes X = M⁻¹, as [`Ltdl::inverse`] does. X_kj of two branches is computed through the indices before both
-    /// branches.
+    /// Computes X = M⁻¹, as [`Ltdl::inverse`] does. If k and j are in different branches, X_kj is computed from the
+    /// entries X_ej, where e runs over the common ancestors of k and j.
     ///
     /// # Panics
     /// If `X` is not nv × nv.
@@ -125,7 +126,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
             for j in 0..k {
                 let ways = self.before[k].iter().zip(self.before[j].iter().chain([&j]));
                 let common = ways.take_while(|(a, b)| a == b).count();
-                // if j is on the path from the root to k, take all indices before k
+                // If j is an ancestor of k, the sum runs over all indices before k.
                 let m =
                     if self.before[k].get(common.wrapping_sub(1)) == Some(&j) { self.before[k].len() } else { common };
                 let x = self.through(k, m, S::zero(), |e| X[at(e, j)]).kept();

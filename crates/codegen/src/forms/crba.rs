@@ -1,9 +1,9 @@
 //! The joint-space inertia matrix by the composite-rigid-body algorithm, in the bodies' own frames.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. This form is for code that
-//! is recorded for one robot: constants and zeros of placements and inertias fold, and S_eᵀ F is a component of F. In
-//! the world's frame of `crba.rs`, every number depends on all joints between the body and the world. Generated code is
-//! tested against `crba.rs`.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. This form is used only for
+//! code that is recorded for one robot. In a body's frame, placements and inertias have many constants and zeros, which
+//! the recording simplifies. In addition, S_eᵀ F is a component of F. In the world's frame (`crba.rs` of `dynamics`),
+//! every number depends on all joints between the body and the world. Tests compare generated code with `crba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::Joint;
@@ -11,7 +11,7 @@ use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::Columns;
 use condyle_spatial::{Act, Inertia, Se3};
 
-/// Computes M by the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
+/// Computes M with the complete algorithm. The function allocates vectors: a recording also allocates memory.
 pub(super) fn pass<L: Columns>(l: &L, q: &[L::S], M: &mut [L::Number]) {
     let n = l.bodies().end;
     let mut angles = JointSinCos::new(n);

@@ -1,10 +1,10 @@
-//! The pose of a joint, and its effect on quantities of the joint's body.
+//! Pose of a joint, and transforms of the body's quantities by this pose.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::Layout;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// X_J(q), the pose of the body's frame in the joint's frame, in the form with the fewest operations.
+/// Joint pose X_J(q): pose of the body's frame in the joint's frame, in the form with the fewest operations.
 #[derive(Clone, Copy, Debug)]
 pub enum JointPlacement<S> {
     /// A rotation about z.
@@ -19,7 +19,8 @@ pub enum JointPlacement<S> {
 }
 
 impl<S: Scalar> JointPlacement<S> {
-    /// Returns the placement of joint i, with λXi = X_T X_J, from the sine and cosine of its angle.
+    /// Returns the pose X_J of joint i, given the sine and cosine of the joint's angle. With the constant placement
+    /// X_T, the pose of body i in its parent's frame is λXi = X_T X_J.
     pub(crate) fn of<L: Layout<S = S>>(l: &L, i: usize, q: &[S], sin: S, cos: S) -> Self {
         if l.joint(i).turns_about_z() {
             return Self::AboutZ { sin, cos };
@@ -64,7 +65,7 @@ fn about_z<S: Scalar>(sin: S, cos: S, x: Vec3<S>) -> Vec3<S> {
 /// a' = a − s g,   d' = d + s g,   b' = c g − e,   e' = c g − b     with g = s (a − d) + c (b + e)
 /// ```
 ///
-/// This takes half the multiplications of two products of matrices.
+/// These formulas need half as many multiplications as two matrix products.
 fn matrix_about_z<S: Scalar>(sin: S, cos: S, A: Mat3<S>) -> Mat3<S> {
     let (a, b, e, d) = (A.x.x, A.y.x, A.x.y, A.y.y);
     let g = (a - d).mul_add(sin, (b + e) * cos);
@@ -83,7 +84,7 @@ fn symmetric_about_z<S: Scalar>(sin: S, cos: S, A: Sym3<S>) -> Sym3<S> {
     Sym3 { xx: A.xx - g * sin, xy: g.mul_add(cos, -A.xy), yy: g.mul_add(sin, A.yy), xz: z.x, yz: z.y, zz: A.zz }
 }
 
-/// Quantity of a body that a joint transforms into the joint's frame, on the parent's side.
+/// Quantity of a body that a joint pose transforms from the body's frame to the joint's frame.
 pub trait Carried<S>: Sized {
     /// Returns the quantity after the transform X.
     fn carried_by(self, X: &JointPlacement<S>) -> Self;

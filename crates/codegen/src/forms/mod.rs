@@ -1,8 +1,9 @@
 //! Algorithms in the forms that have the fewest operations when they are recorded for one robot.
 //!
-//! Code for one robot has neither loops nor operations with zeros. So ABA and CRBA run in the bodies' frames, where
-//! constants fold. If M is sparse, M and its factor give accelerations and their derivatives. The branches of the
-//! factor give M⁻¹. These functions replace the library's functions of the same names, also in functions of users.
+//! Code recorded for one robot has neither loops nor operations with zeros. So ABA and CRBA compute in the bodies'
+//! frames, where many operands are constants. If the inertia matrix M is sparse, accelerations and their derivatives
+//! are computed from M and its factor. M⁻¹ is computed from the branches of this factor. The generator calls these
+//! functions in place of the library's functions of the same names. Functions that users record can also call them.
 
 mod aba;
 pub(crate) mod branches;
@@ -20,10 +21,10 @@ use condyle_model::layout::Single;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 use nalgebra::{DMatrix, DVectorView};
 
-/// q̈ and its derivatives, as in [`condyle_dynamics::AbaDerivatives`].
+/// Acceleration q̈ and its derivatives, as in [`condyle_dynamics::AbaDerivatives`].
 #[derive(Clone, Debug)]
 pub struct ForwardDerivatives<S> {
-    /// q̈, nv numbers.
+    /// Acceleration q̈, nv numbers.
     pub a: Vec<S>,
     /// ∂q̈/∂q in the tangent space, nv × nv.
     pub da_dq: DMatrix<S>,
@@ -87,9 +88,9 @@ pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: 
     }
 }
 
-/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. M and its factor also give the
-/// acceleration, with fewer operations than articulated bodies need. They also give ∂q̈ if the factor has fewer entries
-/// than M⁻¹.
+/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. The acceleration is computed from M
+/// and its factor, which takes fewer operations than the articulated-body algorithm. The derivatives ∂q̈ are also
+/// computed from the factor if this takes fewer operations than M⁻¹.
 ///
 /// # Panics
 /// As in [`condyle_dynamics::aba_derivatives`].
@@ -134,7 +135,7 @@ fn floating<S: Scalar, R: Constant<S>>(model: &Model<R>) -> Vec<(usize, usize)> 
     model.floating().map(|i| (i, model.nodes()[i].idx_v)).filter(is_free).collect()
 }
 
-/// Computes τ − h + Σ Jᵢᵀ f_ext,i.
+/// Computes the efforts τ − h + Σ Jᵢᵀ f_ext,i, with the bias efforts h and the external forces f_ext.
 fn free_effort<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -151,14 +152,14 @@ fn zeros<S: Scalar, R>(model: &Model<R>) -> DMatrix<S> {
     DMatrix::from_element(model.nv(), model.nv(), S::zero())
 }
 
-/// M⁻¹, and the factor of M if it was computed.
+/// Inverse M⁻¹ of the inertia matrix, and the factor of M if the factor was computed.
 struct Inverse<S> {
     factor: Option<Ltdl<S>>,
     Minv: DMatrix<S>,
 }
 
 impl<S: Scalar> Inverse<S> {
-    /// Computes the inverse of M. Returns `None` if the library computes M⁻¹ of this model without M.
+    /// Computes the inverse of M. Returns `None` if, for this model, the library's algorithm computes M⁻¹ without M.
     fn of<R>(model: &Model<R>, M: impl FnOnce() -> DMatrix<S>) -> Option<Self> {
         model.check_regular();
         let (mut factor, mut Minv) = (Ltdl::new(model), zeros(model));
@@ -187,8 +188,9 @@ impl<S: Scalar> Inverse<S> {
         }
     }
 
-    /// Computes −M⁻¹ B, except for known columns, which stay zero. It uses the factor if this takes fewer products and
-    /// sums than M⁻¹: twice the number of the factor's entries, compared with nv².
+    /// Computes −M⁻¹ B for two matrices B. The known columns of the results are not computed; they stay zero. The
+    /// function uses M's factor if twice the number of the factor's entries is less than nv². Then solving with the
+    /// factor takes fewer operations than multiplying by M⁻¹.
     fn neg_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
         let n = model.nv();
         let mut all = B.map(|(B, known)| {

@@ -5,8 +5,8 @@ use crate::function::Array;
 use crate::program::Program;
 use core::fmt::Write;
 
-/// Code of sines and cosines, without branches except for angles out of range. It has the same sums and products as the
-/// library (`condyle_spatial::Scalar::sin_cos`), and compilers vectorise it.
+/// Code of sines and cosines, without branches except for angles out of range. The code computes the same sums and
+/// products as the library (`condyle_spatial::Scalar::sin_cos`), and compilers vectorise it.
 const SIN_COS: &str = include_str!("sin_cos.c");
 
 /// Code of vector types and functions. It uses GCC's extensions, which clang also has.
@@ -16,7 +16,7 @@ const VECTORS: &str = include_str!("vectors.c");
 pub(crate) struct C {
     /// Type of numbers.
     pub real: &'static str,
-    /// Number of states that a call computes, in vectors.
+    /// Number of states that a call computes at the same time, as lanes of vectors.
     pub lanes: usize,
     /// Name of all files, which is also the prefix of the functions.
     pub name: String,

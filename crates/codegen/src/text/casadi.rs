@@ -37,11 +37,11 @@ pub(crate) fn file(name: &str, programs: &[Program]) -> SourceFile {
 
 /// Result that CasADi requests.
 enum Output {
-    /// A result of the called function.
+    /// Result of the called function.
     Result(Array),
-    /// The derivative of a result y with respect to the restitution e of an impact. y is affine in e. Its value at e =
-    /// -1 is known, because nothing happens there: `v_after` is v, and impulses are 0. So dy/de = (y - y(-1)) / (1 +
-    /// e).
+    /// Derivative of a result y with respect to the restitution e of an impact. y is affine in e. At e = -1, the value
+    /// of y is known, because the impact then has no effect: `v_after` is v, and impulses are 0. So dy/de = (y - y(-1))
+    /// / (1 + e).
     ByRestitution(Array),
 }
 
@@ -55,15 +55,16 @@ impl Output {
     }
 }
 
-/// Returns the name that a result has in its derivatives: `v_after` is the new value of `v`, and is named `v` there.
+/// Returns the name of a result y in the names `dy_dx` of its derivatives. For example, the name is `v` for the result
+/// `v_after`, which is the new value of `v`.
 fn differentiated(y: &Array) -> &str {
     y.name.strip_suffix("_after").unwrap_or(&y.name)
 }
 
-/// Returns the function that computes the derivatives of a function, if it exists. It must differentiate with respect
-/// to the numbers of each argument, so positions with quaternions are excluded. The results are `dy_dx` of
+/// Returns the function that computes the derivatives of a function, if it exists. Positions with quaternions are
+/// excluded, because CasADi needs derivatives with respect to each number of an argument. The results are `dy_dx` of
 /// `f_derivatives` for each output y (or `y_after`) and each input x of `f`, in CasADi's names and order. Derivatives
-/// with respect to the restitution of an impact need no result.
+/// with respect to the restitution of an impact do not need a result of `f_derivatives`.
 fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Function, Vec<(String, Output)>)> {
     let name = format!("{}_derivatives", function.name);
     let derivatives = programs.iter().map(|program| program.function).find(|f| f.name == name)?;
@@ -81,8 +82,9 @@ fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Fu
     (derivatives.inputs == function.inputs).then_some((derivatives, blocks))
 }
 
-/// Returns CasADi's interface of one function, whose arrays have these names. The interface calls a generated function,
-/// which takes only the first of these inputs.
+/// Returns CasADi's interface of one function. `inputs` and `outputs` contain the arrays and the names that CasADi
+/// gives them. The interface calls the generated function `function`, which can have fewer inputs: only the first of
+/// `inputs`.
 fn interface(
     name: &str,
     inputs: &[(String, Array)],
@@ -129,7 +131,7 @@ fn interface(
         let names: Vec<String> = arrays.iter().map(|(name, _)| format!("\"{name}\"")).collect();
         let shapes: Vec<String> = arrays.iter().map(|(_, (rows, cols))| format!("{{{rows}, {cols}, 1}}")).collect();
         let n = arrays.len();
-        // An array of size 0 is invalid in C, so it gets an additional entry.
+        // An array of size 0 is invalid in C, so each array gets an additional entry.
         let _ = write!(
             text,
             "EXPORT const char *{name}_name_{which}(casadi_int i) {{\n    \

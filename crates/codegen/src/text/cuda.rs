@@ -1,5 +1,5 @@
-//! Writes CUDA code. A thread computes a state or one of the state's partitions. In memory, the first numbers of all
-//! states come first.
+//! Writes CUDA code. Each thread computes one state, or one partition of a state. An array contains the first number of
+//! every state, then the second number of every state, and so on.
 
 use super::{Dialect, SourceFile, Writer, description, heading, interface, prefixed};
 use crate::function::{Array, Function};
@@ -8,7 +8,7 @@ use crate::program::Program;
 use crate::text::c::C;
 use core::fmt::Write;
 
-/// Syntax of C, for arrays that contain all states.
+/// Syntax of CUDA: the syntax of C, with arrays that contain all states.
 struct Cuda(C);
 
 impl Dialect for Cuda {
@@ -104,7 +104,7 @@ fn kernel(whole: &Writer<Cuda>, partitions: &[Writer<Cuda>], name: &str) -> Stri
             let call = device_function(&mut text, whole, &format!("{symbol}_whole"));
             body.push(format!("if (gridDim.y == 1) return {call}"));
         }
-        // The existing rows of blocks also compute the partitions that have no row of their own.
+        // If the launch has fewer rows of blocks than partitions, each row computes several partitions in turn.
         let count = partitions.len();
         body.push(format!(
             "for (int partition = blockIdx.y; partition < {count}; partition += gridDim.y) switch (partition) {{"
@@ -126,8 +126,8 @@ fn kernel(whole: &Writer<Cuda>, partitions: &[Writer<Cuda>], name: &str) -> Stri
     text
 }
 
-/// Returns the parts of a program as functions, and the lines that call them. A program with one part has no functions,
-/// and lines that compute everything.
+/// Returns the parts of a program as functions, and the lines that call these functions. For a program with only one
+/// part, returns no functions, and the lines that compute this part.
 fn computation(writer: &Writer<Cuda>, name: &str) -> (String, Vec<String>) {
     let program = writer.program;
     let (real, function) = (writer.dialect.0.real, program.function);

@@ -1,4 +1,4 @@
-//! Writes programs as text. This module contains what all languages have in common.
+//! Writes programs as text. This module contains the code that all languages have in common.
 
 mod c;
 mod casadi;
@@ -30,32 +30,32 @@ pub enum Language {
     C,
     /// C99 with `float`.
     CFloat,
-    /// C99 with vectors of GCC and clang. A call computes four states, with `double`.
+    /// C99 with vectors of GCC and clang. Each call computes four states in `double` precision.
     CFour,
-    /// C99 with vectors. A call computes eight states, with `double`.
+    /// C99 with vectors of GCC and clang. Each call computes eight states in `double` precision.
     CEight,
-    /// C99 with vectors. A call computes four states, with `float`.
+    /// C99 with vectors of GCC and clang. Each call computes four states in `float` precision.
     CFloatFour,
-    /// C99 with vectors. A call computes eight states, with `float`.
+    /// C99 with vectors of GCC and clang. Each call computes eight states in `float` precision.
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
-    /// `robot_aba_casadi` for `robot_aba`. The interface has the Jacobian if `robot_aba_derivatives` is also generated,
-    /// and if the robot has neither quaternions nor points on circles. For impacts, the Jacobian also has the columns
-    /// of the restitution, which the functions of derivatives lack.
+    /// `robot_aba_casadi` for `robot_aba`. The interface has the Jacobian if `robot_aba_derivatives` is also generated.
+    /// In addition, no position coordinates of the robot may be quaternions or points on circles. For impacts, the
+    /// Jacobian also has columns for the restitution; the generated functions of derivatives have no such columns.
     CCasadi,
     /// A module of Rust with `f64`, without `std`.
     Rust,
     /// A module of Rust with `f32`, without `std`.
     RustFloat,
-    /// CUDA with `double`. A thread computes a state, or one of the state's partitions ([`Function::partitions`]). In
-    /// memory, the first numbers of all states come first.
+    /// CUDA with `double`. Each thread computes one state, or one partition of a state ([`Function::partitions`]). An
+    /// array contains the first number of every state, then the second number of every state, and so on.
     Cuda,
     /// CUDA with `float`.
     CudaFloat,
 }
 
 impl Language {
-    /// Names of the languages, as [`named`](Self::named) takes them.
+    /// Names of the languages. [`named`](Self::named) converts a name to a language.
     pub const NAMES: [&str; 11] = [
         "c",
         "c-float",
@@ -88,7 +88,7 @@ impl Language {
         Self::NAMES.iter().position(|&known| known == name).map(|k| all[k])
     }
 
-    /// Returns the number of registers of a GPU's thread that a number takes; `None` for other languages than CUDA.
+    /// Returns the number of GPU registers that one number occupies; `None` if the language is not CUDA.
     pub(crate) fn registers_of_number(self) -> Option<usize> {
         match self {
             Self::Cuda => Some(2),
@@ -137,8 +137,8 @@ impl Language {
     }
 
     /// Returns the name of the files: the robot's name, then `_float`, then `_x4` or `_x8`. In C and CUDA it is also
-    /// the prefix of the functions. So files of several languages can be in one folder, and their functions in one
-    /// program.
+    /// the prefix of the functions. So one folder can contain the files of several languages, and one program can
+    /// contain their functions.
     ///
     /// ```
     /// use condyle_codegen::Language;
@@ -159,11 +159,12 @@ impl Language {
 }
 
 impl Function {
-    /// Returns the number of threads that can share a state in the function's kernel. It is 1 for other languages than
-    /// CUDA.
+    /// Returns the number of threads that can compute one state together in the function's kernel. It is 1 if the
+    /// language is not CUDA.
     ///
-    /// A robot's function is split by limbs if one thread would need more values than it has registers. In addition,
-    /// the largest partition must shrink by a larger factor than the factor by which the sum of all partitions grows.
+    /// A robot's function is split by limbs if two conditions hold. One thread would need to hold more values than fit
+    /// into its registers. And the split must save time: the whole function divided by the largest partition must
+    /// exceed the sum of all partitions divided by the whole function (in operations).
     /// [`Settings::partitions`](crate::Settings::partitions) can set the number. If a kernel is launched with this
     /// number of rows of blocks (`blockIdx.y`), each row computes one partition. With one row, each thread computes a
     /// whole state.
@@ -182,27 +183,29 @@ impl Function {
     }
 }
 
-/// Syntax of a language. Each function returns code.
+/// Syntax of a language. Each function returns text in this language.
 pub(crate) trait Dialect {
-    /// Returns a constant.
+    /// Returns the code of a constant.
     fn number(&self, x: f64) -> String;
-    /// Returns an element of an array.
+    /// Returns the code of an element of an array.
     fn element(&self, array: &str, index: &str) -> String {
         format!("{array}[{index}]")
     }
-    /// Returns an element of the work space.
+    /// Returns the code of an element of the work space `w`, the array for intermediate values.
     fn work(&self, slot: &str) -> String {
         format!("w[{slot}]")
     }
-    /// Returns a loop over k = 0, 1, …, n − 1, whose body is one line that uses this name for k.
+    /// Returns the code of a loop over k = 0, 1, …, n − 1, whose body is one line that uses this name for k.
     fn repeat(&self, k: &str, n: usize, line: &str) -> String {
         format!("for (int {k} = 0; {k} < {n}; {k}++) {line}")
     }
-    /// Returns a vector of equal numbers from a constant, if no operation of the language extends constants to vectors.
+    /// Converts the code of a constant to the code of a vector of equal numbers. Languages whose operators accept
+    /// constants return the code unchanged.
     fn whole(&self, value: String) -> String {
         value
     }
-    /// Returns a line across which compilers do not move memory accesses; `None` if the language has none.
+    /// Returns a line across which compilers do not move memory accesses; `None` if the language does not have such a
+    /// line.
     fn fence(&self) -> Option<&'static str> {
         None
     }
@@ -218,23 +221,23 @@ pub(crate) trait Dialect {
             _ => format!("{c} - {a} * {b}"),
         }
     }
-    /// Returns a selection by a mask.
+    /// Returns the code of a selection: a if the mask is true, otherwise b.
     fn select(&self, mask: &str, a: &str, b: &str) -> String;
-    /// Returns a call of a function of one number, `sqrt` or `abs`.
+    /// Returns the code that calls `sqrt` or `abs` with one number.
     fn call(&self, function: &str, a: &str) -> String;
-    /// Returns the angle of the point (x, y).
+    /// Returns the code of the angle of the point (x, y).
     fn atan2(&self, y: &str, x: &str) -> String;
-    /// Returns a mask converted to a number of the work space.
+    /// Returns the code that converts a mask to a number, which the work space can store.
     fn mask_to_work(&self, mask: &str) -> String;
-    /// Returns a mask converted from a number of the work space.
+    /// Returns the code that converts a number of the work space to a mask.
     fn mask_from_work(&self, number: &str) -> String;
-    /// Returns a constant mask: true or false.
+    /// Returns the code of a constant mask: true or false.
     fn truth(&self, holds: bool) -> &'static str;
 }
 
 /// Number of steps between two fences. Without fences, LLVM's scheduler moves loads far ahead of their uses, which
-/// spills registers. With fences, vectors of Talos's derivatives take 0.72 of the time; the gain is the same for 20 to
-/// 200 steps.
+/// spills registers. With fences, the vectorised derivatives of the robot Talos take 0.72 of the time. The gain is the
+/// same for distances of 20 to 200 steps.
 const FENCED: usize = 50;
 
 /// Writer of the code of a program's parts.
@@ -242,7 +245,7 @@ pub(crate) struct Writer<'p, D> {
     pub program: &'p Program<'p>,
     pub dialect: D,
     inputs: Vec<(usize, usize)>,
-    /// Indices of the results that are equal to each value.
+    /// For each value, the indices of the results that are equal to the value.
     goes_to: Vec<Vec<usize>>,
     outputs: &'p [(usize, usize)],
 }
@@ -324,7 +327,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
                     continue;
                 }
             };
-            // A value that is only a result needs no variable.
+            // If no later step uses the value, write it to the result without a variable.
             let used_later = self.program.places[id as usize] != Place::Local || self.is_taken(id);
             if let ([only], false) = (&self.goes_to[id as usize][..], used_later) {
                 lines.push(format!("{} = {text};", self.output(*only)));
@@ -353,7 +356,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// Returns the code of number k among all outputs.
+    /// Returns the code of the output number with index k among the numbers of all outputs.
     fn output(&self, k: usize) -> String {
         let (array, index) = self.outputs[k];
         self.dialect.element(&self.program.function.outputs[array].name, &index.to_string())
@@ -404,7 +407,8 @@ impl<'p, D: Dialect> Writer<'p, D> {
         name
     }
 
-    /// Returns the lines that write results which no part computes: constants, inputs, and sines and cosines of inputs.
+    /// Returns the lines that write results that no part computes. Such results are constants, inputs, and sines and
+    /// cosines of early angles.
     pub(crate) fn given_results(&self) -> Vec<String> {
         let part_of = &self.program.part_of;
         let given =
@@ -413,7 +417,8 @@ impl<'p, D: Dialect> Writer<'p, D> {
         given.map(|(k, &id)| format!("{} = {};", self.output(k), value(id))).collect()
     }
 
-    /// Returns the names of arrays that a function does not use: inputs without effect, and results without numbers.
+    /// Returns the names of arrays that a function does not use: inputs that no result depends on, and results of
+    /// length 0.
     pub(crate) fn unused_arrays(&self) -> Vec<&'p str> {
         let inputs = &self.program.function.inputs;
         let mut unused = vec![true; inputs.len()];
@@ -427,7 +432,8 @@ impl<'p, D: Dialect> Writer<'p, D> {
         unread.chain(empty).map(|array| &*array.name).collect()
     }
 
-    /// Returns the code of an early angle as one expression.
+    /// Returns the code of an early angle as one expression. (The sine and cosine of an early angle are computed before
+    /// all steps.)
     pub(crate) fn angle(&self, id: Id) -> String {
         let inside = |id| self.angle(id);
         match self.program.steps.nodes[id as usize] {
@@ -461,7 +467,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
     }
 }
 
-/// Returns the description of a function as lines: arguments, results and costs.
+/// Returns the description of a function as lines of text: arguments, results, and numbers of operations.
 pub(crate) fn description(program: &Program) -> Vec<String> {
     let mut lines = interface(program.function);
     lines.push(format!("Operations: {}.", program.steps.operations()));
@@ -509,7 +515,7 @@ pub(crate) fn prefixed(prefix: &str, lines: &[String]) -> String {
     text
 }
 
-/// Returns the digits of a number; reading them gives the same number.
+/// Returns the decimal digits of a number. Parsing these digits gives exactly the same number.
 pub(crate) fn digits(x: f64) -> String {
     format!("{x:?}")
 }

@@ -112,7 +112,7 @@ impl Program {
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes }
     }
 
-    /// Compiles Rust code with `rustc` as a library without `std`. A warning is an error. Also checks the code as an
+    /// Compiles Rust code with `rustc` as a library without `std`. A warning is an error. Also compiles the code as an
     /// unused private module, with lints that are off by default.
     pub(crate) fn rust(folder: &Path, functions: &[Function], is_float: bool) -> Self {
         let (language, real) = if is_float { (Language::RustFloat, "f32") } else { (Language::Rust, "f64") };
@@ -170,7 +170,7 @@ impl Program {
 }
 
 /// Panics if results differ by more than a bound. The bound is relative to the largest number of each array, or to 1 if
-/// all are smaller.
+/// all numbers are smaller than 1.
 pub(crate) fn assert_equal(what: &str, function: &Function, found: &[Vec<f64>], expected: &[Vec<f64>], bound: f64) {
     for ((array, found), expected) in function.outputs.iter().zip(found).zip(expected) {
         assert_eq!(
