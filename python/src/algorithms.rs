@@ -28,8 +28,8 @@ functions! {
 /// Computes the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a (inverse dynamics),
 /// nv numbers (N m, N); O(n).
 ///
-/// q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m). It acts at the body's origin and
-/// is expressed in the body's frame; row 0 belongs to the world.
+/// q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m). Each force acts at the origin of
+/// its body and is expressed in the body's frame; row 0 belongs to the world.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
@@ -45,9 +45,9 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 ///
-/// Raises `ModelError` if M is singular at every position. M may also be singular only at this position, as for a point
-/// mass on the axis about which it turns. Then the result is not finite, or is a large number caused by rounding
-/// errors.
+/// Raises `ModelError` if M is singular at every position. M may also be singular at this position only, for example if
+/// a point mass lies on the axis of its joint. Then the acceleration is not finite, or is a large number caused by
+/// rounding errors.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -159,7 +159,8 @@ batch b: any(q: Position, v: Tangent) -> One { b.coriolis_matrix(model, q, v) }
 /// dtau_dv, dtau_da)`, each (nv, nv).
 ///
 /// q: nq numbers; v, a: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent space:
-/// the change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
+/// it is the derivative of τ at `integrate(q, δ)` with respect to δ, at δ = 0. out: three arrays, such as an earlier
+/// result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
@@ -176,7 +177,8 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaD
 /// da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent
-/// space: the change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+/// space: it is the derivative of q̈ at `integrate(q, δ)` with respect to δ, at δ = 0. out: four arrays, such as an
+/// earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data = condyle.Data(arm)

@@ -19,19 +19,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct BodyId {
     inner: condyle::tree::BodyId,
-    /// Number of the builder that made the body; `None` for the world.
+    /// Identifying number of the builder that made the body; `None` for the world.
     builder: Option<u64>,
 }
 
 #[pymethods]
 impl BodyId {
-    /// Returns `condyle.WORLD` for the world, and the same text for all other bodies.
+    /// Returns `condyle.WORLD` for the world, and `<condyle.BodyId>` for every other body.
     fn __repr__(&self) -> &'static str {
         if self.builder.is_none() { "condyle.WORLD" } else { "<condyle.BodyId>" }
     }
 }
 
-/// Returns the world, which is the parent of the first joints.
+/// Returns the identity of the world, which is the parent of root joints.
 pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
     static WORLD: PyOnceLock<Py<BodyId>> = PyOnceLock::new();
     WORLD.get_or_try_init(py, || Py::new(py, BodyId { inner: condyle::WORLD, builder: None }))
@@ -61,7 +61,7 @@ pub(crate) struct ModelBuilder {
     /// The library's builder; `None` once the model is built.
     inner: Option<condyle::ModelBuilder>,
     name: String,
-    /// A number that differs from the numbers of all other builders.
+    /// Identifying number of this builder; no other builder has the same number.
     number: u64,
 }
 
@@ -150,11 +150,11 @@ impl ModelBuilder {
     }
 
     /// Adds a body at the end of a chain of joints: a composite joint. The placement of each joint is relative to the
-    /// frame of the joint before.
+    /// frame of the previous joint.
     ///
     /// The coordinates of the joints follow one another in q and v. Bodies without mass, named `name#1`, `name#2`, and
-    /// so on, connect the joints. Returns the last body, which has `inertia`. A universal joint about unit vectors a
-    /// and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+    /// so on, connect the joints. Returns the last body, to which `inertia` belongs. A universal joint about unit
+    /// vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
     ///
     /// joints: a list of (joint, placement).
     #[pyo3(signature = (name, parent, joints, inertia=None))]
@@ -178,8 +178,8 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y, then by q₂ about the new x; v
-    /// = q̇.
+    /// Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y axis, then by q₂ about the new
+    /// x axis; v = q̇.
     ///
     /// M is singular where q₁ = ±π/2. `Joint.spherical` has no singular position.
     #[pyo3(signature = (name, parent, placement=None, inertia=None))]
@@ -248,8 +248,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a whole robot. The pose of its world in the frame of `parent` is `placement`. `prefix` is added before all
-    /// its names.
+    /// Adds all bodies of another robot. The other robot's world has the pose `placement` in the frame of `parent`.
+    /// `prefix` is added before all names of the other robot.
     ///
     /// >>> from condyle import ModelBuilder, WORLD
     /// >>> two = ModelBuilder("two arms")
@@ -386,8 +386,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Builds the model: checks all data and numbers the bodies depth first, and siblings in the order of the calls
-    /// that added them. The builder cannot be used afterwards.
+    /// Builds the model, and checks all data. The bodies are numbered depth first, and siblings in the order of the
+    /// calls that added them. The builder cannot be used afterwards.
     ///
     /// Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
     /// joint with an invalid leader.

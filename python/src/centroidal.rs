@@ -83,8 +83,8 @@ fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.centroidal_momentum(model, q, v) }
 
-/// Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). It equals
-/// the sum of the weight and of the external forces about the centre of mass.
+/// Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). The rate
+/// equals the sum of the weight and the external forces about the centre of mass.
 ///
 /// q: nq numbers; v, a: nv.
 fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; out) {
@@ -115,7 +115,7 @@ batch b: any(q: Position) -> One { b.potential_energy(model, q) }
 
 /// Computes the mechanical energy E = T + V (J); O(n).
 ///
-/// q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
+/// q: nq numbers; v: nv. The rate of E is the power of the efforts and the external forces.
 fn mechanical_energy(model, data; q: Position, v: Tangent) {
     condyle::forward_velocities(model, data, &q, &v).mechanical_energy()
 }

@@ -52,7 +52,8 @@ fn integrate(model; q: Position, v: Tangent; out) {
 }
 each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved); }
 
-/// Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations it is the shortest such vector.
+/// Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations, v is the shortest vector with
+/// this property.
 ///
 /// q0, q1: nq numbers.
 fn difference(model; q0: Position, q1: Position; out) {
@@ -109,8 +110,8 @@ each(q: Scalable) -> [nq] |to| {
 
 /// Transports the columns of X, which are tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 ///
-/// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
-/// equals `transport` with −v.
+/// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies X by ∂(q ⊕ v)/∂q instead. Its
+/// result equals `transport` with −v.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> v = np.full(18, 0.1)

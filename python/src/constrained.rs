@@ -116,13 +116,14 @@ fn aim(
 /// Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
 /// set.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. In the first iteration λ' is 0, in each later one it is
-/// the previous λ. Redundant constraints then share the forces so that the forces are smallest. Choose μ small compared
-/// with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
-/// Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
+/// With μ > 0 the forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', where b is the right-hand side without regularisation.
+/// In the first iteration λ' is 0; in each later iteration λ' is the previous λ. Redundant constraints then share the
+/// forces, with the smallest norm of λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration
+/// is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
+/// sparse resolution of constrained dynamic equations (2021).
 ///
 /// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
-/// to 10000; none of them is skipped.
+/// to 10000; all of them are computed.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
 /// the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is
@@ -160,7 +161,8 @@ impl ConstraintSet {
         Ok(Self { inner, dual: None, lanes: None, constraints, nv: robot.nv(), made_for, robot })
     }
 
-    /// Returns the same constraints for many states, as scratch memory that fits the batch.
+    /// Returns the scratch memory of these constraints for many states in SIMD lanes. The memory has the size of the
+    /// batch.
     pub(crate) fn side_by_side(
         &mut self,
         batch: &condyle::Batch,
@@ -222,7 +224,7 @@ impl ConstraintSet {
         Self::make(model, constraints, ProximalSettings { mu, iterations })
     }
 
-    /// Returns the parts of a pickle: the robot, and the constraints with their current targets.
+    /// Returns the function and the arguments from which `pickle` makes an equal set. The current targets are included.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.borrow();
         let ProximalSettings { mu, iterations } = this.inner.proximal;
@@ -262,8 +264,8 @@ impl ConstraintSet {
         Ok(PySlice::new(py, range.start as isize, range.end as isize, 1))
     }
 
-    /// Changes the target of constraint k: placement, velocity and acceleration of its frame. Members that are not
-    /// given do not change.
+    /// Changes the target of constraint k: placement, velocity and acceleration of the constraint's frame. Members that
+    /// are not given do not change.
     ///
     /// Raises `ModelError` for numbers that are not finite and for an invalid placement; then the old target is kept.
     #[pyo3(signature = (k, placement=None, velocity=None, acceleration=None))]

@@ -10,8 +10,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// A hyper-dual number for the library's computations. Its operations are not inlined, because a model's functions
-/// contain thousands of operations. Most of the time is spent on creating and reading the Python objects.
+/// A hyper-dual number for the library's computations. Its operations are not inlined, because the library's functions
+/// contain thousands of operations and would become very long. Little speed is lost: most of the time is spent on
+/// creating and reading Python objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hyper(HyperDual64);
 
@@ -110,8 +111,8 @@ impl Scalar for Hyper {
     }
 }
 
-/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
-/// directions, and the mixed second derivative.
+/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. The number carries its derivatives in
+/// two directions, and the mixed second derivative.
 ///
 /// Store these numbers in NumPy arrays of objects. Arithmetic and NumPy's elementary functions accept such arrays. All
 /// functions of a model and a state accept them, too, and then return such arrays. Comparisons use `re`.
@@ -176,7 +177,7 @@ impl HyperDual {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = self.0;
         format!("HyperDual({re}, eps1={eps1}, eps2={eps2}, eps1eps2={eps1eps2})")
     }
-    /// Returns the parts of a pickle.
+    /// Returns the class and the arguments from which `pickle` makes an equal number.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = slf.get().0;
         Ok((slf.get_type(), (re, eps1, eps2, eps1eps2)).into_pyobject(slf.py())?.into_any())

@@ -162,8 +162,8 @@ motions! {
 /// True
 fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). It is the rate of the frame's
-/// spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
+/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). The spatial acceleration is the
+/// rate of the frame's spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
 ///
 /// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
@@ -186,7 +186,7 @@ fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: P
 /// Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
 /// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-/// acceleration for 'local' and 'world'. For 'local_world_aligned', whose origin moves with the frame, it is the
+/// acceleration for 'local' and 'world'. For 'local_world_aligned', whose origin moves with the frame, this sum is the
 /// classical acceleration.
 fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 

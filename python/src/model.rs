@@ -19,11 +19,11 @@ use pyo3::types::{PyBytes, PyList, PyString};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-/// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
+/// A robot: bodies, joints, frames, inertias, limits. A model never changes and may be shared between threads.
 ///
 /// Body 0 is the world. The other bodies are numbered as in Pinocchio: depth first, parents before children, and
 /// siblings by the names of their joints. A model is read from a file, built by a `ModelBuilder`, or taken from
-/// `condyle.robots`; it can be pickled.
+/// `condyle.robots`; a model can be pickled.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> arm.nq, arm.nv, arm.names[:3]
@@ -67,14 +67,14 @@ pub(crate) fn body_index(
     numbered(expected, body, least, model.bodies().len())
 }
 
-/// Returns the items of an argument that is a list; an error message calls the items `what`.
+/// Returns the items of an argument that is a list; `what` names the items in error messages.
 pub(crate) fn members_of<'py>(
     argument: &str,
     what: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let wrong = |found: String| PyTypeError::new_err(format!("{argument}: expected a list of {what}, found {found}"));
-    // refuse text and named tuples, such as a single constraint: they are iterable, but they are no lists of items
+    // refuse text and named tuples, such as a single constraint: they are iterable, but are not lists of items
     if given.is_instance_of::<PyString>() || given.is_instance_of::<PyBytes>() || given.hasattr("_fields")? {
         let found = given.repr()?;
         return Err(wrong(format!("{found}; write [{found}]")));
@@ -114,8 +114,8 @@ impl Model {
     /// The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
     /// `line`.
     ///
-    /// They report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in the
-    /// file, and contents that a model cannot represent.
+    /// Warnings report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in
+    /// the file, and contents that a model cannot represent.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Warnings, || {

@@ -49,7 +49,7 @@ batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 /// spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for joints with several
 /// degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. The only
 /// exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of
-/// actuators. No other function of a model includes passive torques: add them to τ where needed.
+/// actuators. No other function of a model includes passive torques: add passive torques to τ where needed.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> q, v = np.zeros(7), np.ones(7)

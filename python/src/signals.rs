@@ -45,8 +45,8 @@ impl Signals {
         if self.is_due() { py.check_signals() } else { Ok(()) }
     }
 
-    /// Checks as `look` does, for a call that has released the interpreter's lock. Returns whether to continue;
-    /// `finish` returns the exception.
+    /// Checks for signals if a check is due, for a call that has released the interpreter's lock. Returns whether the
+    /// call shall continue; `finish` returns the exception.
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
         if self.raised.is_some() {
             return ControlFlow::Break(());

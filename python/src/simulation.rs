@@ -24,7 +24,7 @@ use std::sync::Arc;
 ///     momentum is conserved up to rounding.
 /// dt: h, the length of a step (s), above 0.
 /// passive: the smoothing ε (rad/s, m/s) of `passive_torque`, which is then added to τ: damping, friction, springs and
-///     gravity compensation. None leaves it out.
+///     gravity compensation. None leaves the passive torque out.
 /// tolerance: for 'variational', Newton's method ends when the imbalance of the momenta is at most this fraction of the
 ///     sum of the momenta.
 /// max_iterations: the maximum number of iterations of Newton's method.
@@ -233,7 +233,7 @@ impl Simulation {
         visit.call(&self.model)
     }
 
-    /// Returns the parts of a pickle: the constructor's arguments, and the state.
+    /// Returns the class, the constructor's arguments, and the state, from which `pickle` makes an equal simulation.
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>, Bound<'py, PyAny>)> {
@@ -245,7 +245,7 @@ impl Simulation {
         Ok((slf.get_type().into_any(), made, (time, q, v, impulses).into_pyobject(py)?.into_any()))
     }
 
-    /// Restores the state of a pickle.
+    /// Restores the state that a pickle contains.
     fn __setstate__(&mut self, state: (f64, Vec<f64>, Vec<f64>, Vec<f64>)) -> PyResult<()> {
         let (time, q, v, impulses) = state;
         self.inner.restore(&State { time, q, v, impulses }).map_err(exception)

@@ -1,4 +1,4 @@
-//! A function as CasADi calls it: the sparsity of its results and derivatives, and the numbers of their entries.
+//! A function as CasADi calls it: the sparsity of its results and derivatives, and the values of their entries.
 //! Derivatives with respect to tangent coordinates are converted to CasADi's coordinates.
 
 use super::chart::{Chart, Position};
@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 
-/// Indices of the four functions of a slot.
+/// Indices of a slot's four functions: the value, the Jacobian J, the product Jᵀλ, and the Jacobian of this product.
 pub(super) const VALUE: usize = 0;
 pub(super) const JACOBIAN: usize = 1;
 pub(super) const REVERSE: usize = 2;
@@ -81,11 +81,11 @@ enum Source {
 pub(super) struct Output {
     pub(super) port: Port,
     source: Source,
-    /// For each entry of one state's result, the index of its number in the source.
+    /// For each entry of one state's result, the index of the entry's number in the source.
     from: Vec<usize>,
 }
 
-/// One of the functions of a slot.
+/// The description of one of a slot's functions for CasADi.
 #[derive(Default)]
 pub(super) struct Description {
     pub(super) inputs: Vec<Port>,
@@ -116,8 +116,8 @@ pub(super) struct Bound {
     /// relative to this number.
     results: Vec<(usize, Vec<usize>)>,
     pub(super) descriptions: [Description; 4],
-    /// Unused work spaces. Each call takes one and puts it back, so their number is the largest number of simultaneous
-    /// calls.
+    /// Work spaces that no call uses at present. Each call takes a work space and returns it at the end. So the list
+    /// grows to the largest number of simultaneous calls.
     free: Mutex<Vec<Work>>,
 }
 
@@ -128,7 +128,8 @@ struct Work {
     x: Vec<Vec<f64>>,
     lambda: Vec<f64>,
     y: Vec<f64>,
-    /// `J`, `g` and `H` are derivatives with respect to tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
+    /// `J`, `g` and `H` are derivatives of the function f with respect to tangent coordinates: J, Jᵀλ and the Hessian
+    /// of λᵀf, with multipliers λ.
     J: Vec<DMatrix<f64>>,
     g: Vec<f64>,
     H: Vec<DMatrix<f64>>,
@@ -292,10 +293,11 @@ impl Bound {
         Ok(())
     }
 
-    /// Evaluates a function for the states in the range `some`, which one call of the computation can do.
+    /// Evaluates a function for the states in the range `some`, in one call of the computation. The range may not
+    /// contain more states than such a call allows.
     ///
     /// # Safety
-    /// As for `evaluate`.
+    /// `arg` and `res` must satisfy the conditions of `evaluate`.
     #[allow(unsafe_code)]
     unsafe fn evaluate_some(
         &self,

@@ -9,7 +9,7 @@ use condyle::{
 };
 use nalgebra::DMatrix;
 
-/// The quantity that is computed.
+/// The quantity that a function computes.
 #[derive(Clone, Debug)]
 pub(crate) enum Kind {
     /// τ = rnea(q, v, a).
@@ -51,7 +51,7 @@ pub(super) struct Scratch<S> {
     zeros: Vec<S>,
 }
 
-/// Writes a block of derivatives to J: its rows begin at `row`, its columns are those for one argument.
+/// Writes a block of derivatives to J: its rows begin at `row`, and its columns belong to one argument.
 fn place<S: Scalar>(J: &mut DMatrix<S>, row: usize, argument: usize, block: &DenseMatrix<S, impl Dense<S>>) {
     J.view_mut((row, argument * block.ncols()), block.shape()).copy_from(block);
 }
@@ -82,8 +82,9 @@ impl Kind {
         }
     }
 
-    /// Returns whether a first derivative may differ from zero: the derivative of number `row` of all results with
-    /// respect to tangent coordinate j. `related` returns whether two coordinates move a common body.
+    /// Returns whether a first derivative may differ from zero: the derivative of the number with index `row` among the
+    /// numbers of all results, with respect to tangent coordinate j. `related` returns whether two coordinates move a
+    /// common body.
     pub(super) fn depends(&self, row: usize, j: usize, nv: usize, related: impl Fn(usize, usize) -> bool) -> bool {
         match self {
             Self::Rnea => related(row, j),
@@ -220,7 +221,7 @@ impl Kind {
     }
 
     /// Computes the Hessian of λᵀf with respect to all tangent coordinates, and the Jacobian if J is given, if the
-    /// library has closed formulas for them. Returns whether it has.
+    /// library has closed formulas for these derivatives. Returns whether the library has such formulas.
     pub(super) fn closed_hessian(
         &self,
         model: &Model,

@@ -30,8 +30,8 @@ const DESCRIPTION_TIME: Duration = Duration::from_millis(50);
 struct Slot {
     bound: AtomicPtr<Bound>,
     users: Mutex<Users>,
-    /// For each function of the slot, the number of CasADi's objects that have not asked for their description. CasADi
-    /// loaded these objects from a file.
+    /// For each function of the slot, the number of CasADi's objects that have not queried the function's description.
+    /// CasADi loaded these objects from a file.
     loaded: [AtomicUsize; 4],
 }
 
@@ -68,14 +68,14 @@ impl Slot {
         self.users.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts one more object of CasADi. A newly created object asks for its inputs next; an object loaded from a file
+    /// Counts one more object of CasADi. A newly created object queries its inputs next; an object loaded from a file
     /// does not.
     fn enter(&self, function: usize) {
         self.users().functions[function] += 1;
         self.loaded[function].fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Notes that an object of CasADi asked for its description, so it was not loaded from a file.
+    /// Records that an object of CasADi queried its description. Such an object was not loaded from a file.
     fn describe(&self, function: usize) {
         let less = |n: usize| n.checked_sub(1);
         let _ = self.loaded[function].fetch_update(Ordering::AcqRel, Ordering::Acquire, less);
@@ -103,8 +103,8 @@ impl Slot {
         }
     }
 
-    /// Returns whether an object of CasADi may have been loaded from a file: then the slot may now belong to another
-    /// robot. Waits for objects that another thread is creating.
+    /// Returns whether an object of CasADi may have been loaded from a file. In this case the slot may now belong to
+    /// another robot. Waits for objects that another thread is creating.
     fn was_loaded(&self, function: usize) -> bool {
         let begin = Instant::now();
         while self.loaded[function].load(Ordering::Acquire) > 0 {
@@ -117,8 +117,8 @@ impl Slot {
     }
 }
 
-/// Holds a slot that computes the function with this key, for this number of states at a time. If no slot computes it
-/// yet, binds the result of `make` to a free slot. Returns `None` if all slots are taken.
+/// Holds a slot that computes the function with this key, for this number of states at a time. If no slot computes this
+/// function yet, binds the result of `make` to a free slot. Returns `None` if all slots are taken.
 pub(super) fn hold(
     key: Vec<u8>,
     states: usize,
@@ -180,12 +180,12 @@ fn sparsity_of(port: Option<&Port>) -> *const i64 {
 /// Evaluates a function; returns 0 on success.
 ///
 /// # Safety
-/// As for `Bound::evaluate`.
+/// `arg` and `res` must satisfy the conditions of `Bound::evaluate`.
 unsafe fn evaluate(slot: usize, function: usize, arg: *const *const f64, res: *const *mut f64) -> c_int {
     let bound = match SLOT[slot].get() {
         Some(bound) if !SLOT[slot].was_loaded(function) => bound,
         _ => {
-            // printed, because CasADi's interface cannot pass an error message
+            // the error is printed, because CasADi's interface cannot pass an error message
             eprintln!(
                 "condyle_{slot}: a function of condyle.casadi cannot be loaded or unpickled: make it anew, without the copy"
             );

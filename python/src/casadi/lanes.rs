@@ -4,7 +4,7 @@ use super::function::Kind;
 use condyle::{Batch, Model, batch::Matrices};
 use nalgebra::DMatrix;
 
-/// Maximum number of states of a call: a few registers of lanes, with matrices that fit in the cache.
+/// Maximum number of states of a call. These states fill a few SIMD registers, and their matrices fit in the cache.
 const MOST: usize = 32;
 
 /// Work space for several states.
@@ -88,7 +88,7 @@ impl Lanes {
             let h = self.batch.rnea_hessian(model, q, v, third, &[], lambda);
             [h.dqdq, h.dvdq, h.dvdv, h.dadq]
         };
-        // the blocks that are not written here are zero
+        // all blocks that are not written below are zero
         place(H, 0, 0, dqdq);
         place(H, n, 0, dvdq);
         place_transposed(H, 0, n, dvdq);

@@ -105,7 +105,7 @@ struct RobotCalls {
     results: usize,
     scratch: Scratch<f64>,
     dual: Option<Box<DualScratch>>,
-    /// Work space for several states at a time, if the function has one.
+    /// Work space for several states at a time; `None` if the function computes one state at a time.
     lanes: Option<Lanes>,
 }
 

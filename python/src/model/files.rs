@@ -100,7 +100,7 @@ impl Model {
     ///
     /// path: a path, as text or `os.PathLike`.
     /// mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2; its `polycoef` must then be linear.
-    ///     Otherwise it is one of the `constraints`, which the tree does not include.
+    ///     Otherwise the coupling is one of the `constraints`, which are not part of the tree.
     /// strict: whether a warning (`warnings`) is an error.
     /// weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
     ///     `warnings`. Otherwise it is an error.
@@ -198,10 +198,11 @@ impl Model {
 
     /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
     ///
-    /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. The results of
-    /// MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`. If numbers were
-    /// changed after compilation, the changed numbers are used. Contents that a model cannot represent are reported in
-    /// `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not imported.
+    /// The names, q and v are the same as with `from_mjcf`. Named `<frame>`s are missing, because MuJoCo does not keep
+    /// them. The results of MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`.
+    /// If numbers were changed after compilation, the changed numbers are used. Contents that a model cannot represent
+    /// are reported in `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not
+    /// imported.
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///
@@ -242,8 +243,8 @@ impl Model {
     /// the file are ignored.
     ///
     /// path: a path, as text or `os.PathLike`.
-    /// strict: whether a joint that the robot does not have is an error. Without `strict` it is ignored, since robots
-    /// with fewer joints often share an SRDF.
+    /// strict: whether a joint that the robot does not have is an error. Without `strict` such a joint is ignored,
+    /// since robots with fewer joints often share an SRDF.
     ///
     /// Raises `ParseError`, with file, line and element.
     #[pyo3(signature = (path, strict=false))]

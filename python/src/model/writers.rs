@@ -13,8 +13,8 @@ impl Model {
     ///
     /// Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
     /// new file gives this model again, up to rounding. `original` and `path` may be the same file. If fixed joints
-    /// merge several links into one body, changes of its inertia are written to the link that the moving joint carries.
-    /// An armature becomes the rotor inertia of a `<transmission>`.
+    /// merge several links into one body, changes of the body's inertia are written to the link that the moving joint
+    /// carries. An armature becomes the rotor inertia of a `<transmission>`.
     ///
     /// path: the new file. original: the file from which the robot was read.
     ///
@@ -68,7 +68,7 @@ impl Model {
         module.call_method1("to_pinocchio", (slf,))
     }
 
-    /// Returns the parts of a pickle.
+    /// Returns the function and the bytes from which `pickle` makes an equal model.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let py = slf.py();
         let bytes = postcard::to_extend(&*slf.get().inner, MAGIC.as_bytes().to_vec())

@@ -26,7 +26,8 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
     value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
 }
 
-/// An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
+/// An optimal control problem: a sequence of knots that begins at the state x0, and a terminal knot. Each knot has one
+/// of the models.
 ///
 /// x0: the initial state, nx numbers.
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
@@ -141,7 +142,8 @@ impl Problem {
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
-    /// Returns the parts of a pickle: knots of robots as JSON, other knots as the objects that the user passed.
+    /// Returns the function and the arguments from which `pickle` makes an equal problem. Knots of robots are stored as
+    /// JSON, other knots as the objects that the user passed.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
         let described = lock("problem", &this.described)?;
@@ -187,7 +189,7 @@ impl Problem {
         Self::make(x0, all, knot_models, (objects, kept), fault)
     }
 
-    /// The number of knots before the terminal one, N.
+    /// The number N of knots before the terminal knot.
     #[getter]
     fn horizon(&self) -> PyResult<usize> {
         Ok(lock("problem", &self.inner)?.horizon())
@@ -221,7 +223,7 @@ impl Problem {
         problem.set_x0(&x0).map_err(problem_error)
     }
 
-    /// Changes the weight of all cost terms with this name, in all knots including the terminal one. Call this method
+    /// Changes the weight of all cost terms with this name, in all knots including the terminal knot. Call this method
     /// between solves.
     ///
     /// Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
@@ -306,8 +308,8 @@ impl Problem {
     }
 
     /// Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
-    /// (N, nu), or a list of N arrays if knots differ in nu. For robots they are computed by statics, for other actions
-    /// by Newton's method.
+    /// (N, nu), or a list of N arrays if knots differ in nu. The controls of robots are computed by statics, the
+    /// controls of other actions by Newton's method.
     ///
     /// xs: states, (N + 1, nx).
     fn quasi_static<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -370,7 +372,7 @@ impl Problem {
         problem.calc(&xs, &us, &mut next, &mut costs);
         problem.calc_diff(&xs, &us, &mut lq_knots);
         self.raise()?;
-        // an LQ knot stores the gap at the state after it
+        // an LQ knot stores the gap at the next state
         for (knot, gap) in lq_knots.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
             knot.f.copy_from_slice(gap);
         }
@@ -389,7 +391,7 @@ impl Problem {
 
     /// Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
     ///
-    /// us: (N, nu), or a list of N arrays if knots differ in nu.
+    /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
     ///
     /// Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
     /// between knots.
@@ -446,7 +448,7 @@ impl Problem {
         let (k, mut described) = (problem.knot_models()[knot], lock("problem", &self.described)?);
         let mut objects = lock("problem", &self.objects)?;
         if k == described.len() - 1 {
-            described.insert(k, None); // before the terminal model
+            described.insert(k, None); // inserted before the terminal model
             objects.insert(k, None);
         }
         if let Some(new) = &new {
@@ -456,7 +458,7 @@ impl Problem {
         let old = std::mem::replace(&mut objects[k], object);
         drop((problem, described, objects));
         if let Some(old) = old {
-            old.drop_ref(py); // may run Python code
+            old.drop_ref(py); // the object's destructor may run Python code
         }
         lock("problem", &self.written)?.extend(written);
         Ok(())
@@ -477,7 +479,7 @@ impl Problem {
         self.moved.load(Ordering::Relaxed)
     }
 
-    /// Calls a function with each variable in which an error is stored, until the function returns a value.
+    /// Calls a function with each variable that stores errors of Python functions, until the function returns a value.
     fn each_fault<T>(&self, mut f: impl FnMut(&mut Option<PyErr>) -> Option<T>) -> Option<T> {
         let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
         let mut found = None;

@@ -1,4 +1,4 @@
-//! The controller.
+//! //! The whole-body controller as a Python class.
 
 use super::contacts::FrictionContact;
 use super::plan::Plan;
@@ -120,7 +120,7 @@ impl WholeBodyController {
     /// share the force that the plan's acceleration c̈ of the centre of mass requires.
     ///
     /// plan: a `Plan` of the same robot with the same number of contacts.
-    /// t: the time (s); before the first knot and after the last one, the plan rests at that knot.
+    /// t: the time (s); before the first knot, the plan rests at the first knot; after the last knot, at the last knot.
     /// references: `References` of this controller, which are changed.
     fn track(&self, plan: &Bound<'_, Plan>, t: f64, references: &Bound<'_, PyAny>) -> PyResult<()> {
         let plan = plan.get();
@@ -136,10 +136,10 @@ impl WholeBodyController {
         references::write(numbers, references)
     }
 
-    /// Computes the `Command` at a state. It always returns a command: without a solution, a safe command whose status
-    /// shows the cause. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an
-    /// invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the joint or the frame.
-    /// Other Python threads can run meanwhile.
+    /// Computes the `Command` at a state. The method always returns a command. If no solution is found, it returns a
+    /// safe command whose status shows the cause. The status is 'not_finite' for a number that is not finite. It is
+    /// 'invalid_state' for an invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the
+    /// joint or the frame. Other Python threads can run meanwhile.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -190,8 +190,8 @@ impl WholeBodyController {
         give(py, &lock("controller", &self.inner)?.controller)
     }
 
-    /// Returns the parts of a pickle: the constructor's arguments, and the numbers that the controller keeps from one
-    /// tick to the next.
+    /// Returns the function and the arguments from which `pickle` makes an equal controller. They include the numbers
+    /// that the controller keeps from one tick to the next.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let contacts: Vec<_> = self.contacts.iter().cloned().map(FrictionContact).collect();
         let tasks: Vec<_> = self.tasks.iter().cloned().map(Task).collect();

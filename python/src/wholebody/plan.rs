@@ -15,12 +15,12 @@ use rust::PlanData;
 /// A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
 /// touch in each interval.
 ///
-/// `WholeBodyController.track` converts it to references. Between knots, q is interpolated with constant velocity (as
-/// by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at this
-/// time (an impact).
+/// `WholeBodyController.track` converts a plan to references. Between knots, q is interpolated with constant velocity
+/// (as by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at
+/// this time (an impact).
 ///
 /// model: the robot.
-/// times: N + 1 times in ascending order (s); two may be equal.
+/// times: N + 1 times in ascending order (s); two consecutive times may be equal.
 /// states: (q, v) of the knots, (N + 1, nq + nv).
 /// touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
 /// controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
@@ -114,8 +114,8 @@ impl Plan {
         Ok(self.inner.activation(contact, t))
     }
 
-    /// Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers; they are 0 for
-    /// a free-flyer.
+    /// Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers. The efforts of
+    /// a free-flyer are 0.
     ///
     /// t: the time (s); q: nq numbers; v: nv.
     ///
@@ -140,7 +140,8 @@ impl Plan {
         output(py, out, &[robot.nv()], |tau| tau.copy_from_slice(&efforts))
     }
 
-    /// Returns the parts of a pickle: the arrays from which the plan was made.
+    /// Returns the class and the arguments from which `pickle` makes an equal plan: the arrays from which the plan was
+    /// made.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let PlanData { times, states, controls, gains, touches, fade } = this.inner.data();

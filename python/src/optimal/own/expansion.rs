@@ -19,8 +19,8 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// Returns how many numbers are stored for each knot: the value, the gradient, and the Hessian's lower triangle,
-    /// row by row.
+    /// Returns the count of numbers that are stored for each knot: the value, the gradient, and the Hessian's lower
+    /// triangle, row by row.
     pub(super) fn stride(self) -> usize {
         1 + self.n + if self.second { self.n * (self.n + 1) / 2 } else { 0 }
     }
@@ -68,7 +68,7 @@ impl SeveralKnots {
     }
 }
 
-/// The other operand of an operation.
+/// The second operand of an operation: a real number, or a number with derivatives.
 enum Other<'py> {
     Real(f64),
     Expansion(Bound<'py, Expansion>),
@@ -92,7 +92,8 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// Creates a variable whose change is one of the directions; `values` are its values at the knots.
+    /// Creates a variable whose derivative is 1 in one direction and 0 in the others; `values` are its values at the
+    /// knots.
     pub(super) fn variable(directions: Directions, direction: usize, values: impl Iterator<Item = f64>) -> Self {
         let mut numbers = Vec::new();
         for value in values {
@@ -233,7 +234,7 @@ fn angle(y: f64, x: f64) -> [f64; 6] {
     [y.atan2(x), x * s, -y * s, -xy, (y * y - x * x) * s * s, xy]
 }
 
-/// Defines the methods of a class: elementary functions, each given with two derivatives, and other methods.
+/// Defines the methods of a class: elementary functions, each with its first two derivatives, and other methods.
 macro_rules! methods {
     ($class:ident { $($name:ident: $x:ident => $f:expr;)* } { $($others:tt)* }) => {
         #[pymethods]
