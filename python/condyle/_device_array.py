@@ -71,7 +71,7 @@ class DeviceArray:
         """Returns a copy in the host's memory, after pending work."""
         host = np.empty(self.shape, self.dtype)
         order = sorted(range(self.ndim), key=lambda k: (-self.strides[k], k))
-        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # with the axes in the order of the memory
+        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # its axes are in the order of the memory
         if dense.nbytes > 0:
             self._before(LEGACY)
             with self._memory.device.current() as driver:
@@ -114,8 +114,8 @@ class DeviceArray:
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
-        """The description that Numba and other libraries read. It contains a stream; the numbers are valid after the
-        work of this stream.
+        """The description of the array that Numba and other libraries read. The description contains a stream; the
+        array's numbers are valid after the work of this stream.
         """
         size = self.dtype.itemsize
         return {
@@ -139,7 +139,7 @@ def row_order(shape: Sequence[int]) -> tuple[int, ...]:
 
 
 class View(NamedTuple):
-    """The address and the layout of an array's numbers. They are valid as long as `owner` exists."""
+    """The address and the layout of an array's numbers. The address is valid as long as `owner` exists."""
 
     owner: Any
     address: int
@@ -187,8 +187,8 @@ def _on_device(name: str, device: Device, kind: int, ordinal: int) -> None:
 
 
 def _interface(name: str, array: Any, device: Device, stream: int) -> View:
-    """Returns a view of an array by its `__cuda_array_interface__`. That interface does not name the device, so it is
-    checked.
+    """Returns a view of an array by its `__cuda_array_interface__`. This interface does not name the device, so the
+    function checks that the address belongs to `device`.
     """
     said = array.__cuda_array_interface__
     address, is_read_only = said["data"]

@@ -133,7 +133,7 @@ def _others(squares: _Array) -> _Array:
 
 
 def _lengths(name: str, given: ArrayLike, count: int) -> _Array:
-    """Reads one or several lengths; they must be finite and not negative."""
+    """Reads one or several lengths; each length must be finite and not negative."""
     found = np.array(given, np.float64)
     shape = () if count == 1 else (count,)
     if found.shape != shape:

@@ -29,7 +29,7 @@ class ModelPool:
         return self._model
 
     def _of(self, threads: int) -> ours.Data:
-        """Returns scratch memory for this number of threads, and keeps it for the next call."""
+        """Returns scratch memory for this number of threads, and keeps the memory for the next call."""
         if threads not in self._data:
             self._data[threads] = ours.Data(self._model.ours, threads=threads)
         return self._data[threads]

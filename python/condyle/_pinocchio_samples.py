@@ -67,14 +67,14 @@ def _limb(robot: ModelBuilder, prefix: str, on: BodyId, begin: SE3, foot: bool =
 
 
 def manipulator() -> Model:
-    """Returns the arm."""
+    """Returns Pinocchio's sample arm."""
     robot = ModelBuilder("")
     _limb(robot, "", WORLD, SE3.identity())
     return robot.build()
 
 
 def humanoid() -> Model:
-    """Returns the humanoid, on a free-flyer."""
+    """Returns Pinocchio's sample humanoid, on a free-flyer."""
     robot = ModelBuilder("")
     base = robot.body("root_body", WORLD, Joint.free_flyer(), None, _LIGHT, joint_name="root_joint")
     robot.frame("root_joint", base, kind="joint")

@@ -2,8 +2,9 @@
 
     python python/examples/casadi_reach.py        needs CasADi: pip install 'condyle[casadi]'
 
-The duration is also a variable. Accelerations are the controls, and inverse dynamics computes the efforts. This is
-cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on the result of `rnea`.
+The duration is also a variable of the optimisation. Accelerations are the controls, and inverse dynamics computes the
+efforts. Inverse dynamics is cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on the
+result of `rnea`.
 """
 
 import casadi

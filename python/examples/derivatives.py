@@ -26,11 +26,11 @@ ahead = condyle.aba(robot, data, condyle.integrate(robot, q, step * direction), 
 behind = condyle.aba(robot, data, condyle.integrate(robot, q, -step * direction), v, tau)
 print("differences are off by", abs((ahead - behind) / (2 * step) - d.da_dq @ direction).max())
 
-# Second derivatives of a number λᵀ q̈, which solvers for optimal control need, in four blocks.
+# Second derivatives of the number λᵀ q̈, in four blocks. Solvers for optimal control need these derivatives.
 hessian = condyle.aba_hessian(robot, data, q, v, tau, np.ones(robot.nv))
 assert np.allclose(hessian.dqdq, hessian.dqdq.T)
 
-# Derivatives of your own function: it is called with hyper-dual numbers, which all functions of Condyle accept.
+# Derivatives of a function that you write: it is called with hyper-dual numbers, which Condyle's functions accept.
 arm = condyle.robots.arm7()
 arm_data, at = condyle.Data(arm), np.full(7, 0.3)
 
@@ -41,7 +41,7 @@ def reach_and_effort(q: np.ndarray) -> np.ndarray:
     return 100.0 * ((tool - [0.4, 0.2, 0.5]) ** 2).sum() + 0.01 * (condyle.gravity(arm, arm_data, q) ** 2).sum()
 
 
-# With the exact Hessian, Newton's method needs few steps. The Gauss-Newton matrix would also work, in more steps.
+# With the exact Hessian, Newton's method needs few steps. With the Gauss-Newton matrix, it would need more steps.
 steps = 0
 while True:
     value, gradient = condyle.gradient(arm, at, reach_and_effort)

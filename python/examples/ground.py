@@ -22,8 +22,8 @@ class Ground:
         self.sets = {}
 
     def step(self, tau, dt, f_ext=None):
-        """Makes a step of dt with efforts τ and external forces on bodies. Returns the force on each foot along the
-        world's axes (N).
+        """Makes a step of length dt with efforts τ and external forces on bodies. Returns the force on each foot along
+        the world's axes (N).
         """
         forces = np.zeros((len(self.feet), 3))
         while True:

@@ -20,7 +20,7 @@ import condyle
 from condyle import viz
 
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
-DT = 0.01  # s
+DT = 0.01  # time step (s)
 
 robot = condyle.robots.quadruped()
 q = condyle.neutral(robot)

@@ -1,5 +1,5 @@
-"""Optimisations by IPOPT with functions of `condyle.casadi`, compared with optimisations of the same functions written
-as CasADi expressions.
+"""Tests of optimisations by IPOPT with functions of `condyle.casadi`. The same problems are solved with CasADi
+expressions for comparison.
 """
 
 import sys

@@ -203,7 +203,9 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
 
 
 def test_constraints_of_ones_own_are_limits() -> None:
-    """Limits of the arm that are written in Python: with and without derivatives, nested, and at the terminal knot."""
+    """Checks limits of the arm that are written in Python: with and without derivatives, nested, and at the terminal
+    knot.
+    """
     problem, xs, us = reach()
     expected = sharp(problem)
     solution = expected.solve(xs, us)

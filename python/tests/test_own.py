@@ -96,7 +96,9 @@ def test_functions_of_two(f: Any) -> None:
 
 
 def check(calc: Any) -> None:
-    """Compares the derivatives of calc at several knots, computed by one call of calc, with central differences."""
+    """Compares derivatives of calc with central differences. One call of calc computes the derivatives at several
+    knots.
+    """
 
     def counted(t: Any, x: Any, u: Any) -> Any:
         calls.append(x.dtype)

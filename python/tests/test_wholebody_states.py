@@ -59,8 +59,8 @@ def test_a_quaternion_has_length_1(factor: float) -> None:
 
 
 def test_references_are_positions_and_poses() -> None:
-    """References that are set are checked at once; references that are changed in place are checked in the next
-    step.
+    """Checks that references that are set are checked at once, and that references changed in place are checked in the
+    next step.
     """
     controller = new()
     good = controller.hold(STANDING)
@@ -145,7 +145,9 @@ def test_normalize_needs_a_length() -> None:
 
 
 def ticks(controller: WholeBodyController, first: int, count: int) -> list[str]:
-    """Returns commands at states near the stance while contacts begin and end. One of the states is invalid."""
+    """Returns the commands of successive ticks, as text, at states near the stance while contacts begin and end. One of
+    the states is invalid.
+    """
     commands = []
     for k in range(first, first + count):
         rng = np.random.default_rng(k)
