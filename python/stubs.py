@@ -482,8 +482,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
-    # `_spelling` is not in `others`: its other classes (`SE3`, `Model` and others) have the same names as classes of
-    # Condyle.
+    # `_spelling` is not in `others`, because most of its classes (`SE3`, `Model`) have the names of Condyle's classes.
     imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\

@@ -25,8 +25,8 @@ The call releases the interpreter's lock and uses the number of threads for whic
 (100, 7, 7)
 
 `out` may be an input, or share memory with an input. Two arrays of `out` may not share memory. Batches and solves
-release the interpreter's lock while they compute. During this time no other thread may write to the arguments, since
-the call would read a mix of old and new numbers.
+release the interpreter's lock while they compute. During this time no other thread may write to the arrays of the call,
+since the call would read a mix of old and new numbers.
 
 A forked process may use all objects that it has inherited, and starts its own threads. Signals are checked during a
 call, every 10 ms in batches and every 25 ms in solves and simulations. An exception of a signal handler, such as

@@ -303,7 +303,7 @@ class Function:
     def __del__(self) -> None:
         if getattr(self, "_module", None):
             with self.device.current() as driver:
-                driver.status("cuCtxSynchronize")  # wait, since the kernel may be running
+                driver.status("cuCtxSynchronize")  # wait for the device, since the kernel may be running
                 driver.status("cuModuleUnload", self._module)
 
 

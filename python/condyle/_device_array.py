@@ -46,12 +46,12 @@ class DeviceArray:
 
     @property
     def device(self) -> int:
-        """The index of the device."""
+        """The index of the device that stores the array."""
         return self._memory.device.ordinal
 
     @property
     def ndim(self) -> int:
-        """The number of axes."""
+        """The number of axes of the array."""
         return len(self.shape)
 
     def __len__(self) -> int:
@@ -160,7 +160,7 @@ def view(name: str, array: Any, device: Device, stream: int) -> View:
         _on_device(name, device, int(kind), int(ordinal))
         try:
             capsule = array.__dlpack__(stream=stream, max_version=_VERSION)
-        except TypeError:  # this library has no versioned DLPack
+        except TypeError:  # the array's library does not support versioned DLPack
             capsule = array.__dlpack__(stream=stream)
         address, (code, bits, lanes), shape, strides, _, flags = _condyle._borrowed(capsule)
         dtype = f"float{bits}" if (code, lanes) == (_FLOAT, 1) else f"type {code} of {lanes} x {bits} bits"

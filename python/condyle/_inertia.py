@@ -39,7 +39,7 @@ class Inertia(NamedTuple):
     """
 
     mass: float
-    """The mass (kg)."""
+    """The mass of the body (kg)."""
     com: _Array
     """The centre of mass in the body's frame (m), 3 numbers; zeros if the mass is zero."""
     about_com: _Array

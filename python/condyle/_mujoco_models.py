@@ -281,8 +281,7 @@ class _Text:
         for k, name in enumerate(names):
             q, v = self.m.key_qpos[k], self.m.key_qvel[k]
             numbers = {"qvel": v, "ctrl": self._controls(self.m.key_ctrl[k]), "act": self.m.key_act[k]}
-            # a file can reserve space for keyframes; an unnamed keyframe with the default state is such space, and is
-            # left out
+            # an unnamed keyframe with the default state is left out: it is unused space that the file has reserved
             if name or any(map(np.any, numbers.values())) or not np.array_equal(q, self.m.qpos0):
                 given = {what: x for what, x in numbers.items() if len(x)}
                 yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q} | given)

@@ -25,7 +25,7 @@ class ModelPool:
         self._data: dict[int, ours.Data] = {}
 
     def model(self) -> Model:
-        """Returns the model."""
+        """Returns the model of the pool."""
         return self._model
 
     def _of(self, threads: int) -> ours.Data:

@@ -13,7 +13,7 @@ from ._inertia import Inertia
 from ._types import ModelWarning
 
 _Part = tuple[Joint, NDArray[np.float64]]
-"""A joint, and its placement."""
+"""A joint of Condyle, and the joint's placement."""
 
 ALIGNED: dict[str, Callable[..., Joint]] = {
     "JointModelR": Joint.revolute,

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 else:
 
     def disjoint_base(cls: type) -> type:
-        """Marks a class for type checkers as a disjoint base, so that other disjoint bases cannot be combined with
-        it.
+        """Marks a class for type checkers as a disjoint base, so that no class can derive from this class and another
+        disjoint base.
         """
         return cls
 
@@ -61,7 +61,7 @@ class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
         return getattr(ufunc, method)(*plain, **options)
 
     def copy(self, order: Literal["K", "A", "C", "F"] | None = "C") -> _Array:  # type: ignore[override]
-        """Returns a plain array with these numbers."""
+        """Returns a plain NumPy array with the same numbers."""
         return np.array(self, order=order)
 
     def __reduce__(self) -> Any:
@@ -77,7 +77,7 @@ class RneaDerivatives(NamedTuple):
     dtau_dq: _Array
     """The derivative ∂τ/∂q in the tangent space: the derivative of τ at integrate(q, δ) with respect to δ."""
     dtau_dv: _Array
-    """The derivative ∂τ/∂v."""
+    """The derivative ∂τ/∂v, (nv, nv)."""
     dtau_da: _Array
     """The derivative ∂τ/∂a, which is M(q), armature included."""
 
@@ -90,7 +90,7 @@ class AbaDerivatives(NamedTuple):
     da_dq: _Array
     """The derivative ∂q̈/∂q in the tangent space: the derivative of q̈ at integrate(q, δ) with respect to δ."""
     da_dv: _Array
-    """The derivative ∂q̈/∂v."""
+    """The derivative ∂q̈/∂v, (nv, nv)."""
     da_dtau: _Array
     """The derivative ∂q̈/∂τ, which is M(q)⁻¹."""
 
@@ -176,7 +176,7 @@ class PassiveDerivatives(NamedTuple):
     dtau_dq: _Array
     """The derivative ∂τ/∂q in the tangent space: the derivative of τ at integrate(q, δ) with respect to δ."""
     dtau_dv: _Array
-    """The derivative ∂τ/∂v."""
+    """The derivative ∂τ/∂v, (nv, nv)."""
 
 
 class CoriolisDerivatives(NamedTuple):
@@ -206,7 +206,7 @@ class Constrained(NamedTuple):
 class ConstrainedDerivatives(NamedTuple):
     """The result of `constrained_dynamics_derivatives`: the result of `constrained_dynamics` and its derivatives.
 
-    ∂/∂q is taken in the tangent space.
+    Derivatives with respect to q are taken in the tangent space.
     """
 
     a: _Array
@@ -233,7 +233,7 @@ class ConstrainedEquations(NamedTuple):
     """The result of `constrained_dynamics_equations`: the result of `constrained_dynamics`, and linear equations for
     its changes.
 
-    ∂/∂q is taken in the tangent space.
+    Derivatives with respect to q are taken in the tangent space.
     """
 
     a: _Array
@@ -270,7 +270,7 @@ class Impulse(NamedTuple):
 class ImpulseDerivatives(NamedTuple):
     """The result of `impulse_dynamics_derivatives`: the result of `impulse_dynamics` and its derivatives.
 
-    ∂/∂q is taken in the tangent space.
+    Derivatives with respect to q are taken in the tangent space.
     """
 
     v: _Array
@@ -302,7 +302,7 @@ class ContactConstraint(NamedTuple):
     """
 
     frame: str | int
-    """The constrained frame."""
+    """The constrained frame, by name or index."""
     kind: Literal["point", "line", "plane", "rigid"]
     """The constrained motion: of the frame's origin, 3 rows ('point'); of the origin along one axis or two ('line',
     'plane'); or of the whole frame, 6 rows, linear first ('rigid').
@@ -408,7 +408,7 @@ class Frame(NamedTuple):
 
 
 class AssemblySize(NamedTuple):
-    """The numbers of bodies, runs, operations and steps of a `DivideConquer`. They determine the cost of its assembly."""
+    """The numbers of bodies, runs, operations and steps of a `DivideConquer`, which determine its cost."""
 
     bodies: int
     """The number of moving bodies; each body is eliminated once."""
@@ -447,7 +447,7 @@ class Spring(NamedTuple):
     """A spring of a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest."""
 
     joint: str
-    """The joint's name."""
+    """The name of the joint to which the spring belongs."""
     stiffness: _Array
     """The coefficients k₀ (N m/rad or N/m), k₁ (unit of k₀, per rad or m) and k₂ (unit of k₀, per rad² or m²)."""
     rest: _Array
@@ -458,7 +458,7 @@ class GravityCompensation(NamedTuple):
     """A supported fraction of a body's weight: the force −mass g acts at the point mass_com / mass."""
 
     body: str
-    """The body's name."""
+    """The name of the supported body."""
     mass: float
     """The mass whose weight is supported (kg)."""
     mass_com: _Array
@@ -478,7 +478,7 @@ class Actuator(NamedTuple):
     """
 
     name: str
-    """The name, or an empty string."""
+    """The name of the actuator, or an empty string."""
     joint: str | None
     """The name of the driven joint; None if the actuator does not drive a joint."""
     tendon: str | None
@@ -538,9 +538,9 @@ class Mimic(NamedTuple):
     """
 
     ratio: float
-    """The ratio (1, m/rad or rad/m)."""
+    """The ratio of the follower's motion to the leader's motion (1, m/rad or rad/m)."""
     offset: float
-    """The offset (rad, m)."""
+    """The offset of the follower's position (rad, m)."""
 
 
 class Iteration(NamedTuple):
@@ -557,7 +557,7 @@ class Iteration(NamedTuple):
     step: float
     """The last step length tried, which is the accepted step length if a step was accepted."""
     regularisation: float
-    """Regularisation after the iteration."""
+    """Regularisation of the sweep after the iteration."""
     d1: float
     """Slope of the expected decrease: for a step length α, the cost should decrease by α (d1 + ½ α d2)."""
     d2: float
@@ -788,9 +788,9 @@ class Control(NamedTuple):
     time: float
     """The time at which the step begins (s)."""
     q: _Array
-    """The position, nq numbers."""
+    """The position of the robot at the beginning of the step, nq numbers."""
     v: _Array
-    """The velocity, nv numbers."""
+    """The velocity of the robot at the beginning of the step, nv numbers."""
     tau: _Array
     """The joint efforts during the step, nv numbers (N m, N). The efforts are 0 when the control law is called; the
     control law sets them in place.
@@ -808,8 +808,8 @@ class Ground(NamedTuple):
     Contacts are rigid, with Coulomb friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
     Anitescu and Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ. Each point satisfies 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0
     and the exact disc ‖λ_t‖ ≤ μ λ_n. Here u⁺ = J v⁺ is the point's velocity after the step, and φ its distance from the
-    plane. The forces of redundant contacts are not unique, but the sum of these forces is. Errors are O(h). Only the
-    points touch the plane: edges of soles, other bodies and joint limits are ignored. With a restitution above 0
+    plane. The forces of redundant contacts are not unique, but the sum of these forces is unique. Errors are O(h). Only
+    the points touch the plane: edges of soles, other bodies and joint limits are ignored. With a restitution above 0
     (Newton's law) and friction, an impact of several points may increase the energy. A point below the plane is moved
     out by a fifth of its depth per step, at most 0.5 m/s.
     """
@@ -823,7 +823,7 @@ class Ground(NamedTuple):
     height: float = 0.0
     """The height of the plane along the normal (m)."""
     friction: float = 0.7
-    """The friction coefficient μ."""
+    """The friction coefficient μ between the ground and the points."""
     restitution: float = 0.0
     """The fraction of the normal speed that a point keeps after an impact, from 0 to 1."""
     tolerance: float = 1e-8

@@ -174,7 +174,7 @@ class Command(NamedTuple):
     def solved(self) -> "Command":
         """Returns the command itself if its status is 'solved'.
 
-        Raises `ControllerError` with the reason otherwise.
+        Raises `ControllerError` with the reason if the command has another status.
         """
         if self.status != "solved":
             raise ControllerError(self.reason)

@@ -156,13 +156,13 @@ class Motion(_Spatial):
 
     @property
     def action(self) -> _Array:
-        """The matrix v ×, (…, 6, 6)."""
+        """The matrix v × that acts on motions, (…, 6, 6)."""
         omega = skew(self.angular)
         return _blocks(omega, skew(self.linear), np.zeros_like(omega), omega)
 
     @property
     def dual_action(self) -> _Array:
-        """The matrix v ×* = −(v ×)ᵀ, (…, 6, 6)."""
+        """The matrix v ×* = −(v ×)ᵀ that acts on forces, (…, 6, 6)."""
         return -self.action.swapaxes(-1, -2)
 
 

@@ -283,7 +283,7 @@ class _Mapped:
             if rows not in self._buffers:
                 self._buffers[rows] = self._function.map(rows).buffer()
             buffer, call = self._buffers[rows]
-            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # kept alive until the call has ended
+            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # arrays in use until the call ends
             for k, argument in enumerate(inputs):
                 buffer.set_arg(k, argument.data)
             for k, result in enumerate(results):

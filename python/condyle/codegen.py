@@ -114,7 +114,7 @@ class Compiled:
             name: (rows,) if columns == 1 else (rows, columns) for name, rows, columns in outputs
         }
         self.library: Path = library
-        """The shared library."""
+        """The path of the compiled shared library."""
         self._function = function
         fields = [f"{output}_" if output == "lambda" else output for output in self.outputs]
         self._result: Any = namedtuple(name, fields) if len(outputs) > 1 else None

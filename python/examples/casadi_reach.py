@@ -32,7 +32,7 @@ def transcribe(
     q, v, a = opti.variable(n, KNOTS), opti.variable(n, KNOTS), opti.variable(n, KNOTS)
     duration = opti.variable()
     h = duration / (KNOTS - 1)
-    for x, rate in ((q, v), (v, a)):  # the trapezoidal rule
+    for x, rate in ((q, v), (v, a)):  # the trapezoidal rule for positions and velocities
         opti.subject_to(x[:, 1:] == x[:, :-1] + h / 2 * (rate[:, 1:] + rate[:, :-1]))
     tau = inverse_dynamics(q, v, a)
     for x, lower, upper in (

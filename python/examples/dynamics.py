@@ -16,10 +16,9 @@ print(robot)  # prints a table of joints; print(robot.tree()) prints the tree of
 
 # q has nq numbers: the base's position and quaternion (x, y, z, w), then a number for each joint. v has nv numbers.
 q, v = condyle.neutral(robot), np.zeros(robot.nv)
-q[2], q[7:] = 0.5, np.tile([0.0, 0.7, -1.4], 4)  # half a metre up, the knees bent
+q[2], q[7:] = 0.5, np.tile([0.0, 0.7, -1.4], 4)  # the base is half a metre up, and the knees are bent
 
-# Inverse dynamics: the efforts τ = M a + h that hold the robot still. For the base, which has no motor, τ is the
-# weight.
+# Inverse dynamics: the efforts τ = M a + h that hold the robot still. The base has no motor: its effort is the weight.
 tau = condyle.rnea(robot, data, q, v, np.zeros(robot.nv))
 print(f"the ground must carry {tau[2]:.1f} N, and {robot.total_mass * 9.81:.1f} N is the robot's weight")
 

@@ -24,7 +24,7 @@ DT = 0.01  # time step (s)
 
 robot = condyle.robots.quadruped()
 q = condyle.neutral(robot)
-q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
+q[7:] = [0.0, 0.7, -1.4] * 4  # joint angles with bent knees
 
 gait = Gait(robot, q, FEET, DT)
 gait.stand(10)

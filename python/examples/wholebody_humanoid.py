@@ -30,7 +30,7 @@ def main() -> None:
     q = condyle.neutral(model)
     for name, i in zip(model.names, model.idx_qs, strict=True):
         if name.endswith(("hip_pitch", "knee", "ankle_pitch")):
-            q[i] = 0.8 if name.endswith("knee") else -0.4  # knees bent
+            q[i] = 0.8 if name.endswith("knee") else -0.4  # joint angles with bent knees
 
     contacts = [FrictionContact.sole(sole, 0.7, [0.2, 0.1]) for sole in SOLES]
     tasks = [

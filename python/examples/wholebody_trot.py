@@ -19,7 +19,7 @@ DT = 1e-3  # time step (s)
 def main() -> None:
     robot = condyle.robots.quadruped()
     q = condyle.neutral(robot)
-    q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
+    q[7:] = [0.0, 0.7, -1.4] * 4  # joint angles with bent knees
 
     gait = Gait(robot, q, FEET, 0.01)
     gait.stand(10)

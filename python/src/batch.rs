@@ -159,7 +159,7 @@ impl Deref for Rows<'_> {
 /// The form in which a function computed in SIMD lanes returns its results.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
-    /// /// A single array.
+    /// A single array.
     One,
     /// The derivatives of an acceleration with respect to q and v, as two arrays.
     Pair,

@@ -301,9 +301,9 @@ functions! {
 /// Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
 /// dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. If constraints contradict each
-/// other, or a constraint cannot be satisfied at a singular posture, the results are finite and `residual` is above
-/// zero.
+/// constraints: a `ConstraintSet`; q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as
+/// for `rnea`. If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the
+/// results are finite and `residual` is above zero.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -324,8 +324,9 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 /// Computes the result of `constrained_dynamics` and its exact derivatives with respect to q, v and τ, as
 /// `ConstrainedDerivatives`.
 ///
-/// constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces
-/// move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
+/// constraints: a `ConstraintSet`, whose targets are fixed; q: position, nq numbers; v, tau: velocity and efforts, nv
+/// numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space. out: one
+/// array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -347,9 +348,9 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
 /// `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
-/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`;
-/// the forces move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an
-/// earlier result.
+/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position, nq numbers; v, tau: velocity and
+/// efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space.
+/// out: one array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -368,8 +369,9 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 /// Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
 /// lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q: nq
-/// numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+/// constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q:
+/// position, nq numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses
+/// no energy.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])

@@ -93,7 +93,7 @@ impl Holds<Hyper> for Data {
 
 /// An argument that is scratch memory. It is made for one model, and used by one call at a time.
 pub(crate) trait Scratch: PyClass<Frozen = False> {
-    /// Name of the argument.
+    /// Name of the argument, for error messages.
     const ARGUMENT: &'static str;
     /// Returns the models with which this object may be used.
     fn made_for(&self) -> &MadeFor;

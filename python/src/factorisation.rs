@@ -20,7 +20,7 @@ macro_rules! factor {
         pub(crate) struct $class {
             inner: condyle::dynamics::$class<f64>,
             size: usize,
-            /// Whether `factorize` was called.
+            /// Whether `factorize` has computed the factor.
             done: bool,
         }
 
@@ -248,7 +248,8 @@ impl DivideConquer {
     /// Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
     /// + grain) steps.
     ///
-    /// model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
+    /// model: the planned model, or another one with the same bodies and joints; q: position, nq numbers; v, tau:
+    /// velocity and efforts, nv numbers each;
     /// f_ext: as for `rnea`.
     #[pyo3(signature = (model, q, v, tau, f_ext=None, out=None))]
     fn aba<'py>(

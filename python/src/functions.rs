@@ -43,11 +43,11 @@ use pyo3::prelude::*;
 use pyo3::types::{PyInt, PyString};
 use std::ops::Range;
 
-/// /// A kind of argument, which defines how an argument is read from Python.
+/// A kind of argument, which defines how an argument is read from Python.
 pub(crate) trait Argument<'a, 'py> {
     /// Type of the value that Python passes.
     type Given;
-    /// /// Type of the value that the library takes for one state.
+    /// Type of the value that the library takes for one state.
     type Read<S: Number>;
     /// Type of the value that the library takes for many states.
     type All;
@@ -120,7 +120,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
         }
     }
 
-    /// Returns the numbers as hyper-dual numbers.
+    /// Returns the argument's numbers as hyper-dual numbers.
     pub(crate) fn duals<S: Number>(
         &mut self,
         name: &str,
@@ -346,20 +346,20 @@ shared! {
         }
     } }
 
-    /// A number.
+    /// A real or hyper-dual number, the same for all states.
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
         dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
     /// A point: three numbers, the same for all states.
     Point<S>: &'a Bound<'py, PyAny> => condyle::Vec3<f64> { |name, given, _| crate::arrays::three(name, given) }
 
-    /// A number, the same for all states.
+    /// A real number, the same for all states.
     Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given), at once if |_| true }
 
     /// A positive speed.
     Speed<S>: f64 => f64 { |name, given, _| positive_speed(name, *given) }
 
-    /// A word, which the function itself interprets.
+    /// A word (`str`) whose meaning the function itself checks.
     Word<S>: &'a str => &'a str { |_, given, _| Ok(*given), at once if |_| true }
 }
 

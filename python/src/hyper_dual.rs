@@ -152,22 +152,22 @@ impl HyperDual {
         Self(HyperDual64::new(re, eps1, eps2, eps1eps2))
     }
 
-    /// The value.
+    /// The value of the number, without derivatives.
     #[getter]
     fn re(&self) -> f64 {
         self.0.re
     }
-    /// The derivative in the first direction.
+    /// The derivative of the number in the first direction.
     #[getter]
     fn eps1(&self) -> f64 {
         self.0.eps1
     }
-    /// The derivative in the second direction.
+    /// The derivative of the number in the second direction.
     #[getter]
     fn eps2(&self) -> f64 {
         self.0.eps2
     }
-    /// The mixed second derivative.
+    /// The mixed second derivative of the number in the two directions.
     #[getter]
     fn eps1eps2(&self) -> f64 {
         self.0.eps1eps2

@@ -59,7 +59,7 @@ pub(crate) fn from_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound<'
 
 /// Returns the `Inertia` with the ten parameters π; the inverse of `from_inertia`.
 ///
-/// pi: 10 numbers.
+/// pi: the ten parameters π.
 #[pyfunction]
 pub(crate) fn to_inertia<'py>(pi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     give_inertia(pi.py(), rust::to_inertia(array("pi", pi)?))

@@ -164,13 +164,13 @@ impl Simulation {
         format!("<condyle.simulation.Simulation of '{}' at {} s>", self.inner.model().name(), self.inner.time())
     }
 
-    /// The position, nq numbers.
+    /// The position of the robot, nq numbers.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.q().give(py, None)
     }
 
-    /// The velocity, nv numbers.
+    /// The velocity of the robot, nv numbers.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.v().give(py, None)

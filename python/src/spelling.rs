@@ -23,7 +23,7 @@ use pyo3::{ffi, intern};
 /// A `condyle.Model` with Pinocchio's interface.
 #[pyclass(name = "_SpelledModel", module = "condyle.pinocchio", frozen, subclass)]
 pub(crate) struct SpelledModel {
-    /// The `condyle.Model`.
+    /// The wrapped `condyle.Model`.
     #[pyo3(get)]
     ours: Py<Model>,
 }
@@ -63,7 +63,7 @@ impl SpelledData {
         Ok(Self { ours, q, v, a, given: 0, poses: None, frame_poses: None, com: None, hg: None })
     }
 
-    /// The `condyle.Data`.
+    /// The wrapped `condyle.Data`.
     #[getter]
     fn _ours<'py>(&self, py: Python<'py>) -> Bound<'py, Data> {
         self.ours.bind(py).clone()
@@ -93,13 +93,13 @@ impl SpelledData {
         made(py, &self.frame_poses)
     }
 
-    /// The centre of mass, in a list.
+    /// The stored centre of mass, as a list with one array.
     #[getter]
     fn com<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 1]> {
         Ok([made(py, &self.com)?])
     }
 
-    /// The centroidal momentum.
+    /// The stored centroidal momentum.
     #[getter]
     fn hg<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         made(py, &self.hg)
@@ -390,9 +390,9 @@ macro_rules! left {
     )*};
 }
 left! {
-    /// Computes M with both triangles, also stored as data.M.
+    /// Computes the inertia matrix M with both triangles, also stored as data.M.
     "_spelled_crba" crba(q) = algorithms::crba => "M";
-    /// Computes M⁻¹, also stored as data.Minv.
+    /// Computes the inverse M⁻¹ of the inertia matrix, also stored as data.Minv.
     "computeMinverse" computeMinverse(q) = algorithms::minv => "Minv";
     /// Computes the nonlinear effects C v + g, also stored as data.nle.
     "nonLinearEffects" nonLinearEffects(q, v) = algorithms::nonlinear_effects => "nle";
@@ -404,7 +404,7 @@ left! {
     "jacobianCenterOfMass" jacobianCenterOfMass(q) = com_jacobian => "Jcom";
 }
 
-/// Computes q ⊕ v.
+/// Computes the position q ⊕ v.
 #[pyfunction(name = "_spelled_integrate")]
 pub(crate) fn integrate<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -414,7 +414,7 @@ pub(crate) fn integrate<'py>(
     configuration::integrate(model.get().ours.bind(model.py()), q, v, None)
 }
 
-/// Computes q₁ ⊖ q₀.
+/// Computes the tangent vector q₁ ⊖ q₀.
 #[pyfunction(name = "_spelled_difference")]
 pub(crate) fn difference<'py>(
     model: &Bound<'py, SpelledModel>,

@@ -25,7 +25,9 @@ DTYPES = st.sampled_from(
 
 @st.composite
 def layouts(draw: st.DrawFn, shape: tuple[int, ...]) -> np.ndarray:
-    """Draws an array of this shape. The array may be a view: transposed, reversed, with gaps, unaligned, or read-only."""
+    """Draws an array of this shape. The array may be a view: transposed, reversed, unaligned, read-only, or with
+    gaps.
+    """
     dtype = np.dtype(draw(DTYPES))
     plain = draw(hnp.arrays(dtype, shape, elements=st.just(0) | st.just(1)))
     match draw(

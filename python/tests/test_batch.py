@@ -218,7 +218,7 @@ def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
     overlapping = memory.reshape(-1)[18 : 18 + memory[0].size].reshape(memory[0].shape)
     with pytest.raises(ValueError, match="^out: the arrays for dtau_dv and dtau_da share memory$"):
         condyle.rnea_derivatives(model, data, q, v, v, out=(memory[2], overlapping, memory[0]))
-    with pytest.raises(ValueError, match="share memory$"):  # functions that compute state by state
+    with pytest.raises(ValueError, match="share memory$"):  # also for functions that compute state by state
         condyle.coriolis_derivatives(model, data, q, v, out=(memory[0], memory[0]))
     assert not memory.any()
     condyle.rnea_derivatives(model, data, q, v, v, out=tuple(memory[:3]))

@@ -112,8 +112,8 @@ def test_mdbook(tmp_path: Path) -> None:
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
 
 
-# For each worked example: the block that defines the algorithm (in the chapter or in rnea.md), the example's block,
-# and mistakes in the definition, each as a pair (right text, wrong text).
+# For each worked example: the block that defines the algorithm (in the chapter or in rnea.md), and the example's block.
+# Further, mistakes in the definition, each as a pair (right text, wrong text).
 RNEA = [
     (" + cross(vel[i]) @ vJ", ""),
     (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),

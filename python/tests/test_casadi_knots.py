@@ -238,7 +238,7 @@ def test_a_knot_is_that_of_its_number() -> None:
     assert close(condyle.casadi.knot(problem, 4)(x), costs[4], ROUNDING)
     each = condyle.casadi.knot(step, None)
     assert close(each.map(4)(np.tile(x[:, None], 4), np.tile(u[:, None], 4), np.arange(4))[1], costs[:4], ROUNDING)
-    assert each.jacobian().nnz_out(2) == each.jacobian().nnz_out(5) == 0  # derivatives with respect to t
+    assert each.jacobian().nnz_out(2) == each.jacobian().nnz_out(5) == 0  # the derivatives with respect to t are zero
     with pytest.raises(ProblemError, match="t: expected 0 to 4, found 5"):
         condyle.casadi.knot(problem, 5)
     with pytest.raises(ProblemError, match="t: expected the number of a knot of the problem, found None"):

@@ -162,7 +162,7 @@ def test_a_start_is_moved_into_the_bounds() -> None:
 def test_feet_do_not_slip() -> None:
     quadruped = condyle.robots.quadruped()
     q = condyle.neutral(quadruped)
-    q[8::3], q[9::3] = 0.7, -1.4  # bent knees
+    q[8::3], q[9::3] = 0.7, -1.4  # joint angles with bent knees
     x0 = np.r_[q, np.zeros(18)]
     feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
     contacts = {f: condyle.ContactConstraint(f, "point", reference="local_world_aligned", kd=20.0) for f in feet}

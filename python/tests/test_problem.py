@@ -181,7 +181,7 @@ def test_accelerations_efforts_and_forces_of_a_solution() -> None:
     solver.shift(0)
     with pytest.raises(ProblemError, match="the horizon has moved on since this solution"):
         _ = late.forces
-    assert solution.forces[0].keys() == set(FEET)  # computed before the shift
+    assert solution.forces[0].keys() == set(FEET)  # the forces are computed before the shift
     jump = ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), [])
     falling = np.array(STANDING)
     falling[21] = -1.0

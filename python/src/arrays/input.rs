@@ -1,4 +1,4 @@
-//! Reads arrays that Python passes.
+//! Reads arrays that Python passes as arguments.
 
 use condyle::{Se3, Vec3, spatial::Mat3};
 use nalgebra::DMatrix;
@@ -38,7 +38,7 @@ impl Input<'_, Ix2> {
 /// The doubles of an argument, in C order, for calls that keep the interpreter's lock. The borrow of the array is not
 /// registered with the crate `numpy`, because the registration takes as long as the dynamics of a small robot.
 pub(crate) enum InPlace<'py, D: Dimension> {
-    /// An array, kept alive by this reference.
+    /// An array of NumPy, kept alive by this reference.
     Array(Bound<'py, PyArray<f64, D>>),
     /// The address and the number of an argument's doubles. The call must run no Python code until it has used the
     /// doubles.

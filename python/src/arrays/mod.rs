@@ -38,7 +38,7 @@ pub(crate) trait Number: Scalar {
     ) -> PyResult<Self::Input<'py, D>>;
     /// Returns the number without its derivatives.
     fn real(&self) -> f64;
-    /// Reads a number.
+    /// Reads an argument that is a single number.
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
     /// Fills the caller's array `out`, or a new array in C order, and returns the array. `fill` must set all numbers.
     fn output<'py>(

@@ -213,7 +213,7 @@ fn transpose<N: Number>(from: &[N], rows: usize, columns: usize, to: &mut [N]) {
     }
 }
 
-/// /// A pose, written as a homogeneous matrix.
+/// A pose, written as a homogeneous matrix.
 impl<S: Number> Array for Se3<S> {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {

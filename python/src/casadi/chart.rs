@@ -47,7 +47,7 @@ pub(super) struct Chart {
 /// A position, and the matrix T at this position.
 #[derive(Clone, Debug)]
 pub(super) struct Position {
-    /// q̂, nq numbers.
+    /// The normalised position q̂, nq numbers.
     pub(super) q: Vec<f64>,
     /// The matrix T of each group. T is set only for groups with a quaternion or a point of a circle.
     T: Vec<Block>,
@@ -94,7 +94,7 @@ impl Chart {
         }
     }
 
-    /// Computes q̂ and T at q.
+    /// Computes the normalised position q̂ and the matrix T at q.
     pub(super) fn update(&self, q: &[f64], at: &mut Position) {
         at.q.copy_from_slice(q);
         for (k, group) in self.groups.iter().enumerate() {

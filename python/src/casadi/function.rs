@@ -12,13 +12,13 @@ use nalgebra::DMatrix;
 /// The quantity that a function computes.
 #[derive(Clone, Debug)]
 pub(crate) enum Kind {
-    /// τ = rnea(q, v, a).
+    /// Inverse dynamics: τ = rnea(q, v, a).
     Rnea,
-    /// a = aba(q, v, τ).
+    /// Forward dynamics: a = aba(q, v, τ).
     Aba,
-    /// M = crba(q).
+    /// The inertia matrix: M = crba(q).
     Crba,
-    /// Position and rotation of a frame.
+    /// The position and the rotation of a frame.
     FramePlacement { frame: usize },
     /// The velocity of a frame.
     FrameVelocity { frame: usize, reference: ReferenceFrame },
@@ -33,11 +33,11 @@ pub(crate) enum Kind {
 /// The second derivatives that may differ from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pattern {
-    /// No second derivatives.
+    /// All second derivatives are zero.
     Zero,
-    /// Second derivatives with respect to pairs of coordinates that move at least one common body.
+    /// A second derivative may differ from zero only if its two coordinates move a common body.
     Related,
-    /// All second derivatives.
+    /// Any second derivative may differ from zero.
     Full,
 }
 
@@ -99,7 +99,7 @@ impl Kind {
             (Self::Rnea, 0, _) | (Self::Rnea, 1, 1) | (Self::Crba, ..) => Pattern::Related,
             (Self::Rnea, ..) => Pattern::Zero,
             (Self::Aba | Self::ConstrainedDynamics { .. }, 1 | 2, 2) => Pattern::Zero, // the result is affine in τ
-            // these results are linear in v
+            // the velocity of a frame and the centroidal momentum are linear in v
             (Self::FrameVelocity { .. } | Self::CentroidalMomentum, 1, 1) => Pattern::Zero,
             _ => Pattern::Full,
         }

@@ -122,7 +122,7 @@ struct KnotCalls {
     t: Option<usize>,
     end: bool,
     next: Vec<f64>,
-    /// /// The vector μ = Eᵀ λ: the multipliers λ of the next state, mapped to its tangent space.
+    /// The vector μ = Eᵀ λ: the multipliers λ of the next state, mapped to its tangent space.
     mu: Vec<f64>,
     knot: LqKnot,
     hessian: Hessian,

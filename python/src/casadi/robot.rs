@@ -8,7 +8,7 @@ use condyle::{ConstraintSet, Model, ModelError as Error};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// A function of a robot.
+/// A function of a robot as the computation of a slot.
 pub(super) struct RobotFunction {
     of: Arc<(Model, Kind)>,
     /// Number of rows of the constraints. `results` is the total number of entries of the results.

@@ -246,7 +246,7 @@ impl Model {
     /// strict: whether a joint that the robot does not have is an error. Without `strict` such a joint is ignored,
     /// since robots with fewer joints often share an SRDF.
     ///
-    /// Raises `ParseError`, with file, line and element.
+    /// Raises `ParseError` for an invalid file; the error contains file, line and element.
     #[pyo3(signature = (path, strict=false))]
     fn reference_configurations<'py>(
         &self,

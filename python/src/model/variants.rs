@@ -162,7 +162,7 @@ impl Model {
     /// kept.
     ///
     /// joints: a list of names or indices of bodies.
-    /// q: nq numbers.
+    /// q: position, nq numbers.
     ///
     /// >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
     /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']

@@ -50,7 +50,7 @@ impl Model {
 
     /// Reads a model from the JSON that `to_json` returns.
     ///
-    /// Raises `ParseError`, with line and column.
+    /// Raises `ParseError` for an invalid text; the error contains line and column.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let model: condyle::Model =
@@ -81,7 +81,7 @@ impl Model {
 /// First bytes of a pickled model, with the library's version: the format may change between versions.
 const MAGIC: &str = concat!("condyle ", env!("CARGO_PKG_VERSION"), "\n");
 
-/// Reads the model in a pickle.
+/// Creates the model from the bytes of a pickle.
 #[pyfunction]
 #[pyo3(name = "_model_from_bytes")]
 pub(crate) fn model_from_bytes(data: &[u8]) -> PyResult<Model> {

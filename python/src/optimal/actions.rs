@@ -201,7 +201,7 @@ methods! {
 /// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
 /// w a(r), as for `FreeDynamics` without Δt.
 ///
-/// There are no controls.
+/// An impact has no controls.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name.

@@ -1,4 +1,4 @@
-//! //! Residuals of robots, which costs minimise or limits bound.
+//! Residuals of robots, which costs minimise or limits bound.
 
 use super::cones::{FrictionCone, WrenchCone, surface};
 use super::own::{Fault, Functions, MOST_SIZE, OwnFunction, Space, Way};

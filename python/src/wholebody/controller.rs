@@ -1,4 +1,4 @@
-//! //! The whole-body controller as a Python class.
+//! The whole-body controller as a Python class.
 
 use super::contacts::FrictionContact;
 use super::plan::Plan;
@@ -105,7 +105,7 @@ impl WholeBodyController {
     /// Returns the `References` that keep the robot at rest at a position: all tasks keep their current values, all
     /// contacts touch and are held, and the contacts share the weight equally.
     ///
-    /// q: nq numbers.
+    /// q: position, nq numbers.
     ///
     /// Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) whose length is
     /// not 1.
@@ -141,7 +141,7 @@ impl WholeBodyController {
     /// 'invalid_state' for an invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the
     /// joint or the frame. Other Python threads can run meanwhile.
     ///
-    /// q: nq numbers; v: nv.
+    /// q: position, nq numbers; v: velocity, nv numbers.
     /// references: `References` of this controller.
     fn step<'py>(
         &self,
@@ -164,7 +164,7 @@ impl WholeBodyController {
     /// errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the state and references
     /// of the last step again. Use this method in tests: it assembles the program anew.
     ///
-    /// q: nq numbers; v: nv.
+    /// q: position, nq numbers; v: velocity, nv numbers.
     /// references: `References` of this controller.
     fn kkt_residuals<'py>(
         &self,

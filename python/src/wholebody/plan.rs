@@ -42,7 +42,7 @@ pub(crate) struct Plan {
     pub(super) inner: rust::Plan,
     pub(super) made_for: MadeFor,
     pub(super) contacts: usize,
-    /// The number of controls.
+    /// The number of controls in each interval.
     nu: usize,
     model: Py<Model>,
 }
@@ -117,7 +117,7 @@ impl Plan {
     /// Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers. The efforts of
     /// a free-flyer are 0.
     ///
-    /// t: the time (s); q: nq numbers; v: nv.
+    /// t: the time (s); q: position, nq numbers; v: velocity, nv numbers.
     ///
     /// Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose
     /// quaternions or pairs (cos, sin) do not have length 1.

@@ -181,13 +181,13 @@ angular_momentum(): 3;
         self.its_frame()
     }
 
-    /// The weight w.
+    /// The weight w of the task.
     #[getter]
     fn weight(&self) -> f64 {
         self.0.weight
     }
 
-    /// The gains k and d, `Gains`.
+    /// The gains k and d of the task, as `Gains`.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_gains(py, self.0.gains)

@@ -37,7 +37,7 @@ impl Directions {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Expansion {
     directions: Directions,
-    /// Value and derivatives, knot by knot.
+    /// The value and the derivatives, knot by knot.
     numbers: Vec<f64>,
 }
 
