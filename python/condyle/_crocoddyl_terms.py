@@ -32,7 +32,7 @@ AT_THE_END = {
     "ResidualModelContactCoPPosition",
 }
 """Residuals that are constant in Crocoddyl's terminal models: ResidualModelJointEffort is minus its reference, the
-others are zero.
+other residuals are zero.
 """
 
 

@@ -1,4 +1,4 @@
-"""NVIDIA's driver and NVIDIA's run-time compiler for `condyle.cuda`. Both are loaded when they are first needed."""
+"""NVIDIA's driver and NVIDIA's run-time compiler for `condyle.cuda`. Both libraries are loaded on first use."""
 
 import ctypes
 import os
@@ -67,7 +67,9 @@ _LOG = 16384
 
 
 def _load(what: str, variable: str, files: Sequence[str], functions: dict[str, list[Any]]) -> ctypes.CDLL:
-    """Loads a library and sets the types of its functions; the error lists the files that were tried."""
+    """Loads a library and sets the types of its functions. If no file can be loaded, the error lists the files that
+    were tried.
+    """
     given = os.environ.get(variable)
     reasons = []
     for file in [given] if given else files:

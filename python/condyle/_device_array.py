@@ -97,7 +97,9 @@ class DeviceArray:
         dl_device: tuple[int, int] | None = None,
         copy: bool | None = None,
     ) -> Any:
-        """Returns a capsule for another library. This library passes the stream on which it will use the numbers."""
+        """Returns a capsule for another library. The other library passes the stream on which it will use the
+        numbers.
+        """
         if dl_device is not None and tuple(dl_device) != self.__dlpack_device__():
             raise BufferError(f"dl_device: expected {self.__dlpack_device__()}, found {tuple(dl_device)}")
         if copy:
@@ -206,8 +208,8 @@ def _interface(name: str, array: Any, device: Device, stream: int) -> View:
 
 
 def current_stream(array: Any, device: Device) -> int | None:
-    """Returns the stream that the library of an array currently uses, if the library reports it, as PyTorch and CuPy
-    do.
+    """Returns the stream that the library of an array currently uses, if the library reports this stream, as PyTorch
+    and CuPy do.
     """
     library = type(array).__module__.partition(".")[0]
     module: Any = sys.modules.get(library)

@@ -1,4 +1,6 @@
-"""Derivatives of a function of the state, by hyper-dual numbers. `differentiate.rs` does the same in Rust."""
+"""Derivatives of a function of the state, by hyper-dual numbers. The Rust file `differentiate.rs` contains the same
+methods.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +14,7 @@ Function = Callable[[NDArray[Any]], Any]
 
 
 def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
-    """Returns the numbers of a state, and the number of directions in which it can change."""
+    """Returns the numbers of a state, and the number of directions in which the state can change."""
     numbers = np.asarray(x, dtype=np.float64)
     if numbers.ndim != 1 or len(numbers) < model.nq:
         raise ValueError(f"x: expected a vector of at least {model.nq} numbers, found shape {numbers.shape}")

@@ -1,5 +1,5 @@
-"""The class `Inertia`: inertias from numbers or for simple shapes, their transformation to other frames, and their
-sums.
+"""The class `Inertia`: inertias from numbers or of simple shapes, transformations of inertias to other frames, and sums
+of inertias.
 """
 
 from typing import NamedTuple

@@ -38,14 +38,16 @@ class ModelPool:
 def rneaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, a: ArrayLike, tau: _Array | None = None
 ) -> _Array | None:
-    """Computes inverse dynamics τ for the state in each column, (nv, N). If `tau` is given, writes the result to it."""
+    """Computes inverse dynamics τ for the state in each column, (nv, N). If `tau` is given, writes the result to
+    `tau`.
+    """
     return _columns(ours.rnea, num_thread, pool, (q, v, a), tau)
 
 
 def abaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, tau: ArrayLike, a: _Array | None = None
 ) -> _Array | None:
-    """Computes forward dynamics q̈ for the state in each column, (nv, N). If `a` is given, writes the result to it."""
+    """Computes forward dynamics q̈ for the state in each column, (nv, N). If `a` is given, writes the result to `a`."""
     return _columns(ours.aba, num_thread, pool, (q, v, tau), a)
 
 

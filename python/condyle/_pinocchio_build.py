@@ -37,7 +37,7 @@ def buildSampleModelHumanoid() -> Model:
 
 
 def buildSampleModelHumanoidRandom() -> Model:
-    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. Its numbers differ from Pinocchio's
+    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. The numbers differ from Pinocchio's
     numbers, since NumPy draws them.
     """
     return Model(samples.random_humanoid())

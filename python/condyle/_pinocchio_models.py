@@ -202,7 +202,7 @@ def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
 
 
 def _check_lossless(theirs: Any, joint: Any, name: str) -> None:
-    """Checks that a joint has neither damping nor friction, because it is converted to a chain of joints."""
+    """Checks that a joint has neither damping nor friction, because the joint is converted to a chain of joints."""
     if any(_losses(theirs, joint, name).values()):
         raise ModelError(f"joint `{name}`: damping and friction of a {joint.shortname()} have no place here")
 

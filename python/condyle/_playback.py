@@ -177,7 +177,9 @@ def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Arr
 
 
 def _some(points: _Array) -> NDArray[np.float32]:
-    """Returns the points of arrows, or an invisible arrow if there are no arrows, since viser needs at least one."""
+    """Returns the points of arrows, or an invisible arrow if there are no arrows, since viser needs at least one
+    arrow.
+    """
     return (points if len(points) else np.zeros((1, 2, 3))).astype(np.float32)
 
 

@@ -93,9 +93,9 @@ def sweep(
     problem: the nominal problem.
     variations: V initial states, (V, nx); or, with `vary`, a sequence of V objects of any type.
     vary: a function of the problem and a variation. The function may return the problem to solve, such as a problem
-        with a heavier robot. Or the function changes the given problem and returns None. Then it must set the same
-        values for each variation, since the next variation gets the same problem. Without `vary`, the variation is the
-        initial state.
+        with a heavier robot. Or the function changes the given problem and returns None. Then the function must set the
+        same values for each variation, since the next variation gets the same problem. Without `vary`, the variation is
+        the initial state.
     start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
         and starts from the solution of this problem. The first state is replaced by the variation's initial state.
     solver: `Fddp` or `AugmentedLagrangian`, which is made for each problem with the `settings`.
@@ -171,7 +171,9 @@ def _solved(
 
 
 class Worker:
-    """A worker, which solves chunks of variations. It uses a single solver as long as the problem is the same."""
+    """A worker, which solves chunks of variations. The worker uses a single solver as long as the problem is the
+    same.
+    """
 
     def __init__(self, job: Job) -> None:
         self._job = job

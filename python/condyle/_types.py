@@ -231,7 +231,7 @@ class ConstrainedDerivatives(NamedTuple):
 
 class ConstrainedEquations(NamedTuple):
     """The result of `constrained_dynamics_equations`: the result of `constrained_dynamics`, and linear equations for
-    its changes.
+    the changes of this result.
 
     Derivatives with respect to q are taken in the tangent space.
     """
@@ -417,9 +417,9 @@ class AssemblySize(NamedTuple):
     longest_run: int
     """The number of bodies in the largest run."""
     joins: int
-    """The number of joins of two pieces of the tree that are in series, one below the other."""
+    """The number of joins of two pieces of the tree, where one piece is below the other."""
     gathers: int
-    """The number of additions of the contributions of two pieces of the tree on the same body."""
+    """The number of additions of contributions, where two pieces of the tree are on the same body."""
     depth: int
     """The number of steps that must be computed one after the other: the longest chain of pieces from a run to the
     whole robot.
@@ -462,7 +462,7 @@ class GravityCompensation(NamedTuple):
     mass: float
     """The mass whose weight is supported (kg)."""
     mass_com: _Array
-    """The supported mass times the position of its centre in the body's frame (kg m), 3 numbers."""
+    """The supported mass times the position of the mass's centre in the body's frame (kg m), 3 numbers."""
     ratio: float
     """The supported fraction of the body's weight, except for parts of the body with another ratio. If the inertia of
     the body changes, `mass` changes by this ratio times the change of the body's mass.

@@ -291,8 +291,8 @@ class FrameTarget(Target):
 
 
 class ContactTarget(Target):
-    """The target of a contact: whether the contact touches, the pose at which it is held, and the reference of its
-    force, in the world's frame.
+    """The target of a contact: whether the contact touches, the pose at which the frame is held, and the reference of
+    the contact's force, in the world's frame.
     """
 
     __slots__ = ()

@@ -1,9 +1,9 @@
 """Poses, motions, forces, inertias, and the exponentials of SO(3) and SE(3), with NumPy, also for batches.
 
-The layout is the same as in Pinocchio: linear parts first. An `SE3` is the pose aXb of frame b in frame a: it converts
-coordinates in b to coordinates in a. Motions and forces are different types. So a change of frame uses the right rule
-for each type, and a motion cannot be added to a force. All types and functions of this module take arrays with any
-number of additional axes in front, for batches.
+The layout is the same as in Pinocchio: linear parts first. An `SE3` is the pose aXb of frame b in frame a. An `SE3`
+converts coordinates in b to coordinates in a. Motions and forces are different types. So a change of frame uses the
+right rule for each type, and a motion cannot be added to a force. All types and functions of this module take arrays
+with any number of additional axes in front, for batches.
 
 >>> import numpy as np
 >>> from condyle.algebra import SE3, Force, Motion, exp6, log6
@@ -383,7 +383,8 @@ def quaternion(R: ArrayLike) -> _Array:
     a, b, c = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    # each tuple contains 4 times the products of one component with (x, y, z, w), so it is a multiple of the quaternion
+    # each tuple contains 4 times the products of one component with (x, y, z, w), so the tuple is a multiple of the
+    # quaternion
     by_x, by_y = (1 + a - b - c, xy, xz, x), (xy, 1 - a + b - c, yz, y)
     by_z, by_w = (xz, yz, 1 - a - b + c, z), (x, y, z, 1 + a + b + c)
     products = np.stack([np.stack(row, -1) for row in (by_x, by_y, by_z, by_w)], -2)

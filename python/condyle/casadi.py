@@ -182,10 +182,11 @@ def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
         argument of the function, (x, u, t) -> (next, cost), so that one function serves all knots of an action:
         `f.map(N)(xs, us, range(N))`.
 
-    For a knot without controls, such as an impact, the function is x -> (next, cost); for the terminal knot it is x ->
-    cost. Bounds on controls, limits and the constraints of a `ConstrainedAction` are not included: pass them to the
-    optimiser. Quaternions and pairs (cos, sin) in x are divided by their lengths, as in the other functions;
-    quaternions and pairs in `next` have length 1. So multiple shooting, x⁺ = next(x, u), keeps the lengths at 1.
+    For a knot without controls, such as an impact, the function is x -> (next, cost); for the terminal knot the
+    function is x -> cost. Bounds on controls, limits and the constraints of a `ConstrainedAction` are not included:
+    pass them to the optimiser. Quaternions and pairs (cos, sin) in x are divided by their lengths, as in the other
+    functions; quaternions and pairs in `next` have length 1. So multiple shooting, x⁺ = next(x, u), keeps the lengths
+    at 1.
 
     First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. For a robot, the Hessian of the
     cost is the Gauss–Newton approximation w (∂r)ᵀ a″ ∂r, with residual r and activation a; for an `Lqr` and a

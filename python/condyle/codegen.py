@@ -102,7 +102,7 @@ def source(
 
 
 class Compiled:
-    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of its arguments and results.
+    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of the arguments and results.
 
     The function may be called from several threads at a time.
     """
@@ -162,8 +162,8 @@ def compile(  # noqa: A001
     compiler: str | None = None,
     cache: "str | os.PathLike[str] | None" = None,
 ) -> Compiled:
-    """Compiles a function of a robot with the system's C compiler, or loads it from the cache if it was compiled
-    before.
+    """Compiles a function of a robot with the system's C compiler, or loads the compiled function from the cache if it
+    was compiled before.
 
     name: one of `functions`; frames, constraints, external_forces, inputs: as for `source`. compiler: a command that
         understands the options of GCC and Clang; by default the environment variable CC, else `cc`. cache: a folder; by

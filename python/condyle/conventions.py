@@ -185,12 +185,12 @@ class Coordinates:
     library: a name in `LIBRARIES`, or a `FreeJoint` that describes a library. Joints keep Condyle's order; if the other
         library numbers joints differently, permute them by name. Spherical joints have their quaternion in the
         library's order, and their angular velocity along the axes of the child body, as in MuJoCo and
-        RigidBodyDynamics.jl. Some libraries represent some joints in another form: Drake represents planar and
-        spherical joints so, and all libraries except Pinocchio represent planar joints so. For such a joint, a
-        ValueError with the joint's name is raised.
+        RigidBodyDynamics.jl. Some libraries represent some joints in another form: this holds for planar and spherical
+        joints of Drake, and for planar joints of all libraries except Pinocchio. For such a joint, a ValueError with
+        the joint's name is raised.
 
     Efforts follow from power: τᵀ v is the same number in both libraries. Accelerations are time derivatives of
-    velocities. So if a library has velocities along the world's axes, its accelerations are classical.
+    velocities. So if a library has velocities along the world's axes, the library's accelerations are classical.
     """
 
     def __init__(self, model: Model, library: str | FreeJoint) -> None:
@@ -276,7 +276,9 @@ class Coordinates:
         return self._shifted(v, a, -1.0)
 
     def effort(self, q: ArrayLike, tau: ArrayLike) -> _Array:
-        """Returns the library's efforts from Condyle's q and τ: τᵀ v is the same in both, so only the axes change."""
+        """Returns the library's efforts from Condyle's q and τ: τᵀ v is the same in both libraries, so only the axes
+        change.
+        """
         return self._out(_last(q, "q", self.model.nq), _last(tau, "tau", self.model.nv))
 
     def effort_from(self, q: ArrayLike, tau: ArrayLike) -> _Array:

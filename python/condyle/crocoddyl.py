@@ -7,9 +7,9 @@ An existing `crocoddyl.ShootingProblem` is solved by Condyle's solvers in two li
 
 where xs and us are arrays of Crocoddyl's states and controls. The numbers of states and controls, their order, and the
 iterates are the same as in Crocoddyl. Gains have the opposite sign: u = ū + α k + K (x ⊖ x̄).
-`project_warm_start=False` matters only if controls are bounded: it keeps a warm start outside the bounds, as Crocoddyl
-does. In the other direction, `differential_action(model)` returns a `crocoddyl.DifferentialActionModelAbstract` for
-Crocoddyl's solvers, which computes with Condyle's dynamics.
+`project_warm_start=False` has an effect only if controls are bounded: a warm start outside the bounds is not moved into
+the bounds, as in Crocoddyl. In the other direction, `differential_action(model)` returns a
+`crocoddyl.DifferentialActionModelAbstract` for Crocoddyl's solvers, which computes with Condyle's dynamics.
 
 The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. Condyle does not install Crocoddyl: PyPI
 has version 3.2.1, for Pinocchio 4.0.
@@ -320,7 +320,7 @@ _classes: list[Any] = []
 
 
 def _differential_class() -> Any:
-    """Returns the class for `differential_action`; it is created on first use, since this requires Crocoddyl."""
+    """Returns the class for `differential_action`; the class is created on first use, because it requires Crocoddyl."""
     if not _classes:
         base: Any = import_module("crocoddyl").DifferentialActionModelAbstract
         _classes.append(type("DifferentialActionModel", (_OnOurs, base), {"_base": base}))

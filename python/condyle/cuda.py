@@ -116,8 +116,8 @@ class _Array:
 
 
 class Kernel:
-    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arguments and results, and their
-    shapes for one state.
+    """A function of a robot on a GPU. `inputs` and `outputs` are the names of the arguments and results, and the shapes
+    for one state.
 
     The kernel may be called from several threads at a time.
     """
@@ -166,8 +166,8 @@ class Kernel:
 
         arguments: arrays on the device, of any library that supports DLPack or `__cuda_array_interface__`. The result
             is an array, or a named tuple if there are several results. The shape of a result is (k, n) or, for
-            matrices, (rows, columns, n). If the states are along the first axis of the first argument, they are also
-            along the first axis of the results. New arrays are allocated, which takes time. In a loop, pass `out`
+            matrices, (rows, columns, n). If the states are along the first axis of the first argument, the results also
+            have the states along the first axis. New arrays are allocated, which takes time. In a loop, pass `out`
             instead: one array of the same shape, or a sequence of arrays for several results. The arrays of `out` are
             filled and returned. A matrix in `out` may also have the shape (rows × columns, n), column by column.
 

@@ -1,4 +1,5 @@
-"""Pinocchio's API names: a thin layer, so that a script for Pinocchio runs if only its import is changed.
+"""Functions and classes with Pinocchio's names. A script for Pinocchio runs with this module if only the script's
+import is changed.
 
 >>> import condyle, numpy as np
 >>> import condyle.pinocchio as pin

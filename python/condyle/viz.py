@@ -80,7 +80,7 @@ def spy(M: ArrayLike, model: Model, tolerance: float = 1e-12) -> "Figure":
 def plot(solution: Solution, model: Model, dt: float | None = None) -> "Figure":
     """Plots the positions, velocities and controls of a solution over time, and the convergence of the solver.
 
-    dt: the time between two knots (s), if it is the same for all knots; None plots over the knot's index.
+    dt: the time between two knots (s), if this time is the same for all knots; None plots over the index of the knot.
     """
     xs = np.asarray(solution.xs, float)
     if xs.ndim != 2 or xs.shape[1] != model.nq + model.nv:

@@ -2,8 +2,8 @@
 
     python python/examples/pictures.py [--stay]
 
-The example needs `pip install condyle[viz]`. It writes plot.png and spy.png to the current folder. With --stay, the
-page stays open until Enter is pressed.
+The example needs `pip install condyle[viz]`. The example writes plot.png and spy.png to the current folder. With
+--stay, the page stays open until Enter is pressed.
 """
 
 import sys

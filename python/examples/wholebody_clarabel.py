@@ -35,7 +35,7 @@ ALIGNED = "local_world_aligned"
 
 
 class Standing:
-    """A posture to hold, and the cone program that holds it at a given state."""
+    """A posture to hold, and the cone program that holds this posture at a given state."""
 
     def __init__(self, model, q_ref, trunk):
         self.model, self.data, self.q_ref, self.trunk = model, condyle.Data(model), q_ref, trunk

@@ -1,9 +1,9 @@
 """A quadruped stands on four point feet. A push makes the robot sway, and the robot returns to its posture.
 
 Each millisecond one cone program gives the torques: whole-body control with exact friction cones. The controller
-measures only the state, not the push. The ground holds each touching foot as long as the ground pushes it. The ground's
-friction is unlimited, so the example checks each force, and reports the largest fraction of the friction limit that was
-used.
+measures only the state, not the push. The ground holds each touching foot as long as the ground pushes the foot. The
+ground's friction is unlimited, so the example checks each force, and reports the largest fraction of the friction limit
+that was used.
 
     python python/examples/wholebody_stand.py
 """

@@ -1,6 +1,6 @@
 //! Dynamics and its derivatives: one Python function for each function of the library.
 //!
-//! A call for one state takes microseconds and keeps the interpreter's lock; a call for many states releases it.
+//! A call for one state takes microseconds and keeps the interpreter's lock; a call for many states releases this lock.
 
 use crate::arrays::{Give, Number, Symmetric, give_named};
 use crate::functions::{any, functions, regular};
@@ -160,8 +160,8 @@ batch b: any(q: Position, v: Tangent) -> One { b.coriolis_matrix(model, q, v) }
 /// dtau_dv, dtau_da)`, each (nv, nv).
 ///
 /// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: as for `rnea`, constant in the
-/// bodies' frames. ∂/∂q is taken in the tangent space: it is the derivative of τ at `integrate(q, δ)` with respect to
-/// δ, at δ = 0. out: three arrays, such as an earlier result.
+/// bodies' frames. ∂τ/∂q is taken in the tangent space, as the derivative of τ at `integrate(q, δ)` with respect to δ,
+/// at δ = 0. out: three arrays, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
@@ -178,7 +178,7 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaD
 /// da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 ///
 /// q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`, constant in the
-/// bodies' frames. ∂/∂q is taken in the tangent space: it is the derivative of q̈ at `integrate(q, δ)` with respect to
+/// bodies' frames. ∂q̈/∂q is taken in the tangent space, as the derivative of q̈ at `integrate(q, δ)` with respect to
 /// δ, at δ = 0. out: four arrays, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()

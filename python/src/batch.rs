@@ -1,9 +1,9 @@
 //! Calls for many states: arguments and results have one more axis, along which the states are stored.
 //!
 //! An argument without this axis is shared by all states. Functions that the library computes in SIMD lanes release the
-//! interpreter's lock. They compute groups of states, each for some milliseconds, and write directly to the returned
-//! arrays. Functions without `Data` are computed state by state, also without the lock. All other functions are called
-//! once for each state. Signals are checked between groups and between states.
+//! interpreter's lock. These functions compute groups of states, which take some milliseconds each, and write directly
+//! to the returned arrays. Functions without `Data` are computed state by state, also without the lock. All other
+//! functions are called once for each state. Signals are checked between groups and between states.
 
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
@@ -23,8 +23,8 @@ use std::ops::{Deref, Range};
 pub(crate) struct Look {
     /// Whether the argument contains hyper-dual numbers.
     pub(crate) dual: bool,
-    /// Number of states for which the argument is given. `None` if it is given for a single state, or does not depend
-    /// on the state.
+    /// Number of states for which the argument is given. `None` if the argument is given for a single state, or does
+    /// not depend on the state.
     pub(crate) states: Option<usize>,
 }
 
@@ -156,7 +156,7 @@ impl Deref for Rows<'_> {
     }
 }
 
-/// The form in which a function computed in SIMD lanes returns its results.
+/// The Python type of the results of a function that is computed in SIMD lanes.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
     /// A single array.

@@ -40,9 +40,9 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 /// A builder that makes a `Model` body by body, parents first.
 ///
 /// Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass.
-/// Pinocchio's composite, universal and spherical ZYX joints are a `chain` of bodies here. The chain has the same q and
-/// v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext include these
-/// bodies.
+/// A builder makes Pinocchio's composite, universal and spherical ZYX joints as a `chain` of bodies. The chain has the
+/// same q and v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext
+/// include these bodies.
 ///
 /// name: the name of the robot.
 ///
@@ -231,8 +231,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Makes a joint follow another one: the follower's position is ratio q + offset, where q is the leader's position.
-    /// The follower has no coordinate in q.
+    /// Makes a joint follow another joint: the follower's position is ratio q + offset, where q is the leader's
+    /// position. The follower has no coordinate in q.
     ///
     /// follower, leader: the bodies that the joints carry.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
@@ -303,7 +303,7 @@ impl ModelBuilder {
     }
 
     /// Supports a fraction of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
-    /// mass. If the inertia of the body changes later, the force changes with it.
+    /// mass. If the inertia of the body changes later, the force changes with the inertia.
     ///
     /// ratio: the supported fraction of the weight; 1 supports the whole weight.
     /// part: None for the whole body, or the inertia of the part of the body to which `ratio` applies. The inertia of
@@ -328,7 +328,7 @@ impl ModelBuilder {
     }
 
     /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. Limits, armature and
-    /// damping belong to the joints; an actuator does not change them.
+    /// damping belong to the joints; an actuator does not change these values.
     ///
     /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
     /// tendon: the tendon's name, if the actuator drives a tendon.

@@ -1,4 +1,5 @@
-//! Attributes of a model as Python objects, made on first access and then kept, since a model never changes.
+//! Attributes of a model as Python objects. The objects are made on first access and then kept, since a model never
+//! changes.
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;

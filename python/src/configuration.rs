@@ -86,8 +86,8 @@ each(q0: Position, q1: Position) -> [] |to| {
     to[0] = condyle::configuration::distance(model, q0, q1, &mut vec![0.0; model.nv()])
 }
 
-/// Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument
-/// itself does not change unless it is `out`.
+/// Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument q
+/// does not change unless q is also `out`.
 ///
 /// q: position, nq numbers.
 ///
@@ -124,8 +124,8 @@ fn transport(model; v: Tangent, X: Tangents; out) {
     moved
 }
 
-/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not
-/// depend on q.
+/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. The Jacobian does
+/// not depend on q.
 ///
 /// v: tangent vector, nv numbers; argument: 'position' for q or 'velocity' for v.
 fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
@@ -139,8 +139,8 @@ fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
     J
 }
 
-/// Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. It depends
-/// only on the difference of the positions.
+/// Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. The
+/// Jacobian depends only on the difference of the positions.
 ///
 /// d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
 fn difference_jacobian(model; d: Tangent, argument: Word; out) {

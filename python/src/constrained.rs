@@ -68,7 +68,7 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
 pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult<Bound<'py, PyDict>> {
     let constraints = PyDict::new(py);
     let joint = |body: usize| &*model.bodies()[body].joint_name;
-    // give the frame's index instead of its name if another frame has the same name
+    // a frame is given by its index, not its name, if another frame has the same name
     let frame = |index: usize| -> PyResult<Bound<'py, PyAny>> {
         let name = &*model.frames()[index].name;
         if model.frame(name) == Ok(index) { name.into_bound_py_any(py) } else { index.into_bound_py_any(py) }
@@ -137,9 +137,10 @@ fn aim(
 #[pyclass(module = "condyle")]
 pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
-    /// The set for hyper-dual numbers, made when it is first needed after a change of the targets.
+    /// The set of constraints for hyper-dual numbers. The set is made on first use, and again on first use after a
+    /// change of the targets.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
-    /// The constraints for many states in SIMD lanes, made when they are first needed.
+    /// The constraints for many states in SIMD lanes, made on first use.
     lanes: Option<Box<condyle::batch::BatchConstraints>>,
     /// The constraints with their current targets.
     constraints: Vec<ContactConstraint>,
@@ -369,9 +370,8 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 /// Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
 /// lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q:
-/// position, nq numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses
-/// no energy.
+/// constraints: a `ConstraintSet`, whose gains and targets of velocity and acceleration are ignored; q: position, nq
+/// numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])

@@ -30,9 +30,9 @@ pub(crate) struct Data {
     /// The model for which this `Data` was made.
     robot: Arc<condyle::Model>,
     threads: usize,
-    /// The scratch for hyper-dual numbers, made when it is first needed.
+    /// The scratch memory for hyper-dual numbers, made on first use.
     dual: Option<Box<condyle::Data<Hyper>>>,
-    /// The scratch for many states, large enough for all calls so far.
+    /// The scratch memory for many states, large enough for all calls so far.
     batch: Option<Box<condyle::Batch>>,
 }
 
@@ -91,7 +91,7 @@ impl Holds<Hyper> for Data {
     }
 }
 
-/// An argument that is scratch memory. It is made for one model, and used by one call at a time.
+/// An argument that is scratch memory, made for one model and used by one call at a time.
 pub(crate) trait Scratch: PyClass<Frozen = False> {
     /// Name of the argument, for error messages.
     const ARGUMENT: &'static str;

@@ -204,8 +204,8 @@ fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> Named("EnergyDerivatives") { b.energy_derivatives(model, q, v) }
 
-/// Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces it is also
-/// the derivative of `gravity`.
+/// Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces, ∂τ/∂q is
+/// also the derivative of `gravity`.
 ///
 /// q: position, nq numbers; f_ext: as for `rnea`, constant in the bodies' frames.
 fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {

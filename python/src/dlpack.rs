@@ -69,7 +69,8 @@ pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
             return Err(PyTypeError::new_err("DLPack: expected a capsule that nobody has taken over"));
         }
     };
-    // SAFETY: the capsule's name determines its structure. It has `ndim` sizes and as many strides, or null strides.
+    // SAFETY: the capsule's name determines its structure. The structure has `ndim` sizes and as many strides, or null
+    // strides.
     unsafe {
         let tensor = &*tensor;
         let numbers = |from: *mut i64| match usize::try_from(tensor.ndim) {
@@ -92,7 +93,7 @@ struct Lent<M> {
 /// Takes back a lent array.
 ///
 /// # Safety
-/// `context` comes from a `Box<Lent<M>>`, and the caller does not use it afterwards.
+/// `context` comes from a `Box<Lent<M>>`, and the caller does not use `context` afterwards.
 unsafe fn take_back<M>(context: *mut c_void) {
     // SAFETY: the caller promises that `context` comes from a `Box<Lent<M>>`.
     let mut lent = unsafe { Box::from_raw(context.cast::<Lent<M>>()) };

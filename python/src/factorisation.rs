@@ -43,7 +43,7 @@ macro_rules! factor {
             /// Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
             /// cost.
             ///
-            /// M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
+            /// M is not checked: if M is not positive definite, solutions are wrong or not finite. An exception of a
             /// signal handler, such as KeyboardInterrupt, stops the computation between rows. After that no factor is
             /// available.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -170,9 +170,9 @@ Ltdl {
 factor! {
 /// The factor M = L Lᵀ of any symmetric positive definite matrix.
 ///
-/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`: it has the same
-/// methods, and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm
-/// 4.2.1.
+/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`, which has the
+/// same methods and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition),
+/// algorithm 4.2.1.
 ///
 /// n: the number of rows of M, at most 4096.
 ///
@@ -248,7 +248,7 @@ impl DivideConquer {
     /// Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
     /// + grain) steps.
     ///
-    /// model: the planned model, or another one with the same bodies and joints; q: position, nq numbers; v, tau:
+    /// model: the planned model, or another model with the same bodies and joints; q: position, nq numbers; v, tau:
     /// velocity and efforts, nv numbers each;
     /// f_ext: as for `rnea`.
     #[pyo3(signature = (model, q, v, tau, f_ext=None, out=None))]

@@ -26,8 +26,8 @@
 //! called state by state. The line of such a function begins with `each` instead of `batch`, and gives the shape of the
 //! result.
 //!
-//! Each part of a declaration has its macro: `function!` the signature, `many!` a line `batch`, `each!` a line `each`,
-//! and `one!` the body. The code that does not depend on the declaration is in functions.
+//! Each part of a declaration has its own macro: `function!` for the signature, `many!` for a line `batch`, `each!` for
+//! a line `each`, and `one!` for the body. The code that does not depend on the declaration is in functions.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
@@ -51,8 +51,8 @@ pub(crate) trait Argument<'a, 'py> {
     type Read<S: Number>;
     /// Type of the value that the library takes for many states.
     type All;
-    /// Reads the argument without running Python code, if it has the simplest form for a single state: a double array
-    /// in C order, or a word. Returns `None` if the argument has another form or is invalid.
+    /// Reads the argument without running Python code, if the argument has the simplest form for a single state: a
+    /// double array in C order, or a word. Returns `None` if the argument has another form or is invalid.
     fn at_once(_given: &Self::Given, _model: &Model) -> Option<Self::Read<f64>> {
         None
     }
@@ -60,16 +60,16 @@ pub(crate) trait Argument<'a, 'py> {
     fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
     }
-    /// Reads the argument as numbers of any type: for a single state, or for state `state` if it is given for many
-    /// states.
+    /// Reads the argument as numbers of any type: for a single state, or for state `state` if the argument is given for
+    /// many states.
     fn read_at<S: Number>(
         name: &str,
         given: &Self::Given,
         model: &Model,
         state: Option<usize>,
     ) -> PyResult<Self::Read<S>>;
-    /// Finds the number of states of an argument, and whether it contains hyper-dual numbers, before any argument is
-    /// read.
+    /// Finds the number of states of an argument, and whether the argument contains hyper-dual numbers. The call does
+    /// this before it reads any argument.
     fn look(_name: &str, _given: &Self::Given, _model: &Model) -> PyResult<Look> {
         Ok(Look::default())
     }
@@ -466,8 +466,8 @@ macro_rules! function {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            // Fast path: most calls have one state in arrays of doubles, which are read here. If one argument has
-            // another form, all arguments are inspected first.
+            // Fast path: most calls have one state in arrays of doubles, and these arrays are read by the lines below.
+            // If one argument has another form, all arguments are inspected first.
             $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
             let at_once = true $(&& $arg.is_read())*;
             let (dual, states) = if at_once { (false, None) } else {

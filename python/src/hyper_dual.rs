@@ -114,9 +114,9 @@ impl Scalar for Hyper {
 /// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. The number carries its derivatives in
 /// two directions, and the mixed second derivative.
 ///
-/// Store these numbers in NumPy arrays of objects. Arithmetic and NumPy's elementary functions accept such arrays. All
-/// functions of a model and a state accept them, too, and then return such arrays. Comparisons use `re`.
-/// `condyle.jacobian`, `gradient` and `hessian` create these numbers and read the derivatives.
+/// Store these numbers in NumPy arrays of objects. Arithmetic, NumPy's elementary functions, and all functions of a
+/// model and a state accept such arrays, and then return such arrays. Comparisons use `re`. `condyle.jacobian`,
+/// `gradient` and `hessian` create these numbers and read the derivatives.
 ///
 /// Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 ///
@@ -127,8 +127,8 @@ impl Scalar for Hyper {
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct HyperDual(HyperDual64);
 
-/// The other operand of an operation: a hyper-dual or real number. Arrays are not accepted, since NumPy handles their
-/// operations.
+/// The operand of an operation that is not `self`: a hyper-dual or real number. Arrays are not accepted, since NumPy
+/// handles operations with arrays.
 pub(crate) struct Operand(HyperDual64);
 
 impl<'py> FromPyObject<'_, 'py> for Operand {

@@ -68,7 +68,7 @@ pub(crate) fn to_inertia<'py>(pi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
 /// Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
 /// kg m and kg.
 ///
-/// J is linear in the parameters. It is positive definite if and only if a body of positive density can have this
+/// J is linear in the parameters. J is positive definite if and only if a body of positive density can have this
 /// inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
 /// identification (2018).
 ///
@@ -84,7 +84,7 @@ pub(crate) fn pseudo_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound
 /// Checks that a body of positive density can have this inertia: its pseudo-inertia J must be positive definite. Raises
 /// `NotPhysicalError` otherwise.
 ///
-/// Point masses, rods and plates have no volume. Their J is singular, so they are rejected.
+/// Point masses, rods and plates have no volume. The J of such bodies is singular, so this function rejects them.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))

@@ -6,7 +6,7 @@ use condyle::Vec3;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// The kind of a joint, with its axis and pitch if it has them.
+/// The kind of a joint, with its axis and pitch if the joint has these.
 ///
 /// | | q | v |
 /// | --- | --- | --- |

@@ -37,8 +37,8 @@ functions! {
 /// Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 ///
 /// q: position, nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is
-/// the world. The pose of a frame f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also
-/// `frame_placement`.
+/// the world. The pose of a frame f is the pose of its body times the placement of the frame: `poses[f.body] @
+/// f.placement`. See also `frame_placement`.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data = condyle.Data(quadruped)
@@ -87,8 +87,8 @@ batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
 
 /// Computes the Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 ///
-/// q: position, nq numbers; body: its index or its joint's name, 0 being the world; reference: as for `frame_jacobian`,
-/// for the body's own frame.
+/// q: position, nq numbers; body: the index of the body, or the name of its joint; index 0 is the world; reference: as
+/// for `frame_jacobian`, for the body's own frame.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q = condyle.Data(arm), [0.3] * 7

@@ -19,7 +19,7 @@ impl MadeFor {
         Self { structure: model.structure, geometry: None, name: model.inner.name().to_owned() }
     }
 
-    /// Makes a check that accepts only models with the same bodies and joints and with equal placements of joints and
+    /// Creates a check that accepts only models with the same bodies and joints and with equal placements of joints and
     /// frames.
     pub(crate) fn with_geometry(model: &Model) -> Self {
         Self { geometry: Some(model.inner.geometry_hash()), ..Self::new(model) }

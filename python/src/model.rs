@@ -1,4 +1,5 @@
-//! The class `Model`, a robot in Python: its tree, names and frames. The submodules have its other methods.
+//! The class `Model`, a robot in Python: the tree, the names and the frames. The submodules contain the other methods
+//! of `Model`.
 
 mod files;
 mod numbers;
@@ -153,7 +154,7 @@ impl Model {
         self.inner.nv()
     }
 
-    /// The number of bodies, the world included. It is the number of rows of f_ext and of the result of
+    /// The number of bodies, the world included. This is also the number of rows of f_ext and of the result of
     /// `forward_kinematics`.
     #[getter]
     fn nbodies(&self) -> usize {
@@ -198,33 +199,31 @@ impl Model {
         self.cached.list(py, Attribute::Parents, || Ok(self.of_bodies(|b| b.parent)))
     }
 
-    /// The index in q at which each joint's position begins; for a mimic joint, the index for the joint that it
-    /// follows.
+    /// The index in q at which each joint's position begins. For a mimic joint this is the index of its leader.
     #[getter]
     fn idx_qs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxQs, || Ok(self.of_bodies(|b| b.idx_q)))
     }
 
-    /// The index in v at which each joint's velocity begins; for a mimic joint, the index for the joint that it
-    /// follows.
+    /// The index in v at which each joint's velocity begins. For a mimic joint this is the index of its leader.
     #[getter]
     fn idx_vs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxVs, || Ok(self.of_bodies(|b| b.idx_v)))
     }
 
-    /// The number of coordinates that each joint has in q: 0 if it mimics another joint, and 0 for the world.
+    /// The number of coordinates that each joint has in q: 0 for mimic joints and for the world.
     #[getter]
     fn nqs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Nqs, || Ok(self.of_joints(|b| b.joint.nq())))
     }
 
-    /// The number of coordinates that each joint has in v: 0 if it mimics another joint, and 0 for the world.
+    /// The number of coordinates that each joint has in v: 0 for mimic joints and for the world.
     #[getter]
     fn nvs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Nvs, || Ok(self.of_joints(|b| b.joint.nv())))
     }
 
-    /// The rule by which each mimic joint follows another one, as `Mimic(ratio, offset)`; None for other joints.
+    /// The rule by which each mimic joint follows another joint, as `Mimic(ratio, offset)`; None for other joints.
     #[getter]
     fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Mimics, || {
@@ -234,8 +233,8 @@ impl Model {
         })
     }
 
-    /// The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed one, there are two
-    /// frames: one of the joint and one of its link.
+    /// The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed joint, there are
+    /// two frames: the joint's frame and the frame of its child link.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Frames, || {
@@ -307,12 +306,12 @@ impl Model {
         self.inner.to_string().trim_end().to_owned()
     }
 
-    /// Returns the model itself, since it never changes.
+    /// Returns the model itself, since a model never changes.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
 
-    /// Returns the model itself, since it never changes.
+    /// Returns the model itself, since a model never changes.
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
         let _ = memo;
         slf

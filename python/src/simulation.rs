@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// A motion is q(t) = q₀ ⊕ ξ(t), with a tangent vector ξ(t). The equations of motion are q̇ = v, with the velocity v in
 /// the body's frame, and v̇ = aba(q, v, τ). τ and the external forces are constant during a step.
 ///
-/// model: the robot; it starts at rest at `neutral`, at time 0.
+/// model: the robot, which starts at rest at `neutral`, at time 0.
 /// integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
 ///     momentum is conserved up to rounding.
@@ -254,8 +254,8 @@ impl Simulation {
     /// Makes a number of steps, and calls a control law before each step. If a step fails, ends early and returns the
     /// status of this step. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
     ///
-    /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
-    ///     efforts; then other Python threads can run meanwhile.
+    /// control: a function that takes a `Control` and sets the numbers of `tau` and `f_ext` of this `Control` in place.
+    ///     None means zero efforts. Other Python threads can run during the steps if control is None.
     ///
     /// An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
     /// step is kept.

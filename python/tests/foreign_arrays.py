@@ -59,7 +59,9 @@ USED = {b"dltensor": b"used_dltensor", b"dltensor_versioned": b"used_dltensor_ve
 LENT: dict[int, "Speaker"] = {}
 """The owners of lent arrays, which capsules keep alive."""
 DESCRIPTIONS: list[Any] = []
-"""Objects to which capsules point, and the deleters of these capsules; they are kept until the process ends."""
+"""Objects to which capsules point, and the deleters of these capsules; these objects are kept until the process
+ends.
+"""
 
 
 def build(folder: Path) -> tuple[Path, Path]:

@@ -1,5 +1,5 @@
-"""Tests of optimisations by IPOPT with functions of `condyle.casadi`. The same problems are solved with CasADi
-expressions for comparison.
+"""Tests of optimisations by IPOPT with functions of `condyle.casadi`. For comparison, the same problems are solved with
+CasADi expressions.
 """
 
 import sys

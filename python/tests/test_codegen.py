@@ -1,5 +1,5 @@
-"""Tests of generated code: compiled by the system's C compiler, it must give the results of the library's functions.
-The tests are skipped if the system has no C compiler.
+"""Tests of generated code: the code, compiled by the system's C compiler, must give the results of the library's
+functions. The tests are skipped if the system has no C compiler.
 """
 
 import os

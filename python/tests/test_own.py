@@ -18,7 +18,8 @@ from condyle.optimal import (
     thrusters,
 )
 
-# Exact derivatives agree with given derivatives up to rounding, central differences agree up to 1e-6 of their size.
+# Exact derivatives agree with given derivatives up to rounding. Central differences agree up to a relative error of
+# 1e-6.
 EXACT = 1e-12
 DIFFERENCES = 1e-5
 ARM = condyle.robots.arm7()

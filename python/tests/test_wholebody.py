@@ -208,9 +208,7 @@ def test_settings_are_the_library_s() -> None:
 
 
 def test_limits_of_effort() -> None:
-    """Checks the command if motors are too weak to carry the robot: the command reports this, and is within the torque
-    limits.
-    """
+    """Checks that commands are within the torque limits if motors are too weak to carry the robot."""
     weak = np.full(18, 5.0)
     controller = WholeBodyController(QUADRUPED, points(), TASKS, Settings(effort=weak))
     command = controller.step(STANDING, np.zeros(18), controller.hold(STANDING))

@@ -40,8 +40,8 @@ impl Input<'_, Ix2> {
 pub(crate) enum InPlace<'py, D: Dimension> {
     /// An array of NumPy, kept alive by this reference.
     Array(Bound<'py, PyArray<f64, D>>),
-    /// The address and the number of an argument's doubles. The call must run no Python code until it has used the
-    /// doubles.
+    /// The address and the number of an argument's doubles. The call must use the doubles before it runs any Python
+    /// code.
     AtOnce(*const f64, usize),
 }
 
@@ -117,7 +117,8 @@ fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[
     Ok(Input(as_it_lies_or_converted(argument, value, shape)?.try_readonly()?))
 }
 
-/// Returns the argument itself if it is an array of doubles in C order, else a new array with the same numbers.
+/// Returns the argument itself if the argument is an array of doubles in C order, else a new array with the same
+/// numbers.
 #[inline]
 fn as_it_lies_or_converted<'py, D: Dimension>(
     argument: &str,
@@ -246,7 +247,8 @@ pub(crate) fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<
     Ok(vector(argument, value, length)?.to_vec())
 }
 
-/// Reads lower and upper bounds. If only one is given, the other is infinite; if neither is given, returns `None`.
+/// Reads lower and upper bounds. If only one bound is given, the other bound is infinite. If no bound is given, returns
+/// `None`.
 pub(crate) fn bounds(
     length: usize,
     lower: Option<&Bound<'_, PyAny>>,

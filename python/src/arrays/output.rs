@@ -61,8 +61,8 @@ fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])
 /// `MemoryError`.
 const LARGE: usize = 1 << 24;
 
-/// Returns whether an array of this shape has fewer than `LARGE` elements, so that its allocation is assumed to
-/// succeed.
+/// Returns whether an array of this shape has fewer than `LARGE` elements, so that the allocation of the array is
+/// assumed to succeed.
 fn is_small(shape: &[usize]) -> bool {
     shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE)
 }
@@ -368,7 +368,8 @@ macro_rules! class {
 }
 pub(crate) use class;
 
-/// Creates a named tuple of a class without a call of the class's `__new__`, which is slower because it is Python code.
+/// Creates a named tuple of a class. The class's `__new__` is not called, because it is Python code and therefore
+/// slower.
 pub(crate) fn named<'py>(class: &Bound<'py, PyType>, members: Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>> {
     static NEW: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = class.py();
@@ -387,8 +388,8 @@ macro_rules! give_named {
 }
 pub(crate) use give_named;
 
-/// Implements `Give` for structs of the library: each becomes the named tuple of the same name. The tuple has the
-/// members listed here; some have another name than in Rust.
+/// Implements `Give` for structs of the library: each struct becomes the named tuple of the same name. The arguments of
+/// the macro list the members; some members have another name than in Rust.
 macro_rules! named_tuples {
     (@name $member:ident) => { stringify!($member) };
     (@name $member:ident as $name:ident) => { stringify!($name) };

@@ -1,5 +1,5 @@
-//! A function as CasADi calls it: the sparsity of its results and derivatives, and the values of their entries.
-//! Derivatives with respect to tangent coordinates are converted to CasADi's coordinates.
+//! A function in the form in which CasADi calls it: the sparsity of results and derivatives, and the values of their
+//! entries. Derivatives with respect to tangent coordinates are converted to CasADi's coordinates.
 
 use super::chart::{Chart, Position};
 use super::computation::{Calls, Computation};
@@ -15,7 +15,7 @@ pub(super) const JACOBIAN: usize = 1;
 pub(super) const REVERSE: usize = 2;
 pub(super) const HESSIAN: usize = 3;
 
-/// An argument or a result of a function, as CasADi describes it.
+/// CasADi's description of an argument or a result of a function.
 pub(super) struct Port {
     pub(super) name: CString,
     /// CasADi's description of a sparse matrix: number of rows, number of columns, index of the first entry of each
@@ -112,8 +112,8 @@ pub(super) struct Bound {
     /// Size of each argument for one state; `ny` is the total size of the results for one state.
     sizes: Vec<usize>,
     ny: usize,
-    /// For each result, the index of its first number among the numbers of all results, and the indices of its entries
-    /// relative to this number.
+    /// For each result, the index of the result's first number among the numbers of all results. Further, the indices
+    /// of the result's entries relative to this number.
     results: Vec<(usize, Vec<usize>)>,
     pub(super) descriptions: [Description; 4],
     /// Work spaces that no call uses at present. Each call takes a work space and returns it at the end. So the list
@@ -121,7 +121,7 @@ pub(super) struct Bound {
     free: Mutex<Vec<Work>>,
 }
 
-/// Work space of a call. It has one position, one J and one H for each state that is computed at the same time.
+/// Work space of a call, with one position, one J and one H for each state that is computed at the same time.
 struct Work {
     calls: Box<dyn Calls>,
     positions: Vec<Position>,

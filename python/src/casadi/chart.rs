@@ -51,7 +51,7 @@ pub(super) struct Position {
     pub(super) q: Vec<f64>,
     /// The matrix T of each group. T is set only for groups with a quaternion or a point of a circle.
     T: Vec<Block>,
-    /// For each group, the length by which its quaternion or point of a circle was divided.
+    /// For each group, the length by which the group's quaternion or point of a circle was divided.
     lengths: Vec<f64>,
 }
 

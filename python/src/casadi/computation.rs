@@ -51,7 +51,7 @@ pub(super) trait Calls: Send {
         1
     }
 
-    /// Computes all results. They are written to `y` one after the other, each by columns.
+    /// Computes all results. Writes the results to `y` one after the other, each result column by column.
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]);
 
     /// Computes the first derivatives of all results with respect to all tangent coordinates.

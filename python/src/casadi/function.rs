@@ -116,7 +116,7 @@ impl Kind {
         Ok(Scratch { data, constraints, tensors, J: DMatrix::from_element(6, nv, zero), zeros: vec![zero; nv] })
     }
 
-    /// Computes all results. They are written to `y` one after the other, each by columns.
+    /// Computes all results. Writes the results to `y` one after the other, each result column by column.
     pub(super) fn value(&self, model: &Model, s: &mut Scratch<f64>, x: &[Vec<f64>], y: &mut [f64]) {
         let data = &mut s.data;
         match self {

@@ -22,11 +22,11 @@ use std::time::{Duration, Instant};
 /// Maximum number of functions that exist at the same time.
 pub(super) const SLOTS: usize = 64;
 
-/// Maximum time between the creation of a function in CasADi and its query of the inputs. After this time the function
-/// counts as loaded from a file.
+/// Maximum time between the creation of a function in CasADi and CasADi's query of the function's inputs. After this
+/// time the function counts as loaded from a file.
 const DESCRIPTION_TIME: Duration = Duration::from_millis(50);
 
-/// A slot: the function bound to it, and the number of its users.
+/// A slot: the bound function, and the number of the slot's users.
 struct Slot {
     bound: AtomicPtr<Bound>,
     users: Mutex<Users>,
@@ -35,8 +35,8 @@ struct Slot {
     loaded: [AtomicUsize; 4],
 }
 
-/// Users of a slot: for each of its functions, the number of CasADi's objects that use it, and the number of holds by
-/// Python objects.
+/// Users of a slot: for each of the slot's functions, the number of CasADi's objects that use the function; and the
+/// number of holds by Python objects.
 #[derive(Clone, Copy)]
 struct Users {
     functions: [usize; 4],
@@ -209,7 +209,7 @@ macro_rules! symbols_of {
                 _: *mut f64,
                 _: c_int,
             ) -> c_int {
-                // SAFETY: CasADi passes arrays with the sparsities that it asked for.
+                // SAFETY: CasADi passes arrays with the sparsities that it queried.
                 unsafe { evaluate($slot, $function, arg, res) }
             }
             #[unsafe(export_name = concat!($name, "_incref"))]

@@ -10,7 +10,7 @@ const MOST: usize = 32;
 /// Work space for several states.
 pub(super) struct Lanes {
     batch: Batch,
-    /// Whether the function is forward dynamics; otherwise it is inverse dynamics.
+    /// Whether the function is forward dynamics. Otherwise the function is inverse dynamics.
     forward: bool,
 }
 

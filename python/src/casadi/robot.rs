@@ -14,10 +14,10 @@ pub(super) struct RobotFunction {
     /// Number of rows of the constraints. `results` is the total number of entries of the results.
     rows: usize,
     results: usize,
-    /// For each pair of coordinates, whether they move a common body; nv × nv.
+    /// For each pair of coordinates, whether the two coordinates move a common body; nv × nv.
     relation: Vec<bool>,
-    /// For each of the nv coordinates, whether it moves a whole tree. M and the Coriolis forces do not depend on such a
-    /// coordinate.
+    /// For each of the nv coordinates, whether the coordinate moves a whole tree. M and the Coriolis forces do not
+    /// depend on such a coordinate.
     moves_a_tree: Vec<bool>,
 }
 

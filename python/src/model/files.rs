@@ -151,7 +151,7 @@ impl Model {
     ///
     /// path: a path, as text or `os.PathLike`.
     /// root_joint: as for `from_urdf`.
-    /// mimic: whether an axis with a `<mimic>` follows another axis. Otherwise it moves freely.
+    /// mimic: whether an axis with a `<mimic>` follows another axis. Otherwise the axis moves freely.
     /// strict: whether a warning (`warnings`) is an error.
     /// packages, allow: as for `from_urdf`; `packages` are also searched for `model://` addresses.
     /// model: the name of the one model to read; None reads all models of the file.
@@ -196,7 +196,7 @@ impl Model {
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
+    /// Converts a `mujoco.MjModel`, which is a robot compiled by MuJoCo. The numbers stay the same.
     ///
     /// The names, q and v are the same as with `from_mjcf`. Named `<frame>`s are missing, because MuJoCo does not keep
     /// them. The results of MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`.
@@ -239,8 +239,8 @@ impl Model {
     /// nq numbers each.
     ///
     /// Joints that a state does not mention stay as in `neutral`. For a joint that turns without limits, the state may
-    /// give the angle. If states of several groups have the same name, they form one position. All other contents of
-    /// the file are ignored.
+    /// give the angle. States of several groups with the same name form one position. All other contents of the file
+    /// are ignored.
     ///
     /// path: a path, as text or `os.PathLike`.
     /// strict: whether a joint that the robot does not have is an error. Without `strict` such a joint is ignored,

@@ -119,7 +119,7 @@ impl Model {
         Ok(self.inner.with_inertias(|body, _| inertias[body]).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
+    /// Returns the same robot with one more frame of kind 'user', which is the last of `frames`. All other contents are
     /// unchanged.
     ///
     /// name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the

@@ -39,7 +39,7 @@ impl Model {
     /// Returns the model as JSON, with all digits; `from_json` returns an equal model. An infinite limit is written as
     /// `null`.
     ///
-    /// The text may be edited; its contents are checked when it is read.
+    /// The text may be edited; `from_json` checks its contents.
     ///
     /// >>> arm = condyle.robots.arm7()
     /// >>> condyle.Model.from_json(arm.to_json()).to_json() == arm.to_json()

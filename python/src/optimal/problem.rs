@@ -32,7 +32,8 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// x0: the initial state, nx numbers.
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
 ///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-/// knot_models: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed
+/// knot_models: for each knot, the index of the knot's model; None if knot t has model t. Consecutive knots are
+/// computed
 ///     as a group if they have the same model, or if their models belong to one robot and differ only in their
 ///     costs and limits.
 /// terminal: the model of the terminal knot, without controls.
@@ -242,7 +243,7 @@ impl Problem {
     /// Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs
     /// move with the knot. Call this method between solves.
     ///
-    /// knot: its index, 0 to N; N is the terminal knot.
+    /// knot: the index of the knot, 0 to N; N is the terminal knot.
     /// costs: a list of `Cost`.
     ///
     /// Raises `ProblemError` if a term does not fit the robot, or if the knot's action does not belong to a robot.
@@ -277,7 +278,7 @@ impl Problem {
     /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
     /// between solves. The solver's next iterations do not allocate.
     ///
-    /// knot: its index, 0 to N − 1.
+    /// knot: the index of the knot, 0 to N − 1.
     /// model: the new model, with as many states and controls as the old one. Costs that the model has for single
     ///     knots belong to the knots of this problem with the same index.
     ///
@@ -291,7 +292,7 @@ impl Problem {
     /// Sets the duration of a single knot; the knot's model keeps its duration at all other knots. Call this method
     /// between solves. The solver's next iterations do not allocate.
     ///
-    /// knot: its index, 0 to N − 1.
+    /// knot: the index of the knot, 0 to N − 1.
     /// dt: the duration (s).
     ///
     /// Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
@@ -320,9 +321,10 @@ impl Problem {
         by_knot(py, &problem, &[], |t, out| out.copy_from_slice(&us[problem.control_range(t)]))
     }
 
-    /// Computes the cost of given states and controls, and the results of the dynamics for them, as an `Evaluation`.
+    /// Computes the cost of given states and controls, and the results of the dynamics for these states and controls,
+    /// as an `Evaluation`.
     ///
-    /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+    /// xs: states, (N + 1, nx), which need not satisfy the dynamics.
     /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
     fn evaluate<'py>(
         &self,
@@ -495,7 +497,7 @@ impl Problem {
         self.each_fault(Option::take).map_or(Ok(()), Err)
     }
 
-    /// Returns whether an error of one of the problem's Python functions is stored.
+    /// Returns whether a Python function of the problem has raised an error, which is then stored.
     pub(super) fn has_failed(&self) -> bool {
         self.each_fault(|error| error.is_some().then_some(())).is_some()
     }

@@ -322,8 +322,8 @@ fn residuals_mut(knot: &mut robot::Knot) -> impl Iterator<Item = &mut robot::Res
     costs.map(|robot::Cost { residual, .. }| residual).chain(limits.map(|robot::Limit { residual, .. }| residual))
 }
 
-/// Takes the residuals that are written in Python out of a knot, and returns them with their indices. Then the knot can
-/// be written as JSON.
+/// Takes the residuals that are written in Python out of a knot, and returns these residuals with their indices. Then
+/// the knot can be written as JSON.
 pub(super) fn take_written(knot: &mut robot::Knot) -> Vec<(usize, Residual)> {
     let take = |(place, residual): (usize, &mut robot::Residual)| {
         let robot::Residual::Own(own) = residual else { return None };
@@ -356,7 +356,7 @@ fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<ro
     Ok((&model.frames()[frame_index(model, frame)?]).into())
 }
 
-/// Reads six numbers, linear first; zeros if they are not given.
+/// Reads six numbers, linear first; returns zeros if no numbers are given.
 fn six(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
     target.map_or(Ok([0.0; 6]), |given| array("target", given))
 }

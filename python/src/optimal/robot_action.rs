@@ -26,7 +26,7 @@ pub(super) struct RobotAction<A> {
     action: A,
     pub(super) described: Arc<Described>,
     model: Py<Model>,
-    /// Residuals that are written in Python; they are reported to Python's garbage collector.
+    /// Residuals that are written in Python. These objects are reported to Python's garbage collector.
     kept: Vec<Py<PyAny>>,
 }
 
@@ -158,7 +158,7 @@ impl Described {
     }
 }
 
-/// An action for a problem, with its description if it can be written to a file.
+/// An action for a problem, with its description if the action can be written to a file.
 pub(super) struct Boxed {
     pub action: Box<dyn ActionModel>,
     pub described: Option<Arc<Described>>,

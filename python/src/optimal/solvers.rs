@@ -109,7 +109,7 @@ impl Observer<'_> {
     }
 }
 
-/// Runs a solve, from the warm start (xs, us) if it is given. Other Python threads can run meanwhile.
+/// Runs a solve, from the warm start (xs, us) if a warm start is given. Other Python threads can run meanwhile.
 fn run<'py, S: Send>(
     py: Python<'py>,
     problem: &Py<Problem>,
@@ -171,10 +171,10 @@ macro_rules! solver {
             /// an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
             /// Then `solution` is the best iterate, from which `resume` continues.
             ///
-            /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+            /// xs: states, (N + 1, nx), which need not satisfy the dynamics.
             /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
-            /// callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            ///     solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
+            /// callback: a function that is called with the `Iteration` after each iteration. If the function returns
+            ///     False, the solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
             /// verbose: whether to print a line for each iteration.
             /// progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
             ///
@@ -219,8 +219,8 @@ macro_rules! solver {
                 })
             }
 
-            /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
-            /// None before the first solve.
+            /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
+            /// ("interrupted"); None before the first solve.
             #[getter]
             fn solution<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
                 let problem = lock("problem", &self.problem.get().inner)?;
@@ -268,9 +268,9 @@ macro_rules! solver {
             ///
             /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
             /// limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-            /// model has for all knots. The last control is repeated, and the last state follows from it. At a second
-            /// shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
-            /// controls would diverge.
+            /// model has for all knots. The last control is repeated, and the last state follows from this control. At
+            /// a second shift without a solver step in between, the last state is repeated, too, because a rollout with
+            /// repeated controls would diverge.
             ///
             /// last: the index of the new last knot's model.
             ///
@@ -293,7 +293,7 @@ solver! {
 ///
 /// If controls are bounded, the solver uses the equations of Crocoddyl's box solvers.
 ///
-/// problem: the problem to solve; all memory is allocated for its shape, once.
+/// problem: the problem to solve. All memory is allocated once, for the size of this problem.
 /// settings: any of the following settings, by name. `method`: "fddp" (default), whose trial steps keep a fraction of
 ///     the gaps, or "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of
 ///     the dynamics if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations
@@ -358,7 +358,7 @@ solver! {
 /// The solution's trace and gains are from the last inner solve, its timings from the whole solve. Controls of a warm
 /// start are moved into their bounds.
 ///
-/// problem: the problem to solve; all memory is allocated for its shape, once.
+/// problem: the problem to solve. All memory is allocated once, for the size of this problem.
 /// inner: a dict of settings of `Fddp` for the inner solves. The tolerances of inner solves are chosen automatically;
 ///     `time_budget` applies to the whole solve.
 /// settings: any of the following settings, by name. `tolerance`: the largest accepted distance of a limit from its

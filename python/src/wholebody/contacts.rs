@@ -11,8 +11,8 @@ use rust::{Normal, Shape, SurfaceForces};
 /// A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
 /// ‖f_t‖ ≤ μ f_n.
 ///
-/// `ContactTarget.activation` defines at each tick whether the contact touches, and which fraction of the full load it
-/// carries. The constructor of `WholeBodyController` checks the numbers.
+/// `ContactTarget.activation` defines at each tick whether the contact touches, and which fraction of the full load the
+/// contact carries. The constructor of `WholeBodyController` checks the numbers.
 ///
 /// Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
 /// max_force: bounds on the normal force of the whole contact (N).

@@ -12,8 +12,8 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::PlanData;
 
-/// A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
-/// touch in each interval.
+/// A planned motion with N + 1 knots: states at given times, efforts and gains between these times, and the contacts
+/// that touch in each interval.
 ///
 /// `WholeBodyController.track` converts a plan to references. Between knots, q is interpolated with constant velocity
 /// (as by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at
@@ -26,7 +26,7 @@ use rust::PlanData;
 /// controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
 ///     free-flyer's), (N, nu); None for no controls.
 /// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
-/// fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it ends to touch.
+/// fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it stops touching.
 ///
 /// Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
 /// or pairs (cos, sin) do not have length 1.
@@ -102,8 +102,8 @@ impl Plan {
         (begin, end)
     }
 
-    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after it begins and
-    /// before it ends to touch, else 1. contact: the index of the contact.
+    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after the contact
+    /// begins and before it ends, else 1. contact: the index of the contact.
     fn activation(&self, contact: usize, t: f64) -> PyResult<f64> {
         if contact >= self.contacts {
             return Err(PyIndexError::new_err(format!(

@@ -111,7 +111,7 @@ fn write_numbers(references: &References, numbers: &mut [f64]) {
     }
 }
 
-/// Returns the array of `References`, after a check that they were made for these sizes.
+/// Returns the array of `References`, after a check that the references were made for these sizes.
 fn its_numbers<'py>(given: &Bound<'py, PyAny>, expected: Sizes) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let py = given.py();
     if !given.is_exact_instance(class!(py, "condyle._wholebody", "References")?) {

@@ -15,9 +15,9 @@ use rust::{Axes, TaskKind};
 /// constructor of `WholeBodyController` checks the numbers.
 ///
 /// Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
-/// is `Gains.critical(100.0)`. mask: for each number of the task, whether it is controlled; None controls all numbers.
-/// axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame, of the
-/// world); or ('frame', name), the axes of another frame.
+/// is `Gains.critical(100.0)`. mask: for each number of the task, whether the number is controlled; None controls all
+/// numbers. axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame,
+/// of the world); or ('frame', name), the axes of another frame.
 /// priority: 0 is the first priority; at most 2.
 ///
 /// >>> from condyle.wholebody import Task
@@ -55,7 +55,7 @@ impl Task {
         Ok(Self(task))
     }
 
-    /// Returns the name of the frame that the task moves, or of the frame whose contact force it controls.
+    /// Returns the name of the frame that the task moves, or of the frame whose contact force the task controls.
     fn its_frame(&self) -> Option<&str> {
         match &self.0.kind {
             TaskKind::Pose(f)
@@ -193,7 +193,7 @@ angular_momentum(): 3;
         give_gains(py, self.0.gains)
     }
 
-    /// The mask: for each number of the task, whether it is controlled.
+    /// The mask: for each number of the task, whether the number is controlled.
     #[getter]
     fn mask(&self) -> Vec<bool> {
         self.0.mask[..self.size()].to_vec()

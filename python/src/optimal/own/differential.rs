@@ -1,4 +1,4 @@
-//! Dynamics in continuous time that are written in Python; the library integrates them.
+//! Dynamics in continuous time that are written in Python and integrated by the library.
 
 use super::MOST_SIZE;
 use super::action::named;

@@ -1,5 +1,5 @@
-//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. With them, one
-//! call of a Python function computes its derivatives at all knots of a horizon.
+//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. With such
+//! numbers, one call of a Python function computes the function's derivatives at all knots of a horizon.
 //!
 //! ```text
 //! f(x):      g = f′ gₓ,                 H = f′ Hₓ + f″ gₓ gₓᵀ
@@ -68,7 +68,7 @@ impl SeveralKnots {
     }
 }
 
-/// The second operand of an operation: a real number, or a number with derivatives.
+/// The operand of an operation that is not `self`: a real number, or a number with derivatives.
 enum Other<'py> {
     Real(f64),
     Expansion(Bound<'py, Expansion>),
@@ -187,7 +187,7 @@ impl Expansion {
         Ok(Self { directions: d, numbers })
     }
 
-    /// Returns whether a comparison of two numbers is true. It is an error if the comparison differs between knots.
+    /// Returns whether a comparison of two numbers is true. Returns an error if the comparison differs between knots.
     fn compare(&self, other: &Other<'_>, by: CompareOp) -> PyResult<bool> {
         let stride = self.directions.stride();
         let theirs = |k: usize| match other {

@@ -97,8 +97,8 @@ impl Functions {
     }
 }
 
-/// Returns the result of a Python function, or `None` after an error, which is stored. After the first error of the
-/// problem the function is not called.
+/// Returns the result of a Python function. If the function raises an error, stores the error and returns `None`. After
+/// the first error of the problem, no function is called.
 pub(super) fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
     let kept = || fault.lock().unwrap_or_else(PoisonError::into_inner);
     if kept().is_some() {
