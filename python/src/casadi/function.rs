@@ -51,7 +51,7 @@ pub(super) struct Scratch<S> {
     zeros: Vec<S>,
 }
 
-/// Writes a block of derivatives to J: its rows begin at `row`, and its columns belong to one argument.
+/// Writes a block of derivatives to J. The block begins at row `row`, and its columns belong to one argument.
 fn place<S: Scalar>(J: &mut DMatrix<S>, row: usize, argument: usize, block: &DenseMatrix<S, impl Dense<S>>) {
     J.view_mut((row, argument * block.ncols()), block.shape()).copy_from(block);
 }
