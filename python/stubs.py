@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Writes condyle/_condyle.pyi, which describes the extension module for editors and type checkers.
 
-    python3 python/stubs.py [--check]        with --check nothing is written; it fails if the file is out of date
+    python3 python/stubs.py [--check]        with --check, writes nothing; fails if the file is out of date
 
 Names, signatures and docstrings are read from the installed module; their source is the Rust code. The module does not
-contain types: the tables below define types by the names of arguments and functions. A name without a type and an
-unused entry of a table are errors.
+contain types: the tables below define types by the names of arguments and functions. A name without a type is an error,
+and so is an unused entry of a table.
 
 The file is kept in the repository for two reasons. A wheel is packed before its module can be imported. And type
 checkers read editable installations and source folders, in which the module may not be built.
@@ -23,7 +23,7 @@ from typing import Any
 
 FILE = Path(__file__).parent / "condyle" / "_condyle.pyi"
 WIDTH = 120
-DERIVABLE = 1 << 10  # Py_TPFLAGS_BASETYPE: a class that can be subclassed
+DERIVABLE = 1 << 10  # Python's flag Py_TPFLAGS_BASETYPE of classes that can be subclassed
 
 ALIASES = {
     "_Array": "NDArray[np.float64]",
@@ -168,7 +168,7 @@ ARGUMENTS = {
     "Sequence[int] | None": "knot_models",
     "_Controls": "us",
     "Problem": "problem",
-    # functions that get arrays of floats, or arrays of numbers that carry their derivatives
+    # functions whose arguments are arrays of floats, or arrays of numbers that carry their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
     "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
         Action.calc_diff DifferentialAction.calc_diff Residual.own_cost.calc_diff""",
@@ -202,8 +202,8 @@ ARGUMENTS = {
     "list[ContactConstraint]": "_generate.constraints",
 }
 
-# Types of results and properties, by `Class.name` or the function's name. An entry for a class holds for its methods.
-# Without an entry, a function that takes `out` returns an array, and a static method returns its class.
+# Types of results and properties, by `Class.name` or the function's name. An entry for a class holds for the methods of
+# this class. Without an entry, a function that takes `out` returns an array, and a static method returns its class.
 RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
@@ -323,7 +323,9 @@ RESULTS = {
 
 
 class Table:
-    """A table from names to types. It records names that are missing in the table, and names that were not used."""
+    """A table from names to types. The object records names that are missing in the table, and names that were not
+    used.
+    """
 
     def __init__(self, names_by_type: dict[str, str]) -> None:
         self.types = {name: kind for kind, names in names_by_type.items() for name in names.split()}
@@ -342,8 +344,8 @@ class Table:
 
 
 def wrapped(head: str, parts: list[str], tail: str, indent: str = "") -> str:
-    """Formats a definition or a list as Ruff does: in one line if it fits, else with all parts in a second line, else
-    with each part in its own line.
+    """Formats a definition or a list as Ruff does: in one line if the text fits, else with all parts in a second line,
+    else with each part in its own line.
     """
     inside = ", ".join(parts)
     if len(indent + head + inside + tail) <= WIDTH:
@@ -354,14 +356,14 @@ def wrapped(head: str, parts: list[str], tail: str, indent: str = "") -> str:
 
 
 def docstring(item: Any, indent: str) -> str:
-    """Returns the docstring of an item as a statement."""
+    """Returns the Python code of an item's docstring."""
     text = (inspect.getdoc(item) or "").replace("\\", "\\\\")
     lines = [f"{indent}{line}".rstrip() for line in text.splitlines()]
     return f'{indent}"""' + "\n".join(lines).lstrip() + ('"""' if len(lines) == 1 else f'\n{indent}"""')
 
 
 class Writer:
-    """Writes the items of a module; the named tuples of their types are defined in another module."""
+    """A writer of a module's items. The named tuples that occur in types are defined in another module."""
 
     def __init__(self, module: ModuleType, types: ModuleType) -> None:
         self.module, self.types = module, types
@@ -434,7 +436,7 @@ class Writer:
         for member in sorted(k for k, v in members.items() if inspect.isdatadescriptor(v)):
             head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
             text += head + docstring(members[member], "        ") + "\n\n"
-        for member, value in sorted(members.items()):  # otherwise the linker determines the order
+        for member, value in sorted(members.items()):  # sorted, because otherwise the linker determines the order
             special = member.startswith("__") and name not in known and f"{name}.{member}" not in known
             if callable(value) and not special and member not in ("__new__", "__repr__"):
                 method = self.function(getattr(item, member), member, name, "    ")
@@ -480,8 +482,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
-    # `_spelling` is not in `others`: its other classes (`SE3`, `Model` and others) have the same names as classes of
-    # Condyle.
+    # `_spelling` is not in `others`, because most of its classes (`SE3`, `Model`) have the names of Condyle's classes.
     imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
@@ -508,7 +509,7 @@ from typing_extensions import disjoint_base
 
 
 def main() -> None:
-    """Writes the file, or compares it with the existing one."""
+    """Writes the stub file, or compares the text with the existing file."""
     sys.path.pop(0)  # the folder of the sources, where the module is not built
     from condyle import _condyle, _inertia, _types, _wholebody
 

@@ -15,7 +15,7 @@ in the same order. Functions return new arrays, or fill the arrays given as `out
 NumPy can convert to an array of real numbers; float64 C-contiguous arrays are read without a copy. A wrong shape is a
 `ValueError`.
 
-One call can compute many states: positions, velocities, efforts and forces may have one more axis, the first; the
+One call can compute many states: positions, velocities, efforts and forces may have an additional first axis. The
 results then have this axis, too. Dynamics and their derivatives are computed in SIMD lanes for several states at once.
 The call releases the interpreter's lock and uses the number of threads for which the `Data` was made:
 
@@ -24,9 +24,9 @@ The call releases the interpreter's lock and uses the number of threads for whic
 >>> condyle.crba(arm, data, np.zeros((100, 7))).shape
 (100, 7, 7)
 
-`out` may be an input, or share memory with an input; results that would share memory with each other are an error.
-Batches and solves release the interpreter's lock while they compute. During this time no other thread may write to
-their arrays, since they would read a mix of old and new numbers.
+`out` may be an input, or share memory with an input. Two arrays of `out` may not share memory. Batches and solves
+release the interpreter's lock while they compute. During this time no other thread may write to the arrays of the call,
+since the call would read a mix of old and new numbers.
 
 A forked process may use all objects that it has inherited, and starts its own threads. Signals are checked during a
 call, every 10 ms in batches and every 25 ms in solves and simulations. An exception of a signal handler, such as
@@ -36,7 +36,7 @@ state after its last step, and `out` contains the results that were computed bef
 The environment variable `CONDYLE_LEVEL` chooses the SIMD level: "baseline", "neon", "avx2" or "avx512". If the
 processor does not support this level, or the name is unknown, the import fails. `LEVEL` is the level in use.
 
-Your own function of the state is differentiated exactly, with `HyperDual` numbers in arrays of objects:
+Functions of the state that you write are differentiated exactly, with `HyperDual` numbers in arrays of objects:
 
 >>> def effort(x):
 ...     return (condyle.rnea(arm, data, x[:7], x[7:], np.zeros(7)) ** 2).sum()
@@ -76,8 +76,9 @@ Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
 Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, the SIMD level
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
-    (poses, motions, forces), `conventions` (other libraries' numbers); to be imported separately `casadi`, `pinocchio`
-    (its spelling), `crocoddyl` (its problems), `codegen` (straight-line C), `cuda` (kernels) and `viz` (pictures)
+    (poses, motions, forces), `conventions` (other libraries' numbers). Further modules must be imported by name:
+    `casadi`, `pinocchio` (Pinocchio's names of functions), `crocoddyl` (Crocoddyl's problems), `codegen` (straight-line
+    C), `cuda` (kernels) and `viz` (pictures)
 """
 
 from . import algebra, conventions, inertial_parameters, optimal, robots, simulation, wholebody

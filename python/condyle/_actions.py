@@ -10,7 +10,7 @@ from ._condyle import Action, Model, ProblemError
 
 _Array = NDArray[np.float64]
 _SCHEMES = {
-    # scheme: (times of its stages within a step, weights of the stages); a stage uses the result of the stage before
+    # scheme: (times of the stages within a step, weights); each stage uses the result of the previous stage
     "euler": ([0.0], [1.0]),
     "runge_kutta_2": ([0.0, 0.5], [0.0, 1.0]),
     "runge_kutta_3": ([0.0, 1 / 3, 2 / 3], [0.25, 0.0, 0.75]),

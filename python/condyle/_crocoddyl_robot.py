@@ -57,7 +57,7 @@ class Robot:
         return np.array_equal(self.armature, armature) and (self.theirs is theirs or bool(self.theirs == theirs))
 
     def frame(self, number: int) -> int:
-        """Returns the index in `model` of a frame, given by its index in the Pinocchio model."""
+        """Returns the index in `model` of a frame. `number` is the frame's index in the Pinocchio model."""
         return self._numbers[number]
 
 

@@ -32,7 +32,7 @@ AT_THE_END = {
     "ResidualModelContactCoPPosition",
 }
 """Residuals that are constant in Crocoddyl's terminal models: ResidualModelJointEffort is minus its reference, the
-others are zero.
+other residuals are zero.
 """
 
 
@@ -44,7 +44,7 @@ def kind(theirs: Any) -> str:
 
 
 def bounds(numbers: Any) -> _Array:
-    """Converts bounds; a bound of large magnitude becomes infinite."""
+    """Converts bounds; a bound whose magnitude is at least `NO_BOUND` becomes infinite."""
     x = np.asarray(numbers, float)
     out: _Array = np.where(np.abs(x) < NO_BOUND, x, np.copysign(np.inf, x))
     return out
@@ -67,7 +67,7 @@ class Drives:
 
     @staticmethod
     def _at(theirs: Any, x: _Array, u: _Array) -> tuple[_Array, _Array, _Array]:
-        """Returns τ, ∂τ/∂u and ∂τ/∂x."""
+        """Returns the efforts τ of an actuation model, and the derivatives ∂τ/∂u and ∂τ/∂x."""
         data = theirs.createData()
         theirs.calc(data, x, u)
         theirs.calcDiff(data, x, u)
@@ -75,7 +75,9 @@ class Drives:
         return np.array(data.tau), np.array(data.dtau_du, float).reshape(shape), np.array(data.dtau_dx, float)
 
     def given(self) -> _Array | None:
-        """Returns S as Condyle's actions take it; None if each joint except a free-flyer at the root has a control."""
+        """Returns the argument `actuation` for Condyle's actions: S, or None if each joint except a free-flyer at the
+        root has a control.
+        """
         return None if self.usual else self.matrix
 
 
@@ -101,8 +103,8 @@ class Terms:
         return [self._limit(item) for item in counts if not self._vanishes(item.constraint)]
 
     def _vanishes(self, term: Any) -> bool:
-        """Returns whether a term is zero in a terminal model because its residual is zero there. A constant term that
-        is not zero is an error.
+        """Returns whether a term is zero in a terminal model because the term's residual is zero in terminal models. A
+        constant term that is not zero is an error.
         """
         residual: Any = getattr(term, "residual", None)
         if not self.end or kind(residual) not in AT_THE_END:
@@ -162,8 +164,8 @@ class Terms:
         return not (self.end and name == "ResidualModelImpulseCoM")
 
     def _efforts(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
-        """Converts a residual of joint efforts: to a residual of the controls, or of the efforts of inverse
-        dynamics.
+        """Converts a residual of joint efforts to a residual of the controls, or to a residual of the efforts of
+        inverse dynamics.
         """
         if self.drives is None:
             return Residual.control(theirs.reference), (np.arange(theirs.nr), theirs.nr)

@@ -1,4 +1,4 @@
-"""NVIDIA's driver and NVIDIA's run-time compiler for `condyle.cuda`. Both are loaded when they are first needed."""
+"""NVIDIA's driver and NVIDIA's run-time compiler for `condyle.cuda`. Both libraries are loaded on first use."""
 
 import ctypes
 import os
@@ -67,7 +67,9 @@ _LOG = 16384
 
 
 def _load(what: str, variable: str, files: Sequence[str], functions: dict[str, list[Any]]) -> ctypes.CDLL:
-    """Loads a library and sets the types of its functions; the error lists the files that were tried."""
+    """Loads a library and sets the types of its functions. If no file can be loaded, the error lists the files that
+    were tried.
+    """
     given = os.environ.get(variable)
     reasons = []
     for file in [given] if given else files:
@@ -86,7 +88,7 @@ def _load(what: str, variable: str, files: Sequence[str], functions: dict[str, l
 
 
 class Driver:
-    """The driver's library."""
+    """The library of NVIDIA's driver."""
 
     def __init__(self) -> None:
         files = ["nvcuda.dll"] if sys.platform == "win32" else ["libcuda.so.1", "libcuda.so"]
@@ -94,11 +96,13 @@ class Driver:
         self.call("cuInit", 0)
 
     def status(self, function: str, *arguments: Any) -> int:
-        """Calls a function and returns its status."""
+        """Calls a function of the driver and returns its status."""
         return int(getattr(self._library, function)(*arguments))
 
     def call(self, function: str, *arguments: Any) -> None:
-        """Calls a function; an error message contains the function's name and CUDA's message."""
+        """Calls a function of the driver. If the call fails, raises an error with the function's name and CUDA's
+        message.
+        """
         status = self.status(function, *arguments)
         if status != 0:
             raise RuntimeError(f"{function}: {self.text(status)} (status {status})")
@@ -126,7 +130,7 @@ def driver() -> Driver:
 
 
 def names() -> list[str]:
-    """Returns the devices' names."""
+    """Returns the names of all CUDA devices."""
     count, device, name = c_int(), c_int(), ctypes.create_string_buffer(256)
     driver().call("cuDeviceGetCount", byref(count))
     found = []
@@ -207,7 +211,9 @@ def device(ordinal: int) -> Device:
 
 
 class Memory:
-    """Memory of a device. It is freed with this object, after all streams have finished their work on the memory."""
+    """Memory of a device. The memory is freed with this object, after all streams have finished their work on the
+    memory.
+    """
 
     def __init__(self, device: Device, size: int) -> None:
         self.device = device
@@ -224,7 +230,9 @@ class Memory:
 
 
 class Event:
-    """An event that happens when a stream has done all work that it contained at the creation of the event."""
+    """An event in a CUDA stream. The event happens when the stream has done all work that was in the stream before the
+    event.
+    """
 
     def __init__(self, device: Device, stream: int) -> None:
         self.device = device
@@ -234,7 +242,7 @@ class Event:
             driver.call("cuEventRecord", self._handle, stream)
 
     def has_happened(self) -> bool:
-        """Returns whether the event has happened; if a kernel failed, it counts as happened."""
+        """Returns whether the event has happened; if a kernel failed, the event counts as happened."""
         with self.device.current() as driver:
             return driver.status("cuEventQuery", self._handle) != _NOT_READY
 
@@ -297,7 +305,7 @@ class Function:
     def __del__(self) -> None:
         if getattr(self, "_module", None):
             with self.device.current() as driver:
-                driver.status("cuCtxSynchronize")  # wait, since the kernel may be running
+                driver.status("cuCtxSynchronize")  # wait for the device, since the kernel may be running
                 driver.status("cuModuleUnload", self._module)
 
 
@@ -330,16 +338,16 @@ class Compiler:
         self._known = list(known)
 
     def architecture(self, capability: tuple[int, int]) -> str:
-        """Returns the architecture for which to compile: this capability, or the newest one below it that the compiler
-        knows.
+        """Returns the architecture for which to compile: this capability, or the newest lower capability that the
+        compiler knows.
         """
         wanted = 10 * capability[0] + capability[1]
         best = max((known for known in self._known if known <= wanted), default=wanted)
         return f"sm_{wanted}" if best == wanted else f"compute_{best}"
 
     def compile(self, name: str, text: str, architecture: str) -> bytes:
-        """Compiles a text. For an architecture such as "sm_90" the result is machine code; for an architecture such as
-        "compute_90" it is PTX, which also works on newer devices.
+        """Compiles the text of a kernel. For an architecture such as "sm_90" the result is machine code; for an
+        architecture such as "compute_90" the result is PTX, which also works on newer devices.
         """
         program = c_void_p()
         library = self._library

@@ -46,12 +46,12 @@ class DeviceArray:
 
     @property
     def device(self) -> int:
-        """The index of the device."""
+        """The index of the device that stores the array."""
         return self._memory.device.ordinal
 
     @property
     def ndim(self) -> int:
-        """The number of axes."""
+        """The number of axes of the array."""
         return len(self.shape)
 
     def __len__(self) -> int:
@@ -71,7 +71,7 @@ class DeviceArray:
         """Returns a copy in the host's memory, after pending work."""
         host = np.empty(self.shape, self.dtype)
         order = sorted(range(self.ndim), key=lambda k: (-self.strides[k], k))
-        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # with the axes in the order of the memory
+        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # its axes are in the order of the memory
         if dense.nbytes > 0:
             self._before(LEGACY)
             with self._memory.device.current() as driver:
@@ -97,7 +97,9 @@ class DeviceArray:
         dl_device: tuple[int, int] | None = None,
         copy: bool | None = None,
     ) -> Any:
-        """Returns a capsule for another library. This library passes the stream on which it will use the numbers."""
+        """Returns a capsule for another library. The other library passes the stream on which it will use the
+        numbers.
+        """
         if dl_device is not None and tuple(dl_device) != self.__dlpack_device__():
             raise BufferError(f"dl_device: expected {self.__dlpack_device__()}, found {tuple(dl_device)}")
         if copy:
@@ -114,8 +116,8 @@ class DeviceArray:
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
-        """The description that Numba and other libraries read. It contains a stream; the numbers are valid after the
-        work of this stream.
+        """The description of the array that Numba and other libraries read. The description contains a stream; the
+        array's numbers are valid after the work of this stream.
         """
         size = self.dtype.itemsize
         return {
@@ -139,7 +141,7 @@ def row_order(shape: Sequence[int]) -> tuple[int, ...]:
 
 
 class View(NamedTuple):
-    """The address and the layout of an array's numbers. They are valid as long as `owner` exists."""
+    """The address and the layout of an array's numbers. The address is valid as long as `owner` exists."""
 
     owner: Any
     address: int
@@ -160,7 +162,7 @@ def view(name: str, array: Any, device: Device, stream: int) -> View:
         _on_device(name, device, int(kind), int(ordinal))
         try:
             capsule = array.__dlpack__(stream=stream, max_version=_VERSION)
-        except TypeError:  # this library has no versioned DLPack
+        except TypeError:  # the array's library does not support versioned DLPack
             capsule = array.__dlpack__(stream=stream)
         address, (code, bits, lanes), shape, strides, _, flags = _condyle._borrowed(capsule)
         dtype = f"float{bits}" if (code, lanes) == (_FLOAT, 1) else f"type {code} of {lanes} x {bits} bits"
@@ -187,8 +189,8 @@ def _on_device(name: str, device: Device, kind: int, ordinal: int) -> None:
 
 
 def _interface(name: str, array: Any, device: Device, stream: int) -> View:
-    """Returns a view of an array by its `__cuda_array_interface__`. That interface does not name the device, so it is
-    checked.
+    """Returns a view of an array by its `__cuda_array_interface__`. This interface does not name the device, so the
+    function checks that the address belongs to `device`.
     """
     said = array.__cuda_array_interface__
     address, is_read_only = said["data"]
@@ -206,8 +208,8 @@ def _interface(name: str, array: Any, device: Device, stream: int) -> View:
 
 
 def current_stream(array: Any, device: Device) -> int | None:
-    """Returns the stream that the library of an array currently uses, if the library reports it, as PyTorch and CuPy
-    do.
+    """Returns the stream that the library of an array currently uses, if the library reports this stream, as PyTorch
+    and CuPy do.
     """
     library = type(array).__module__.partition(".")[0]
     module: Any = sys.modules.get(library)

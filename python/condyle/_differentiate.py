@@ -1,4 +1,6 @@
-"""Derivatives of a function of the state, by hyper-dual numbers. `differentiate.rs` does the same in Rust."""
+"""Derivatives of a function of the state, by hyper-dual numbers. The Rust file `differentiate.rs` contains the same
+methods.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +14,7 @@ Function = Callable[[NDArray[Any]], Any]
 
 
 def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
-    """Returns the numbers of a state, and the number of directions in which it can change."""
+    """Returns the numbers of a state, and the number of directions in which the state can change."""
     numbers = np.asarray(x, dtype=np.float64)
     if numbers.ndim != 1 or len(numbers) < model.nq:
         raise ValueError(f"x: expected a vector of at least {model.nq} numbers, found shape {numbers.shape}")
@@ -40,7 +42,7 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
     """Computes the value f(x) and the exact Jacobian ∂f(x ⊕ δ)/∂δ, as `(value, J)`: m numbers, and (m, nv + others).
 
     x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
-    f: a function of an array like x, of `HyperDual`s, that returns a vector. It is called once for every two
+    f: a function that takes an array like x, of `HyperDual`s, and returns a vector. f is called once for every two
         directions.
 
     >>> arm = condyle.robots.arm7()
@@ -64,7 +66,7 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
 def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64]]:
     """Computes the value f(x) and the exact gradient ∂f(x ⊕ δ)/∂δ, as `(value, gradient)`: a number, and nv + others.
 
-    x: as for `jacobian`. f returns a number; it is called once for every two directions.
+    x: as for `jacobian`. f returns a number, and is called once for every two directions.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)
@@ -79,7 +81,7 @@ def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np
 def hessian(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Computes the value f(x), and exact gradient and Hessian ∂²f(x ⊕ δ)/∂δ∂δ, as `(value, gradient, H)`.
 
-    x: as for `jacobian`. f returns a number; it is called once for every pair of directions, n (n + 1)/2 times.
+    x: as for `jacobian`. f returns a number, and is called once for every pair of directions, n (n + 1)/2 times.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q = condyle.Data(arm), [0.3] * 7

@@ -1,5 +1,5 @@
-"""The class `Inertia`: inertias from numbers or for simple shapes, their transformation to other frames, and their
-sums.
+"""The class `Inertia`: inertias from numbers or of simple shapes, transformations of inertias to other frames, and sums
+of inertias.
 """
 
 from typing import NamedTuple
@@ -39,7 +39,7 @@ class Inertia(NamedTuple):
     """
 
     mass: float
-    """The mass (kg)."""
+    """The mass of the body (kg)."""
     com: _Array
     """The centre of mass in the body's frame (m), 3 numbers; zeros if the mass is zero."""
     about_com: _Array
@@ -133,7 +133,7 @@ def _others(squares: _Array) -> _Array:
 
 
 def _lengths(name: str, given: ArrayLike, count: int) -> _Array:
-    """Reads one or several lengths; they must be finite and not negative."""
+    """Reads one or several lengths; each length must be finite and not negative."""
     found = np.array(given, np.float64)
     shape = () if count == 1 else (count,)
     if found.shape != shape:

@@ -7,7 +7,7 @@ from typing import Any
 from ._condyle import Model
 
 PACKAGES = ("example_robot_data", "robot_descriptions")
-"""Packages to search, in this order."""
+"""Names of the packages that are searched for a robot, in this order."""
 
 
 def load(name: str, package: str | None = None, root_joint: str | None = None) -> Model:
@@ -20,8 +20,8 @@ def load(name: str, package: str | None = None, root_joint: str | None = None) -
     itself.
 
     A robot of example_robot_data is the robot that the package's own `load` returns, including its root joint and
-    armature. It is converted from Pinocchio, on which the package depends. robot_descriptions downloads the files of a
-    robot on first use.
+    armature. The robot is converted from a `pinocchio.Model`, because the package depends on Pinocchio.
+    robot_descriptions downloads the files of a robot on first use.
 
     Raises ImportError if neither package is installed, and ValueError if no package has the robot.
     """
@@ -49,7 +49,7 @@ def _example(name: str, root_joint: str | None) -> Model | None:
 
 
 def _described(name: str, root_joint: str | None) -> Model | None:
-    """Returns a robot of robot_descriptions, whose modules know the paths of its files."""
+    """Returns a robot of robot_descriptions. Each module of this package contains the paths of one robot's files."""
     module = _description(name)
     if module is None:
         return None

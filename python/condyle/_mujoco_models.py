@@ -1,7 +1,7 @@
 """Converts compiled MuJoCo models to plain MJCF, which has no elements that need MuJoCo's compiler or other files.
 
-`Model.from_mujoco` reads this text like every MJCF, so the rules for limits, springs, actuators and warnings are the
-same. Numbers are written with all digits.
+`Model.from_mujoco` reads this text like the text of any MJCF, so the rules for limits, springs, actuators and warnings
+are the same. Numbers are written with all digits.
 """
 
 import sys
@@ -44,7 +44,7 @@ def mjcf(model: Any) -> str:
 
 
 class _Text:
-    """Writes the elements of the text, and gives names to unnamed items."""
+    """A writer of the MJCF's text. It gives names to unnamed items."""
 
     def __init__(self, model: Any) -> None:
         self.m = model
@@ -281,7 +281,7 @@ class _Text:
         for k, name in enumerate(names):
             q, v = self.m.key_qpos[k], self.m.key_qvel[k]
             numbers = {"qvel": v, "ctrl": self._controls(self.m.key_ctrl[k]), "act": self.m.key_act[k]}
-            # an unnamed keyframe without changes is only space that the file has reserved
+            # an unnamed keyframe with the default state is left out: it is unused space that the file has reserved
             if name or any(map(np.any, numbers.values())) or not np.array_equal(q, self.m.qpos0):
                 given = {what: x for what, x in numbers.items() if len(x)}
                 yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q} | given)
@@ -316,7 +316,7 @@ names.
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """Returns the name, or a similar name if it is taken, and marks the result as taken."""
+    """Returns the given name, or a similar name if the given name is taken. Marks the result as taken."""
     while name in taken:
         name += "_"
     taken.add(name)

@@ -25,11 +25,11 @@ class ModelPool:
         self._data: dict[int, ours.Data] = {}
 
     def model(self) -> Model:
-        """Returns the model."""
+        """Returns the model of the pool."""
         return self._model
 
     def _of(self, threads: int) -> ours.Data:
-        """Returns scratch memory for this number of threads, and keeps it for the next call."""
+        """Returns scratch memory for this number of threads, and keeps the memory for the next call."""
         if threads not in self._data:
             self._data[threads] = ours.Data(self._model.ours, threads=threads)
         return self._data[threads]
@@ -38,14 +38,16 @@ class ModelPool:
 def rneaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, a: ArrayLike, tau: _Array | None = None
 ) -> _Array | None:
-    """Computes inverse dynamics τ for the state in each column, (nv, N). If `tau` is given, writes the result to it."""
+    """Computes inverse dynamics τ for the state in each column, (nv, N). If `tau` is given, writes the result to
+    `tau`.
+    """
     return _columns(ours.rnea, num_thread, pool, (q, v, a), tau)
 
 
 def abaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, tau: ArrayLike, a: _Array | None = None
 ) -> _Array | None:
-    """Computes forward dynamics q̈ for the state in each column, (nv, N). If `a` is given, writes the result to it."""
+    """Computes forward dynamics q̈ for the state in each column, (nv, N). If `a` is given, writes the result to `a`."""
     return _columns(ours.aba, num_thread, pool, (q, v, tau), a)
 
 

@@ -37,8 +37,8 @@ def buildSampleModelHumanoid() -> Model:
 
 
 def buildSampleModelHumanoidRandom() -> Model:
-    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. Its numbers differ, since NumPy draws
-    them.
+    """Returns a humanoid like Pinocchio's random humanoid, on a free-flyer. The numbers differ from Pinocchio's
+    numbers, since NumPy draws them.
     """
     return Model(samples.random_humanoid())
 
@@ -57,7 +57,7 @@ def appendModel(modelA: Model, modelB: Model, frameInModelA: int, aMb: algebra.S
 def transformJointIntoMimic(
     model: Model, index_mimicked: int, index_mimicking: int, scaling: float, offset: float
 ) -> Model:
-    """Returns the robot in which one more joint follows another joint."""
+    """Returns the robot with one more mimic joint, which follows another joint."""
     return Model(model.ours.with_mimic(index_mimicking, index_mimicked, scaling, offset))
 
 

@@ -13,7 +13,7 @@ from ._inertia import Inertia
 from ._types import ModelWarning
 
 _Part = tuple[Joint, NDArray[np.float64]]
-"""A joint, and its placement."""
+"""A joint of Condyle, and the joint's placement."""
 
 ALIGNED: dict[str, Callable[..., Joint]] = {
     "JointModelR": Joint.revolute,
@@ -108,8 +108,7 @@ def warn_of_additions(model: Model) -> None:
 
 
 TURNS = {"free_flyer": 3, "planar": 2}
-"""For kinds of joints whose rotation does not begin at index 0 of the joint's position, the index at which it begins.
-"""
+"""Index in a joint's position at which the rotation begins, by kind of joint. For other kinds the index is 0."""
 
 
 def _check_order(theirs: Any) -> None:
@@ -130,8 +129,8 @@ def _check_order(theirs: Any) -> None:
 
 
 def _parts(joint: Any, name: str) -> list[_Part]:
-    """Returns the joints that together equal one joint of Pinocchio, each with its placement in the frame of the joint
-    before.
+    """Returns the joints that together equal one joint of Pinocchio, each with its placement in the frame of the
+    previous joint.
     """
     kind, here = joint.shortname(), np.eye(4)
     if kind in FREE:
@@ -160,7 +159,7 @@ def _parts(joint: Any, name: str) -> list[_Part]:
 
 
 def _motion(joint: Any) -> NDArray[np.float64]:
-    """Returns S, the constant motion at unit velocity of a joint with one degree of freedom."""
+    """Returns the constant motion S at unit velocity of a joint with one degree of freedom."""
     data = joint.createData()
     joint.calc(data, np.eye(max(joint.idx_q + 2, 2))[joint.idx_q])
     return np.array(data.S, float).ravel()
@@ -190,7 +189,9 @@ def _limits(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
-    """Returns damping and friction of a joint. In Condyle, each is a single value for the whole joint."""
+    """Returns damping and friction of a joint. In Condyle, damping and friction each have a single value for the whole
+    joint.
+    """
     out = {}
     for what, numbers in ("damping", theirs.damping), ("friction", theirs.upperDryFrictionLimit):
         own = np.array(numbers[joint.idx_v : joint.idx_v + joint.nv])
@@ -201,7 +202,7 @@ def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
 
 
 def _check_lossless(theirs: Any, joint: Any, name: str) -> None:
-    """Checks that a joint has neither damping nor friction, because it is converted to a chain of joints."""
+    """Checks that a joint has neither damping nor friction, because the joint is converted to a chain of joints."""
     if any(_losses(theirs, joint, name).values()):
         raise ModelError(f"joint `{name}`: damping and friction of a {joint.shortname()} have no place here")
 
@@ -260,7 +261,9 @@ def to_pinocchio(ours: Model) -> Any:
 
 
 def _their_joint(pin: Any, joint: Joint | None, kind: str) -> Any:
-    """Returns Pinocchio's joint of this kind. For the axes x, y and z, it has the class for that axis."""
+    """Returns Pinocchio's joint of this kind. If the axis is x, y or z, the joint has Pinocchio's class for this
+    axis.
+    """
     assert joint is not None
     free = {"spherical": "Spherical", "planar": "Planar", "translation": "Translation", "free_flyer": "FreeFlyer"}
     if kind in free:

@@ -11,7 +11,7 @@ from .algebra import SE3, Motion, exp3, exp6
 _LIGHT = Inertia.from_com(0.1, np.zeros(3), 0.01 * np.eye(3))
 _ROD = Inertia.from_com(1.0, [0.0, 0.0, 0.5], np.eye(3))
 _HERE, _UP = np.zeros(3), np.array([0.0, 0.0, 1.0])
-_DOWN = [np.pi, 0.0, 0.0]  # half a turn about x
+_DOWN = [np.pi, 0.0, 0.0]  # rotation vector of half a turn about x
 _X, _Y, _Z = ([float(k == axis) for k in range(3)] for axis in range(3))
 _LIMB = (
     ("shoulder1", _X, _HERE, _LIGHT, ()),
@@ -59,7 +59,7 @@ def _limb(robot: ModelBuilder, prefix: str, on: BodyId, begin: SE3, foot: bool =
         at = SE3(np.eye(3), offset)
         if name == "shoulder1":
             at = begin
-        elif name == "wrist2" and foot:  # a quarter turn about y
+        elif name == "wrist2" and foot:  # turns the foot by a quarter turn about y
             at = exp6(Motion(np.zeros(3), [0.0, np.pi / 2.0, 0.0])) * at
         on = _link(robot, f"{prefix}{name}", on, Joint.revolute(axis), at, inertia)
         for link in links:
@@ -67,14 +67,14 @@ def _limb(robot: ModelBuilder, prefix: str, on: BodyId, begin: SE3, foot: bool =
 
 
 def manipulator() -> Model:
-    """Returns the arm."""
+    """Returns Pinocchio's sample arm."""
     robot = ModelBuilder("")
     _limb(robot, "", WORLD, SE3.identity())
     return robot.build()
 
 
 def humanoid() -> Model:
-    """Returns the humanoid, on a free-flyer."""
+    """Returns Pinocchio's sample humanoid, on a free-flyer."""
     robot = ModelBuilder("")
     base = robot.body("root_body", WORLD, Joint.free_flyer(), None, _LIGHT, joint_name="root_joint")
     robot.frame("root_joint", base, kind="joint")

@@ -60,7 +60,7 @@ class Player:
 
     @property
     def url(self) -> str:
-        """The page's address."""
+        """The address of the page in the browser."""
         return f"http://localhost:{self.server.get_port()}"
 
     def show(self, knot: int) -> None:
@@ -135,7 +135,7 @@ def play(
 ) -> Player:
     """Shows a motion in the browser, at the address of the returned `Player`.
 
-    q: positions, (N, nq), such as `solution.xs[:, :model.nq]`; they are shown without checks.
+    q: positions, (N, nq), such as `solution.xs[:, :model.nq]`; the positions are shown without checks.
     dt: the time from one knot to the next (s).
     forces: contact forces of each knot, by the name of a frame. The first three numbers of a force, along the world's
         axes, are drawn as an arrow at the frame. `solution.forces` has this form if contacts have the names of their
@@ -177,7 +177,9 @@ def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Arr
 
 
 def _some(points: _Array) -> NDArray[np.float32]:
-    """Returns the points of arrows, or an invisible arrow if there are no arrows, since viser needs at least one."""
+    """Returns the points of arrows, or an invisible arrow if there are no arrows, since viser needs at least one
+    arrow.
+    """
     return (points if len(points) else np.zeros((1, 2, 3))).astype(np.float32)
 
 

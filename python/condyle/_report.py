@@ -51,8 +51,8 @@ def _bar(**options: Any) -> Any:
 
 
 def counter(progress: bool | Callable[[int, int], object], total: int, done: int) -> Callable[[int | None], None]:
-    """Returns a function that shows the progress of a sweep, as the argument `progress` requests. Call it with the
-    number of newly finished variations, and with None at the end.
+    """Returns a function that shows the progress of a sweep, as the argument `progress` requests. Call the returned
+    function with the number of newly finished variations, and with None at the end.
     """
     bar = _bar(desc="sweep", unit=" variations", total=total, initial=done) if progress is True else None
 

@@ -59,7 +59,7 @@ def capsule(radius: float, length: float, sides: int = 16, rings: int = 4) -> tu
 
 
 def _turned(profile: _Array, sides: int) -> tuple[_Array, NDArray[np.int64]]:
-    """Returns the triangles of the surface that a profile (r, z) forms when it rotates about z."""
+    """Returns the triangles of the surface that a profile (r, z) forms when the profile rotates about z."""
     turn = 2.0 * np.pi * np.arange(sides) / sides
     r, z = profile[:, :1], profile[:, 1:]
     vertices = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, (len(profile), sides))], -1)
@@ -99,7 +99,7 @@ def visuals(model: Model, urdf: str | os.PathLike[str], packages: Sequence[str |
 
 
 def _triangles(visual: Any, path: Path, packages: list[Path]) -> Shape | None:
-    """Returns the shape of a `<visual>` at the origin of its body; None if its mesh is missing or cannot be read."""
+    """Returns the shape of a `<visual>` at the origin of its body; None if the mesh is missing or cannot be read."""
     geometry = visual.find("geometry")
     shape = geometry[0] if geometry is not None and len(geometry) else None
     if shape is None:
@@ -162,8 +162,8 @@ def _origin(origin: Any) -> _Array:
 
 
 def _color(visual: Any, root: Any) -> tuple[int, int, int] | None:
-    """Returns the colour of a `<visual>`: the colour that it contains, or the colour of the robot's material that it
-    names.
+    """Returns the colour of a `<visual>`: the colour in the element, or the colour of the robot's material that the
+    element names.
     """
     material = visual.find("material")
     if material is None:

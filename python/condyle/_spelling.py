@@ -24,7 +24,7 @@ class ReferenceFrame(Enum):
 
 
 class Motion(algebra.Motion):
-    """A `condyle.algebra.Motion` with Pinocchio's names. It can also be made from six numbers."""
+    """A `condyle.algebra.Motion` with Pinocchio's names. The constructor also accepts six numbers."""
 
     __slots__ = ()
 
@@ -39,7 +39,7 @@ class Motion(algebra.Motion):
 
 
 class Force(algebra.Force):
-    """A `condyle.algebra.Force` with Pinocchio's names. It can also be made from six numbers."""
+    """A `condyle.algebra.Force` with Pinocchio's names. The constructor also accepts six numbers."""
 
     __slots__ = ()
 
@@ -54,7 +54,7 @@ class Force(algebra.Force):
 
 
 class SE3(algebra.SE3):
-    """A `condyle.algebra.SE3` with Pinocchio's names. It can also be made from a matrix (4, 4)."""
+    """A `condyle.algebra.SE3` with Pinocchio's names. The constructor also accepts a matrix (4, 4)."""
 
     __slots__ = ()
 
@@ -64,7 +64,7 @@ class SE3(algebra.SE3):
 
     @classmethod
     def Identity(cls) -> "SE3":
-        """Returns the identity."""
+        """Returns the identity pose."""
         return cls(np.eye(4))
 
     def actInv(self, x: Any) -> Any:
@@ -164,8 +164,8 @@ class Model(ours._SpelledModel):
 
 
 class Data(ours._SpelledData):
-    """Stores the results of functions, such as oMi, oMf, v, a, tau, ddq, M, com and hg. A result exists after a
-    function has computed it.
+    """Scratch memory, which also stores the results of functions, such as oMi, oMf, v, a, tau, ddq, M, com and hg. A
+    result exists after a function has computed it.
     """
 
     vcom: list[_Array]
@@ -242,12 +242,12 @@ def log6(X: algebra.SE3 | ArrayLike) -> Motion:
 
 
 def Jlog3(R: ArrayLike) -> _Array:
-    """Computes the Jacobian ∂ log3(R exp δ)/∂δ at δ = 0."""
+    """Computes the Jacobian ∂ log3(R exp δ)/∂δ at δ = 0, (3, 3)."""
     return algebra.Jlog3(log3(R))
 
 
 utils = SimpleNamespace(zero=np.zeros, eye=np.eye, rand=np.random.random)
-"""Some functions of `pinocchio.utils`."""
+"""The functions `zero`, `eye` and `rand` of `pinocchio.utils`."""
 
 log = log6
 exp3, log3, skew = algebra.exp3, algebra.log3, algebra.skew

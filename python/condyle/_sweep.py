@@ -28,7 +28,7 @@ class Variations(NamedTuple):
     cost: _Array
     """The cost of each trajectory."""
     gap: _Array
-    """The largest gap of each trajectory."""
+    """The largest gap between the states of each trajectory and the dynamics."""
     iterations: NDArray[np.int64]
     """The number of iterations of each solve."""
     seconds: _Array
@@ -36,9 +36,11 @@ class Variations(NamedTuple):
     error: NDArray[np.str_]
     """The error message if a variation could not be made or solved; else empty."""
     xs: _Array | None
-    """States, (V, N + 1, nx)."""
+    """The states of each trajectory, (V, N + 1, nx), for V variations and N knots."""
     us: _Array | None
-    """Controls, (V, N, nu). If knots differ in nu, the controls of all knots follow one another, (V, Σ nu)."""
+    """The controls of each trajectory, (V, N, nu). If knots differ in nu, the controls of all knots follow one another,
+    (V, Σ nu).
+    """
     K: _Array | None
     """Feedback gains, (V, N, nu, ndx), or (V, Σ nu · ndx) if knots differ in nu; None unless `keep` contains "K"."""
     k: _Array | None
@@ -60,7 +62,7 @@ class Variations(NamedTuple):
 
 
 class Job(NamedTuple):
-    """The data that all variations share; they are sent to each worker once."""
+    """The data that all variations share. The data are sent once to each worker."""
 
     problem: Problem
     start: tuple[Any, Any]
@@ -90,10 +92,10 @@ def sweep(
 
     problem: the nominal problem.
     variations: V initial states, (V, nx); or, with `vary`, a sequence of V objects of any type.
-    vary: a function of the problem and a variation. Either it returns the problem to solve, such as a problem with a
-        heavier robot; or it changes the given problem and returns None. In the second case, it must set the same values
-        for each variation, since the next variation gets the same problem. Without `vary`, the variation is the initial
-        state.
+    vary: a function of the problem and a variation. The function may return the problem to solve, such as a problem
+        with a heavier robot. Or the function changes the given problem and returns None. Then the function must set the
+        same values for each variation, since the next variation gets the same problem. Without `vary`, the variation is
+        the initial state.
     start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
         and starts from the solution of this problem. The first state is replaced by the variation's initial state.
     solver: `Fddp` or `AugmentedLagrangian`, which is made for each problem with the `settings`.
@@ -105,7 +107,7 @@ def sweep(
     cluster: None solves in this process; True uses the processors of this machine, or of the cluster to which `ray` is
         connected; else the address of a Ray cluster (`pip install condyle[ray]`). Problem and start are sent once to
         each worker. Workers compute at this process's SIMD level (`condyle.LEVEL`), so results are bit-identical. If a
-        worker is lost, another one repeats its chunk.
+        worker is lost, another worker repeats the chunk.
     workers: the number of workers on the cluster; None is one for each processor.
     progress: whether to show the progress (with tqdm if it is installed); or a function that is called with the number
         of finished variations and the total number.
@@ -169,7 +171,9 @@ def _solved(
 
 
 class Worker:
-    """Solves chunks, with a single solver as long as the problem is the same."""
+    """A worker, which solves chunks of variations. The worker uses a single solver as long as the problem is the
+    same.
+    """
 
     def __init__(self, job: Job) -> None:
         self._job = job

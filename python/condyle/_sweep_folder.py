@@ -68,7 +68,7 @@ class Folder:
         return chunks
 
     def write(self, number: int, rows: _Rows) -> None:
-        """Writes a chunk; its file appears only when it is complete."""
+        """Writes a chunk. The chunk's file appears in the folder only when the file is complete."""
         path = self._path / f"chunk-{number:06d}.npz"
         part = path.with_suffix(".part")
         with open(part, "wb") as file:

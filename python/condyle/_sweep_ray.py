@@ -9,8 +9,8 @@ from ._condyle import LEVEL
 from ._sweep import Job, Worker
 
 _LOSSES = 3
-"""Maximum number of lost workers per chunk. If more are lost, the chunk is taken as the cause, and the sweep ends with
-an error.
+"""Maximum number of lost workers per chunk. If more workers are lost, the chunk is taken as the cause, and the sweep
+ends with an error.
 """
 
 
@@ -37,7 +37,7 @@ def on_cluster(
 def _shared(
     ray: Any, job: Job, missing: list[tuple[int, int, Any]], count: int
 ) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Gives each worker one chunk at a time; if a worker is lost, a new worker gets its chunk."""
+    """Gives each worker one chunk at a time; if a worker is lost, a new worker gets the lost worker's chunk."""
     environment = {"env_vars": {"CONDYLE_LEVEL": LEVEL}}  # so that results are bit-identical to results of this process
     remote = ray.remote(num_cpus=1, max_restarts=0, runtime_env=environment)(Worker)
     shared = ray.put(job)

@@ -11,8 +11,8 @@ if TYPE_CHECKING:
 else:
 
     def disjoint_base(cls: type) -> type:
-        """Marks a class for type checkers as a disjoint base, so that other disjoint bases cannot be combined with
-        it.
+        """Marks a class for type checkers as a disjoint base, so that no class can derive from this class and another
+        disjoint base.
         """
         return cls
 
@@ -21,8 +21,8 @@ _Array: TypeAlias = NDArray[np.float64]
 
 
 class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
-    """Numbers of a model, which are read-only since a model never changes. An attempt to write raises an error that
-    names the method for making a changed model.
+    """An array of a model's numbers. The array is read-only, since a model never changes. An attempt to write raises an
+    error that names the method of `Model` that returns a changed model.
 
     Results of arithmetic and copies are plain NumPy arrays, which can be changed.
     """
@@ -61,7 +61,7 @@ class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
         return getattr(ufunc, method)(*plain, **options)
 
     def copy(self, order: Literal["K", "A", "C", "F"] | None = "C") -> _Array:  # type: ignore[override]
-        """Returns a plain array with these numbers."""
+        """Returns a plain NumPy array with the same numbers."""
         return np.array(self, order=order)
 
     def __reduce__(self) -> Any:
@@ -75,24 +75,24 @@ class RneaDerivatives(NamedTuple):
     """The derivatives of τ = rnea(q, v, a), each (nv, nv)."""
 
     dtau_dq: _Array
-    """∂τ/∂q in the tangent space: the change of τ when q moves to integrate(q, δ), per δ."""
+    """The derivative ∂τ/∂q in the tangent space: the derivative of τ at integrate(q, δ) with respect to δ."""
     dtau_dv: _Array
-    """∂τ/∂v."""
+    """The derivative ∂τ/∂v, (nv, nv)."""
     dtau_da: _Array
-    """∂τ/∂a = M(q), armature included."""
+    """The derivative ∂τ/∂a, which is M(q), armature included."""
 
 
 class AbaDerivatives(NamedTuple):
-    """q̈ = aba(q, v, τ) and its derivatives, each (nv, nv)."""
+    """The acceleration q̈ = aba(q, v, τ), and its derivatives, each (nv, nv)."""
 
     a: _Array
-    """q̈ itself, nv numbers."""
+    """The acceleration q̈, nv numbers."""
     da_dq: _Array
-    """∂q̈/∂q in the tangent space: the change of q̈ when q moves to integrate(q, δ), per δ."""
+    """The derivative ∂q̈/∂q in the tangent space: the derivative of q̈ at integrate(q, δ) with respect to δ."""
     da_dv: _Array
-    """∂q̈/∂v."""
+    """The derivative ∂q̈/∂v, (nv, nv)."""
     da_dtau: _Array
-    """∂q̈/∂τ = M(q)⁻¹."""
+    """The derivative ∂q̈/∂τ, which is M(q)⁻¹."""
 
 
 class RneaHessian(NamedTuple):
@@ -127,11 +127,11 @@ class RneaSecondDerivatives(NamedTuple):
     """
 
     dqdq: _Array
-    """The blocks for q and q."""
+    """The blocks for the pair (q, q): entry [i, j, k] is the derivative of τ_i with respect to q_j and q_k."""
     dvdq: _Array
     """The blocks for v and q: entry [i, j, k] is the derivative of τ_i with respect to v_j and q_k."""
     dvdv: _Array
-    """The blocks for v and v."""
+    """The blocks for the pair (v, v): entry [i, j, k] is the derivative of τ_i with respect to v_j and v_k."""
     dadq: _Array
     """The blocks for a and q: entry [i, j, k] is the derivative of τ_i with respect to a_j and q_k."""
 
@@ -140,65 +140,65 @@ class CentroidalDerivatives(NamedTuple):
     """The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c, along the world's axes."""
 
     dh_dq: _Array
-    """∂hg/∂q, (6, nv), linear rows first."""
+    """The derivative ∂hg/∂q, (6, nv), linear rows first."""
     dh_dv: _Array
-    """∂hg/∂v = Ag, (6, nv)."""
+    """The derivative ∂hg/∂v, which is Ag, (6, nv)."""
     drate_dq: _Array
-    """∂dhg/∂q, (6, nv)."""
+    """The derivative ∂dhg/∂q, (6, nv)."""
     drate_dv: _Array
-    """∂dhg/∂v, (6, nv)."""
+    """The derivative ∂dhg/∂v, (6, nv)."""
     drate_da: _Array
-    """∂dhg/∂a = Ag, (6, nv)."""
+    """The derivative ∂dhg/∂a, which is Ag, (6, nv)."""
     dcom_dq: _Array
-    """∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, (3, nv)."""
+    """The derivative ∂c/∂q, which equals ∂ċ/∂v and ∂c̈/∂a, (3, nv)."""
     dvcom_dq: _Array
-    """∂ċ/∂q, (3, nv)."""
+    """The derivative ∂ċ/∂q of the centre of mass's velocity, (3, nv)."""
     dacom_dq: _Array
-    """∂c̈/∂q, (3, nv)."""
+    """The derivative ∂c̈/∂q of the centre of mass's acceleration, (3, nv)."""
     dacom_dv: _Array
-    """∂c̈/∂v, (3, nv)."""
+    """The derivative ∂c̈/∂v of the centre of mass's acceleration, (3, nv)."""
 
 
 class EnergyDerivatives(NamedTuple):
     """The derivatives of kinetic energy T and potential energy V, nv numbers each."""
 
     dT_dq: _Array  # noqa: N815
-    """∂T/∂q."""
+    """The derivative ∂T/∂q of the kinetic energy."""
     dT_dv: _Array  # noqa: N815
-    """∂T/∂v = M v, the generalised momentum."""
+    """The derivative ∂T/∂v of the kinetic energy, which is the generalised momentum M v."""
     dV_dq: _Array  # noqa: N815
-    """∂V/∂q = g(q)."""
+    """The derivative ∂V/∂q of the potential energy, which is g(q)."""
 
 
 class PassiveDerivatives(NamedTuple):
     """The derivatives of `passive_torque`, each (nv, nv)."""
 
     dtau_dq: _Array
-    """∂τ/∂q in the tangent space: the change of τ when q moves to integrate(q, δ), per δ."""
+    """The derivative ∂τ/∂q in the tangent space: the derivative of τ at integrate(q, δ) with respect to δ."""
     dtau_dv: _Array
-    """∂τ/∂v."""
+    """The derivative ∂τ/∂v, (nv, nv)."""
 
 
 class CoriolisDerivatives(NamedTuple):
     """The derivatives of C(q, v) v, each (nv, nv)."""
 
     dq: _Array
-    """The derivative with respect to q."""
+    """The derivative of C(q, v) v with respect to q."""
     dv: _Array
-    """The derivative with respect to v."""
+    """The derivative of C(q, v) v with respect to v."""
 
 
 class Constrained(NamedTuple):
     """The result of `constrained_dynamics`."""
 
     a: _Array
-    """q̈, nv numbers (rad/s², m/s²)."""
+    """The acceleration q̈, nv numbers (rad/s², m/s²)."""
     lambda_: _Array
-    """λ, the force of each constraint on the body of the constrained frame, along the axes of the constraint's rows (N,
+    """The force λ of each constraint on the body of the constrained frame, along the axes of the constraint's rows (N,
     N m).
     """
     residual: float
-    """The largest magnitude in J q̈ + γ (m/s², rad/s²), which measures how well the constraints are satisfied."""
+    """The largest magnitude in J q̈ + γ (m/s², rad/s²), which is zero if the constraints are satisfied."""
     redundant: float
     """The number of rows of J that depend linearly on earlier rows, up to rounding. These rows have no force."""
 
@@ -206,7 +206,7 @@ class Constrained(NamedTuple):
 class ConstrainedDerivatives(NamedTuple):
     """The result of `constrained_dynamics_derivatives`: the result of `constrained_dynamics` and its derivatives.
 
-    ∂/∂q is taken in the tangent space.
+    Derivatives with respect to q are taken in the tangent space.
     """
 
     a: _Array
@@ -214,26 +214,26 @@ class ConstrainedDerivatives(NamedTuple):
     residual: float
     redundant: float
     da_dq: _Array
-    """∂q̈/∂q, (nv, nv)."""
+    """The derivative ∂q̈/∂q, (nv, nv)."""
     da_dv: _Array
-    """∂q̈/∂v, (nv, nv)."""
+    """The derivative ∂q̈/∂v, (nv, nv)."""
     da_dtau: _Array
-    """∂q̈/∂τ, (nv, nv), symmetric."""
+    """The derivative ∂q̈/∂τ, (nv, nv), symmetric."""
     dlambda_dq: _Array
-    """∂λ/∂q, (rows, nv)."""
+    """The derivative ∂λ/∂q of the constraint forces, (rows, nv)."""
     dlambda_dv: _Array
-    """∂λ/∂v, (rows, nv)."""
+    """The derivative ∂λ/∂v of the constraint forces, (rows, nv)."""
     dlambda_dtau: _Array
-    """∂λ/∂τ, (rows, nv)."""
+    """The derivative ∂λ/∂τ of the constraint forces, (rows, nv)."""
     inertia: _Array
     """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along the rows of the constraints."""
 
 
 class ConstrainedEquations(NamedTuple):
     """The result of `constrained_dynamics_equations`: the result of `constrained_dynamics`, and linear equations for
-    its changes.
+    the changes of this result.
 
-    ∂/∂q is taken in the tangent space.
+    Derivatives with respect to q are taken in the tangent space.
     """
 
     a: _Array
@@ -241,25 +241,25 @@ class ConstrainedEquations(NamedTuple):
     residual: float
     redundant: float
     M: _Array
-    """M, (nv, nv), armature included."""
+    """The inertia matrix M, (nv, nv), armature included."""
     dtau_dq: _Array
-    """∂(M q̈ + h − Jᵀ λ)/∂q, (nv, nv)."""
+    """The derivative ∂(M q̈ + h − Jᵀ λ)/∂q, (nv, nv)."""
     dtau_dv: _Array
-    """∂h/∂v, (nv, nv)."""
+    """The derivative ∂h/∂v of the nonlinear effects, (nv, nv)."""
     dgamma_dq: _Array
-    """∂(J q̈ + γ)/∂q, (rows, nv)."""
+    """The derivative ∂(J q̈ + γ)/∂q of the constraints' acceleration, (rows, nv)."""
     dgamma_dv: _Array
-    """∂γ/∂v, (rows, nv)."""
+    """The derivative ∂γ/∂v of the constraints' velocity-dependent acceleration, (rows, nv)."""
 
 
 class Impulse(NamedTuple):
     """The result of `impulse_dynamics`."""
 
     v: _Array
-    """v⁺, the velocity after the impact, nv numbers (rad/s, m/s)."""
+    """The velocity v⁺ after the impact, nv numbers (rad/s, m/s)."""
     lambda_: _Array
-    """Λ, the impulse of each constraint on the body of the constrained frame, along the axes of the constraint's rows
-    (N s, N m s).
+    """The impulse Λ of each constraint on the body of the constrained frame, along the axes of the constraint's rows (N
+    s, N m s).
     """
     residual: float
     """The largest magnitude in J (v⁺ + ε v) (m/s, rad/s)."""
@@ -270,7 +270,7 @@ class Impulse(NamedTuple):
 class ImpulseDerivatives(NamedTuple):
     """The result of `impulse_dynamics_derivatives`: the result of `impulse_dynamics` and its derivatives.
 
-    ∂/∂q is taken in the tangent space.
+    Derivatives with respect to q are taken in the tangent space.
     """
 
     v: _Array
@@ -278,13 +278,13 @@ class ImpulseDerivatives(NamedTuple):
     residual: float
     redundant: float
     dv_dq: _Array
-    """∂v⁺/∂q, (nv, nv)."""
+    """The derivative ∂v⁺/∂q, (nv, nv)."""
     dv_dv: _Array
-    """∂v⁺/∂v, (nv, nv)."""
+    """The derivative ∂v⁺/∂v, (nv, nv)."""
     dlambda_dq: _Array
-    """∂Λ/∂q, (rows, nv)."""
+    """The derivative ∂Λ/∂q of the impulses, (rows, nv)."""
     dlambda_dv: _Array
-    """∂Λ/∂v, (rows, nv)."""
+    """The derivative ∂Λ/∂v of the impulses, (rows, nv)."""
     inertia: _Array
     """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along the rows of the constraints."""
 
@@ -296,13 +296,13 @@ class ContactConstraint(NamedTuple):
     relative to its target in the other frame. The constraint is a − a* + kd (v − v*) + kp e = 0. Here e is log X
     ('rigid') or the difference of the frames' origins ('point'), in the axes of `reference` at the frame's origin.
     Pinocchio's RigidConstraintModel and Crocoddyl's contacts have the same equation. For 'point', a is the classical
-    acceleration; for 'rigid', the spatial acceleration. A 'line' has only the row of a point along the third of `axes`,
-    like Crocoddyl's ContactModel1D. A 'plane' has the rows along the first and the third, like ContactModel2D. A
-    ContactModel1D with rotation R and reference x has axes=R.T and a placement at R @ (0, 0, x).
+    acceleration; for 'rigid', the spatial acceleration. A 'line' has only the row along the third of `axes`, like
+    Crocoddyl's ContactModel1D. A 'plane' has the rows along the first and the third of these axes, like ContactModel2D.
+    A ContactModel1D with rotation R and reference x has axes=R.T and a placement at R @ (0, 0, x).
     """
 
     frame: str | int
-    """The constrained frame."""
+    """The constrained frame, by name or index."""
     kind: Literal["point", "line", "plane", "rigid"]
     """The constrained motion: of the frame's origin, 3 rows ('point'); of the origin along one axis or two ('line',
     'plane'); or of the whole frame, 6 rows, linear first ('rigid').
@@ -316,13 +316,13 @@ class ContactConstraint(NamedTuple):
     kd: float = 0.0
     """The gain of the velocity error (1/s)."""
     placement: ArrayLike | None = None
-    """The target pose of the frame in the other frame, (4, 4). For 'rigid' the whole pose is used, else only its
-    translation.
+    """The target pose of the frame in the other frame, (4, 4). For 'rigid' the whole pose is used, else only the
+    translation of the pose.
     """
     velocity: ArrayLike | None = None
-    """v*, six numbers in the axes of `reference` (m/s, rad/s)."""
+    """The target velocity v*, six numbers in the axes of `reference` (m/s, rad/s)."""
     acceleration: ArrayLike | None = None
-    """a*, six numbers in the axes of `reference` (m/s², rad/s²)."""
+    """The target acceleration a*, six numbers in the axes of `reference` (m/s², rad/s²)."""
     axes: ArrayLike | None = None
     """The axes of a line or a plane, in the axes of `reference`: a rotation (3, 3) with an axis in each column. None is
     the identity.
@@ -336,11 +336,11 @@ class Coupling(NamedTuple):
     """
 
     follower: str
-    """The joint that follows."""
+    """The name of the joint that follows."""
     leader: str | None
-    """The joint that leads; None keeps the follower at c₀."""
+    """The name of the joint that leads; None keeps the follower at c₀."""
     coefficients: tuple[float, ...]
-    """c₀ to c₄."""
+    """The coefficients c₀ to c₄ of the polynomial."""
 
 
 class CentroidalMap(NamedTuple):
@@ -353,9 +353,9 @@ class CentroidalMap(NamedTuple):
     Ig: _Array
     """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī]."""
     com: _Array
-    """c, the centre of mass in the world's frame (m), 3 numbers."""
+    """The centre of mass c in the world's frame (m), 3 numbers."""
     Jcom: _Array
-    """The Jacobian of c, (3, nv): ċ = Jcom v."""
+    """The Jacobian of the centre of mass c, (3, nv): ċ = Jcom v."""
 
 
 class CentroidalMapRate(NamedTuple):
@@ -370,28 +370,28 @@ class CentroidalMapRate(NamedTuple):
     Ig: _Array
     """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī]."""
     com: _Array
-    """c, the centre of mass in the world's frame (m), 3 numbers."""
+    """The centre of mass c in the world's frame (m), 3 numbers."""
     com_velocity: _Array
-    """ċ, the velocity of the centre of mass (m/s), 3 numbers."""
+    """The velocity ċ of the centre of mass (m/s), 3 numbers."""
     Jcom: _Array
-    """The Jacobian of c, (3, nv): ċ = Jcom v."""
+    """The Jacobian of the centre of mass c, (3, nv): ċ = Jcom v."""
 
 
 class AllTerms(NamedTuple):
     """The terms of the equations of motion M a + h = τ, momentum and energies."""
 
     M: _Array
-    """M(q), (nv, nv), as returned by `crba`."""
+    """The inertia matrix M(q), (nv, nv), as returned by `crba`."""
     h: _Array
-    """h(q, v), nv numbers, as returned by `nonlinear_effects`."""
+    """The nonlinear effects h(q, v), nv numbers, as returned by `nonlinear_effects`."""
     centroidal: CentroidalMapRate
     """Centroidal momentum, its matrix and the rate of this matrix, and the centre of mass, as returned by
     `centroidal_map_rate`.
     """
     kinetic_energy: float
-    """T = ½ vᵀ M v (J)."""
+    """The kinetic energy T = ½ vᵀ M v (J)."""
     potential_energy: float
-    """V = −m gᵀ c (J)."""
+    """The potential energy V = −m gᵀ c (J)."""
 
 
 class Frame(NamedTuple):
@@ -400,7 +400,7 @@ class Frame(NamedTuple):
     name: str
     """The name of the frame: the name of its link or joint, or the user's name."""
     kind: Literal["link", "joint", "user", "constraint"]
-    """The source of the frame."""
+    """The source of the frame: a link, a joint, the user, or a constraint."""
     body: int
     """The body to which the frame is fixed; 0 is the world."""
     placement: _Array
@@ -408,9 +408,7 @@ class Frame(NamedTuple):
 
 
 class AssemblySize(NamedTuple):
-    """The numbers of bodies, pieces, operations and levels in the assembly of a `DivideConquer`, which determine its
-    cost.
-    """
+    """The numbers of bodies, runs, operations and steps of a `DivideConquer`, which determine its cost."""
 
     bodies: int
     """The number of moving bodies; each body is eliminated once."""
@@ -419,9 +417,9 @@ class AssemblySize(NamedTuple):
     longest_run: int
     """The number of bodies in the largest run."""
     joins: int
-    """The number of joins of two pieces of the tree that are in series, one below the other."""
+    """The number of joins of two pieces of the tree, where one piece is below the other."""
     gathers: int
-    """The number of additions of the contributions of two pieces of the tree on the same body."""
+    """The number of additions of contributions, where two pieces of the tree are on the same body."""
     depth: int
     """The number of steps that must be computed one after the other: the longest chain of pieces from a run to the
     whole robot.
@@ -438,7 +436,7 @@ class Limits(NamedTuple):
     velocity: _Array
     """Maximum speed (rad/s, m/s), nv numbers."""
     effort: _Array
-    """Maximum magnitude of effort (N m, N), nv numbers."""
+    """Maximum magnitude of the effort (N m, N), nv numbers."""
     effort_lower: _Array
     """Minimum effort (N m, N), nv numbers, usually negative."""
     effort_upper: _Array
@@ -449,9 +447,9 @@ class Spring(NamedTuple):
     """A spring of a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest."""
 
     joint: str
-    """The joint's name."""
+    """The name of the joint to which the spring belongs."""
     stiffness: _Array
-    """k₀ (N m/rad or N/m), k₁ (the unit of k₀, per rad or m) and k₂ (the unit of k₀, per rad² or m²)."""
+    """The coefficients k₀ (N m/rad or N/m), k₁ (unit of k₀, per rad or m) and k₂ (unit of k₀, per rad² or m²)."""
     rest: _Array
     """The joint's position at which the spring is at rest, with as many numbers as the joint has in q."""
 
@@ -460,11 +458,11 @@ class GravityCompensation(NamedTuple):
     """A supported fraction of a body's weight: the force −mass g acts at the point mass_com / mass."""
 
     body: str
-    """The body's name."""
+    """The name of the supported body."""
     mass: float
     """The mass whose weight is supported (kg)."""
     mass_com: _Array
-    """The supported mass times the position of its centre in the body's frame (kg m), 3 numbers."""
+    """The supported mass times the position of the mass's centre in the body's frame (kg m), 3 numbers."""
     ratio: float
     """The supported fraction of the body's weight, except for parts of the body with another ratio. If the inertia of
     the body changes, `mass` changes by this ratio times the change of the body's mass.
@@ -480,23 +478,23 @@ class Actuator(NamedTuple):
     """
 
     name: str
-    """The name, or an empty string."""
+    """The name of the actuator, or an empty string."""
     joint: str | None
     """The name of the driven joint; None if the actuator does not drive a joint."""
     tendon: str | None
     """The name of the driven tendon; None if the actuator does not drive a tendon."""
     frame: str | None
-    """The name of the frame on which the actuator acts; None if it does not act on a frame."""
+    """The name of the frame on which the actuator acts; None if the actuator does not act on a frame."""
     coefficients: dict[str, float]
     """The joints of the tendon by name, each with its coefficient (1, m/rad)."""
     gear: _Array
     """The effort at the joint per unit of force (1, m), 6 numbers. Joints with one degree of freedom and tendons use
     the first number. A ball joint uses three numbers: an axis in the frame of its body. A frame uses six numbers,
-    linear first, in the frame's axes. A free joint also uses six: a force in the world's axes and a torque in the
-    body's axes.
+    linear first, in the frame's axes. A free joint also uses six numbers: a force in the world's axes and a torque in
+    the body's axes.
     """
     gain: float
-    """The force per unit of control."""
+    """The force of the actuator per unit of control."""
     bias: float
     """The force at zero control, zero length and rest (N, N m)."""
     kp: float
@@ -510,18 +508,18 @@ class Actuator(NamedTuple):
 
 
 class ModelWarning(str):
-    """A warning about a robot or its file. It is a string, the text of the warning, with the attributes below."""
+    """A warning about a robot or its file: a string with the text of the warning, and the attributes below."""
 
     kind: str
     """The kind of the warning: 'massless', 'negative', 'triangle', 'singular', 'unlikely', 'limit', 'unknown',
     'left_out', 'assumed' or 'mimic'. A strict reader accepts the kinds in its argument `allow`.
     """
     subject: str
-    """The name of the body or joint, or the element of the file."""
+    """The subject of the warning: the name of a body or joint, or the element of the file."""
     file: str | None
     """The path of the file; None if the warning is not about a file."""
     line: int | None
-    """The line in the file, counted from 1; None if the warning is not about a file."""
+    """The number of the line in the file, counted from 1; None if the warning is not about a file."""
 
     def __new__(cls, text: str, kind: str, subject: str, file: str | None = None, line: int | None = None) -> "Self":
         """Creates a warning from its text and its attributes."""
@@ -530,36 +528,36 @@ class ModelWarning(str):
         return warning
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Returns the parts of a pickle."""
+        """Returns the class and the arguments from which `pickle` makes an equal warning."""
         return type(self), (str(self), self.kind, self.subject, self.file, self.line)
 
 
 class Mimic(NamedTuple):
-    """The rule by which a joint follows another joint: its position is ratio * q + offset, where q is the position of
-    the other joint.
+    """The rule by which a joint follows another joint. The position of the follower is ratio * q + offset, where q is
+    the position of the other joint.
     """
 
     ratio: float
-    """The ratio (1; m/rad, rad/m)."""
+    """The ratio of the follower's motion to the leader's motion (1, m/rad or rad/m)."""
     offset: float
-    """The offset (rad, m)."""
+    """The offset of the follower's position (rad, m)."""
 
 
 class Iteration(NamedTuple):
     """A record of one iteration of a solver."""
 
     iteration: int
-    """Index of the iteration, from 0."""
+    """Index of the iteration, which begins at 0."""
     cost: float
     """Cost of the iterate after the step."""
     gap: float
     """Largest gap of the iterate before the step."""
     stop: float
-    """The expected decrease of the cost for the full step. The solver compares it with the tolerance."""
+    """The expected decrease of the cost for the full step. The solver compares this decrease with the tolerance."""
     step: float
-    """The last step length tried, which is the accepted one if a step was accepted."""
+    """The last step length tried, which is the accepted step length if a step was accepted."""
     regularisation: float
-    """Regularisation after the iteration."""
+    """Regularisation of the sweep after the iteration."""
     d1: float
     """Slope of the expected decrease: for a step length α, the cost should decrease by α (d1 + ½ α d2)."""
     d2: float
@@ -574,18 +572,18 @@ class Timings(NamedTuple):
     """The durations of the phases of a solve (s)."""
 
     calc: float
-    """Dynamics and cost of the warm start."""
+    """Time for dynamics and cost of the warm start."""
     calc_diff: float
-    """Derivatives."""
+    """Time for the derivatives of dynamics and costs."""
     sweep: float
-    """Backward sweeps, including repeated sweeps."""
+    """Time for backward sweeps, including repeated sweeps."""
     rollout: float
-    """Trial rollouts of the line searches, accepted or not."""
+    """Time for the trial rollouts of the line searches, accepted or not."""
     total: float
-    """The whole solve."""
+    """Time for the whole solve."""
     overrun: float = 0.0
-    """The time in excess of `time_budget`. It is above zero if the budget is shorter than an iteration, or if the solve
-    was delayed. With a budget of 0 no iteration is made, and this time is 0.
+    """The time in excess of `time_budget`. The overrun is above zero if the budget is shorter than an iteration, or if
+    the solve was delayed. With a budget of 0 no iteration is made, and the overrun is 0.
     """
 
 
@@ -595,7 +593,7 @@ class Evaluation(NamedTuple):
     cost: float
     """The sum of the costs of all knots."""
     costs: _Array
-    """The cost of each knot, N + 1 numbers, the terminal one last."""
+    """The cost of each knot, N + 1 numbers, the terminal knot last."""
     next_states: _Array
     """The next states φ(x, u), (N, nx)."""
     gaps: _Array
@@ -614,13 +612,13 @@ class Evaluation(NamedTuple):
 
 class _Solution(NamedTuple):
     xs: _Array
-    """States, (N + 1, nx)."""
+    """The states of the trajectory, (N + 1, nx)."""
     us: _Array | list[_Array]
-    """Controls, (N, nu)."""
+    """The controls of the trajectory, (N, nu)."""
     K: _Array | list[_Array]
     """Feedback gains of the last sweep, (N, nu, ndx): u + K (x ⊖ x̄) is the control near the trajectory."""
     k: _Array | list[_Array]
-    """Feed-forward of the last sweep, (N, nu)."""
+    """The feed-forward terms of the last sweep, (N, nu)."""
     cost: float
     """Cost of the trajectory."""
     gap: float
@@ -644,7 +642,7 @@ class _Solution(NamedTuple):
     solution exists. `outcome.worst` contains the limit.
     """
     trace: list[Iteration]
-    """One record per iteration."""
+    """The records of the iterations, one for each iteration."""
     timings: Timings
     """The durations of the phases of the solve."""
 
@@ -683,7 +681,9 @@ class Solution(_Solution):
         return self._evaluated().forces
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Returns the parts of a pickle: the numbers of the solution, but not the problem."""
+        """Returns the function and the arguments from which `pickle` makes a solution with the same numbers, but
+        without the problem.
+        """
         return type(self), tuple(self)
 
 
@@ -691,15 +691,15 @@ class ConstraintRows(NamedTuple):
     """Constraints of an `LqKnot`: lower ≤ C δx + D δu + c ≤ upper, row by row."""
 
     C: ArrayLike
-    """∂g/∂x, (rows, ndx)."""
+    """The derivative ∂g/∂x of the constraints g, (rows, ndx)."""
     D: ArrayLike
-    """∂g/∂u, (rows, nu)."""
+    """The derivative ∂g/∂u of the constraints g, (rows, nu)."""
     c: ArrayLike
-    """Values at δx = 0, δu = 0, one for each row."""
+    """The values of the constraints at δx = 0, δu = 0, one for each row."""
     lower: ArrayLike
-    """Lower bounds, one for each row; −∞ for none."""
+    """The lower bounds, one for each row; −∞ for no bound."""
     upper: ArrayLike
-    """Upper bounds, one for each row; ∞ for none."""
+    """The upper bounds, one for each row; ∞ for no bound."""
 
 
 class LqKnot(NamedTuple):
@@ -708,23 +708,23 @@ class LqKnot(NamedTuple):
     """
 
     A: ArrayLike
-    """∂x⁺/∂x, (ndx, ndx)."""
+    """The derivative ∂x⁺/∂x of the next state, (ndx, ndx)."""
     B: ArrayLike
-    """∂x⁺/∂u, (ndx, nu)."""
+    """The derivative ∂x⁺/∂u of the next state, (ndx, nu)."""
     f: ArrayLike
     """The gap φ(x, u) ⊖ x⁺, ndx numbers."""
     Q: ArrayLike
-    """∂²ℓ/∂x², (ndx, ndx)."""
+    """The second derivative ∂²ℓ/∂x² of the cost, (ndx, ndx)."""
     S: ArrayLike
-    """∂²ℓ/∂x∂u, (ndx, nu)."""
+    """The second derivative ∂²ℓ/∂x∂u of the cost, (ndx, nu)."""
     R: ArrayLike
-    """∂²ℓ/∂u², (nu, nu)."""
+    """The second derivative ∂²ℓ/∂u² of the cost, (nu, nu)."""
     q: ArrayLike
-    """∂ℓ/∂x, ndx numbers."""
+    """The derivative ∂ℓ/∂x of the cost, ndx numbers."""
     r: ArrayLike
-    """∂ℓ/∂u, nu numbers."""
+    """The derivative ∂ℓ/∂u of the cost, nu numbers."""
     rows: ConstraintRows | None = None
-    """General constraints; None without constraints."""
+    """The constraints of the knot; None without constraints."""
 
 
 class SweepResult(NamedTuple):
@@ -746,7 +746,7 @@ class Violation(NamedTuple):
     kind: Literal["constraint", "gap"]
     """'constraint' for a limit or constraint of a knot, 'gap' for a gap of the dynamics."""
     knot: int
-    """The knot, 0 … N."""
+    """The index of the knot, 0 … N."""
     row: int
     """The index of the row in `multipliers[knot]`; for a gap, the index in the tangent vector."""
     name: str | None
@@ -754,7 +754,7 @@ class Violation(NamedTuple):
     entry: int
     """The index of the row in the limit `name`; without a name, the same number as `row`."""
     amount: float
-    """The distance from the bound, or the magnitude of the gap; infinite if it is NaN."""
+    """The distance from the bound, or the magnitude of the gap; infinite if this number is NaN."""
 
 
 class Outcome(NamedTuple):
@@ -788,16 +788,16 @@ class Control(NamedTuple):
     time: float
     """The time at which the step begins (s)."""
     q: _Array
-    """The position, nq numbers."""
+    """The position of the robot at the beginning of the step, nq numbers."""
     v: _Array
-    """The velocity, nv numbers."""
+    """The velocity of the robot at the beginning of the step, nv numbers."""
     tau: _Array
-    """The joint efforts during the step, nv numbers (N m, N). They are 0 when the control law is called; it sets them
-    in place.
+    """The joint efforts during the step, nv numbers (N m, N). The efforts are 0 when the control law is called; the
+    control law sets them in place.
     """
     f_ext: _Array
     """The force on each body during the step, (nbodies, 6), at the body's origin and in the body's frame. The forces
-    are 0 when the control law is called; it sets them in place.
+    are 0 when the control law is called; the control law sets them in place.
     """
 
 
@@ -808,8 +808,8 @@ class Ground(NamedTuple):
     Contacts are rigid, with Coulomb friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
     Anitescu and Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ. Each point satisfies 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0
     and the exact disc ‖λ_t‖ ≤ μ λ_n. Here u⁺ = J v⁺ is the point's velocity after the step, and φ its distance from the
-    plane. Forces of redundant contacts are not unique, but the sum of these forces is unique. Errors are O(h). Only the
-    points touch the plane: edges of soles, other bodies and joint limits are ignored. With a restitution above 0
+    plane. The forces of redundant contacts are not unique, but the sum of these forces is unique. Errors are O(h). Only
+    the points touch the plane: edges of soles, other bodies and joint limits are ignored. With a restitution above 0
     (Newton's law) and friction, an impact of several points may increase the energy. A point below the plane is moved
     out by a fifth of its depth per step, at most 0.5 m/s.
     """
@@ -819,11 +819,11 @@ class Ground(NamedTuple):
     with the corners of a sole in this frame, (n, 3) (m).
     """
     normal: ArrayLike = (0.0, 0.0, 1.0)
-    """The direction out of the ground, in the world's frame; it need not be a unit vector."""
+    """The direction out of the ground, in the world's frame, as a vector of any nonzero length."""
     height: float = 0.0
     """The height of the plane along the normal (m)."""
     friction: float = 0.7
-    """The friction coefficient μ."""
+    """The friction coefficient μ between the ground and the points."""
     restitution: float = 0.0
     """The fraction of the normal speed that a point keeps after an impact, from 0 to 1."""
     tolerance: float = 1e-8
@@ -844,8 +844,8 @@ class GroundContacts(NamedTuple):
 
 
 _NUMBERS = 12
-"""Maximum length of a vector or list that is printed in full when a result is printed; of a longer one, only the shape
-is printed.
+"""Maximum length of a vector or list that is printed in full when a result is printed. For a longer vector or list,
+only the shape is printed.
 """
 
 
@@ -864,7 +864,7 @@ def _repr(self: Any) -> str:
     return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in self._asdict().items())})"
 
 
-# users and pickle find these classes in the following modules
+# public modules of these classes, for users and for pickle
 _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",

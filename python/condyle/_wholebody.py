@@ -11,16 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 from ._condyle import ControllerError, _check_pose, _check_rotations
 
 _Array: TypeAlias = NDArray[np.float64]
-_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # joint, and range in q of its rotation
+_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # for each rotation: joint, and range in q
 
 
 class Gains(NamedTuple):
     """The gains of a task: the desired acceleration is a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v)."""
 
     stiffness: float
-    """k (1/s²)."""
+    """The stiffness k (1/s²)."""
     damping: float
-    """d (1/s)."""
+    """The damping d (1/s)."""
 
     @classmethod
     def critical(cls, stiffness: float) -> "Gains":
@@ -33,13 +33,13 @@ class Gains(NamedTuple):
 
 
 class Pyramid(NamedTuple):
-    """A pyramid that approximates the friction cone; it allows a comparison with other controllers."""
+    """A pyramid that approximates the friction cone, for comparisons with other controllers."""
 
     sides: int = 4
     """The number of faces of the pyramid, at least 3."""
     inscribed: bool = True
-    """Whether the pyramid lies inside the cone and its edges touch the cone; otherwise it lies outside and its faces
-    touch the cone.
+    """Whether the pyramid lies inside the cone, so that the pyramid's edges touch the cone. Otherwise the pyramid lies
+    outside, and its faces touch the cone.
     """
 
 
@@ -56,9 +56,9 @@ class JointLimits(NamedTuple):
     """
 
     look_ahead: float = 0.05
-    """The look-ahead time T (s); it should be at least some ticks."""
+    """The look-ahead time T (s), which should be at least some ticks."""
     max_acceleration: float = 200.0
-    """a_max (rad/s², m/s²)."""
+    """The maximum acceleration a_max (rad/s², m/s²)."""
     lower: ArrayLike | None = None
     """Minimum position (rad, m), nq numbers; None for the model's limits."""
     upper: ArrayLike | None = None
@@ -75,10 +75,10 @@ class Settings(NamedTuple):
     """
 
     acceleration_weight: float = 1e-6
-    """The weight of ½ ‖q̈‖², above 0. It makes the accelerations unique that the tasks leave free."""
+    """The weight of ½ ‖q̈‖², above 0. This term determines the accelerations that the tasks leave free."""
     force_weight: float = 1e-7
-    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), above 0. It makes the distribution of forces unique. The moment of a
-    sole's wrench counts as equivalent forces at the corners, so that the pressure stays away from the edges.
+    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), above 0. This term makes the distribution of forces unique. The moment of
+    a sole's wrench counts as equivalent forces at the corners, so that the pressure stays away from the edges.
     """
     contact_gains: Gains = Gains(0.0, 0.0)
     """Gains of the Baumgarte stabilisation: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0."""
@@ -134,7 +134,7 @@ class KktResiduals(NamedTuple):
 
 
 class Command(NamedTuple):
-    """The command for the robot at this tick. It is finite and within the torque limits for every status.
+    """The command for the robot at this tick. The command is finite and within the torque limits for every status.
 
     In a safe command, all members from `a` to `violation` are from the last solution.
     """
@@ -144,8 +144,8 @@ class Command(NamedTuple):
     ]
     """The reason why the step ended."""
     reason: str
-    """The reason why the step ended, as a sentence. It contains the index of a number that is not finite, or the joint
-    or the frame whose rotation is invalid.
+    """The reason why the step ended, as a sentence. The sentence contains the index of a number that is not finite, or
+    the joint or the frame whose rotation is invalid.
     """
     source: Literal["solution", "last_solution", "gravity_compensation"]
     """The method by which the command was computed. 'solution' also includes an iterate of an unfinished solve that
@@ -153,15 +153,15 @@ class Command(NamedTuple):
     solution for some ticks, then gravity compensation with damping.
     """
     tau: _Array
-    """τ, the efforts of the motors (N m, N), nv numbers, 0 at a free-flyer."""
+    """The efforts τ of the motors (N m, N), nv numbers, 0 at a free-flyer."""
     a: _Array
-    """q̈, the acceleration that follows from the command if the contacts hold (rad/s², m/s²), nv numbers."""
+    """The acceleration q̈ that follows from the command if the contacts hold (rad/s², m/s²), nv numbers."""
     forces: _Array
     """The force of the environment on the robot at each contact, (contacts, 6), linear first, about the origin of the
     contact's frame in the world's axes (N, N m).
     """
     com_acceleration: _Array
-    """c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²), 3 numbers."""
+    """The acceleration c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²), 3 numbers."""
     violation: float
     """The largest violation of a constraint (N, N m, m/s²)."""
     iterations: int
@@ -174,7 +174,7 @@ class Command(NamedTuple):
     def solved(self) -> "Command":
         """Returns the command itself if its status is 'solved'.
 
-        Raises `ControllerError` with the reason otherwise.
+        Raises `ControllerError` with the reason if the command has another status.
         """
         if self.status != "solved":
             raise ControllerError(self.reason)
@@ -182,8 +182,8 @@ class Command(NamedTuple):
 
 
 class Numbers:
-    """A member of a `Target`: a view of a range of the target's numbers. It can be set from any array with the shape of
-    the view.
+    """A member of a `Target`: a view of a range of the target's numbers. The member can be set from any array with the
+    shape of the view.
     """
 
     def __init__(self, first: int, *shape: int) -> None:
@@ -211,7 +211,7 @@ class Numbers:
 
 
 class Pose(Numbers):
-    """A pose of a `Target`: a homogeneous (4, 4) matrix, whose rotation is checked when it is set."""
+    """A pose of a `Target`: a homogeneous (4, 4) matrix. The rotation is checked when the pose is set."""
 
     def __init__(self, first: int) -> None:
         super().__init__(first, 4, 4)
@@ -221,7 +221,7 @@ class Pose(Numbers):
 
 
 class Position(Numbers):
-    """A position of a `PostureTarget`, whose quaternions and pairs (cos, sin) are checked when it is set."""
+    """A position of a `PostureTarget`. Quaternions and pairs (cos, sin) are checked when the position is set."""
 
     def check(self, target: "Target", given: _Array) -> None:
         if isinstance(target, PostureTarget):
@@ -256,11 +256,11 @@ class ComTarget(Target):
     __slots__ = ()
     SIZE = 9
     position = Numbers(0, 3)
-    """c_ref (m), 3 numbers."""
+    """The reference position c_ref (m), 3 numbers."""
     velocity = Numbers(3, 3)
-    """ċ_ref (m/s), 3 numbers."""
+    """The reference velocity ċ_ref (m/s), 3 numbers."""
     acceleration = Numbers(6, 3)
-    """c̈_ref (m/s²), 3 numbers."""
+    """The reference acceleration c̈_ref (m/s²), 3 numbers."""
 
 
 class MomentumTarget(Target):
@@ -269,7 +269,7 @@ class MomentumTarget(Target):
     __slots__ = ()
     SIZE = 6
     momentum = Numbers(0, 3)
-    """k_ref (kg m²/s), 3 numbers."""
+    """The reference angular momentum k_ref (kg m²/s), 3 numbers."""
     rate = Numbers(3, 3)
     """The rate of k_ref (N m), 3 numbers."""
 
@@ -283,22 +283,22 @@ class FrameTarget(Target):
     __slots__ = ()
     SIZE = 28
     pose = Pose(0)
-    """oXf, a homogeneous (4, 4) matrix."""
+    """The reference pose oXf of the frame, a homogeneous (4, 4) matrix."""
     velocity = Numbers(16, 6)
-    """(ṗ, ω) (m/s, rad/s), 6 numbers."""
+    """The reference velocity (ṗ, ω) of the frame (m/s, rad/s), 6 numbers."""
     acceleration = Numbers(22, 6)
-    """(p̈, ω̇) (m/s², rad/s²), 6 numbers."""
+    """The reference acceleration (p̈, ω̇) of the frame (m/s², rad/s²), 6 numbers."""
 
 
 class ContactTarget(Target):
-    """The target of a contact: whether the contact touches, the pose at which it is held, and the reference of its
-    force, in the world's frame.
+    """The target of a contact: whether the contact touches, the pose at which the frame is held, and the reference of
+    the contact's force, in the world's frame.
     """
 
     __slots__ = ()
     SIZE = 23
     pose = Pose(1)
-    """The pose at which the frame is held, a homogeneous (4, 4) matrix. It has an effect only if the stiffness of
+    """The pose at which the frame is held, a homogeneous (4, 4) matrix. The pose has an effect only if the stiffness of
     `Settings.contact_gains` is above 0. For a point contact, only the translation is used.
     """
     force = Numbers(17, 6)
@@ -336,17 +336,17 @@ class PostureTarget(Target):
         return type(self), (self._name, self._numbers.copy(), *sizes, self._rotations)
 
     q = Position(0)
-    """q_ref, nq numbers."""
+    """The reference position q_ref, nq numbers."""
     v = Numbers(0)
-    """v_ref, nv numbers."""
+    """The reference velocity v_ref, nv numbers."""
     a = Numbers(0)
-    """a_ref, nv numbers."""
+    """The reference acceleration a_ref, nv numbers."""
 
 
 class References:
-    """The targets of all tasks during one tick. `WholeBodyController.hold` creates the first one.
+    """The targets of all tasks during one tick. `WholeBodyController.hold` creates `References` for a position.
 
-    The members are views of one array. They can be set, or changed in place. A copy has its own numbers. Values are
+    The members are views of one array. Members can be set, or changed in place. A copy has its own numbers. Values are
     checked when they are set: rotations must be valid, and quaternions and pairs (cos, sin) must have length 1. Each
     step of the controller checks all values.
 
@@ -363,11 +363,11 @@ class References:
 
     __slots__ = ("_numbers", "_rotations", "_sizes", "com", "contacts", "frames", "momentum", "posture")
     com: ComTarget
-    """The centre of mass."""
+    """The target of the centre of mass."""
     momentum: MomentumTarget
-    """The angular momentum."""
+    """The target of the angular momentum."""
     posture: PostureTarget
-    """The joints."""
+    """The target of the joints."""
     frames: tuple[FrameTarget, ...]
     """A target for each task that moves a frame, in the order of the tasks."""
     contacts: tuple[ContactTarget, ...]
@@ -414,6 +414,6 @@ class References:
         return f"<condyle.wholebody.References of {len(self.frames)} frames and {len(self.contacts)} contacts>"
 
 
-# users and pickle find these classes in the public module
+# public module of these classes, for users and for pickle
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and _item.__module__ == __name__]:
     _class.__module__ = "condyle.wholebody"

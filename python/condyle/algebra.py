@@ -1,9 +1,9 @@
 """Poses, motions, forces, inertias, and the exponentials of SO(3) and SE(3), with NumPy, also for batches.
 
-The layout is the same as in Pinocchio: linear parts first. An `SE3` is the pose aXb of frame b in frame a: it converts
-coordinates in b to coordinates in a. Motions and forces are different types. So a change of frame uses the right rule
-for each, and a motion cannot be added to a force. All types and functions of this module take arrays with any number of
-additional axes in front, for batches.
+The layout is the same as in Pinocchio: linear parts first. An `SE3` is the pose aXb of frame b in frame a. An `SE3`
+converts coordinates in b to coordinates in a. Motions and forces are different types. So a change of frame uses the
+right rule for each type, and a motion cannot be added to a force. All types and functions of this module take arrays
+with any number of additional axes in front, for batches.
 
 >>> import numpy as np
 >>> from condyle.algebra import SE3, Force, Motion, exp6, log6
@@ -49,7 +49,7 @@ _CLOSE = 1e-12  # tolerance of `==` for rounding errors, relative to 1 and to th
 
 
 def skew(x: ArrayLike) -> _Array:
-    """Returns the matrix x̂ with x̂ y = x × y, (…, 3, 3)."""
+    """Returns the skew-symmetric matrix x̂ with x̂ y = x × y, (…, 3, 3)."""
     x = _shaped(x, "x", 3)
     out = np.zeros((*x.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
@@ -58,7 +58,7 @@ def skew(x: ArrayLike) -> _Array:
 
 
 class _Spatial:
-    """Six numbers, linear and angular."""
+    """A spatial vector of six numbers: a linear part and an angular part."""
 
     __slots__ = ("vector",)
     __hash__ = None  # type: ignore[assignment]
@@ -84,17 +84,17 @@ class _Spatial:
 
     @classmethod
     def zero(cls) -> Any:
-        """Returns six zeros."""
+        """Returns the motion or force that is zero."""
         return cls(np.zeros(3), np.zeros(3))
 
     @property
     def linear(self) -> _Array:
-        """The linear part, (…, 3)."""
+        """The linear part of the vector, (…, 3)."""
         return self.vector[..., :3]
 
     @property
     def angular(self) -> _Array:
-        """The angular part, (…, 3)."""
+        """The angular part of the vector, (…, 3)."""
         return self.vector[..., 3:]
 
     def __add__(self, other: Any) -> Any:
@@ -119,7 +119,7 @@ class _Spatial:
 
 
 class Motion(_Spatial):
-    """A velocity or an acceleration: (v, ω), with v at the frame's origin."""
+    """A velocity or an acceleration (v, ω). The linear part v belongs to the frame's origin."""
 
     __slots__ = ()
 
@@ -156,23 +156,23 @@ class Motion(_Spatial):
 
     @property
     def action(self) -> _Array:
-        """The matrix v ×, (…, 6, 6)."""
+        """The matrix v × that acts on motions, (…, 6, 6)."""
         omega = skew(self.angular)
         return _blocks(omega, skew(self.linear), np.zeros_like(omega), omega)
 
     @property
     def dual_action(self) -> _Array:
-        """The matrix v ×* = −(v ×)ᵀ, (…, 6, 6)."""
+        """The matrix v ×* = −(v ×)ᵀ that acts on forces, (…, 6, 6)."""
         return -self.action.swapaxes(-1, -2)
 
 
 class Force(_Spatial):
-    """A force, a momentum, an impulse: (f, n), n about the frame's origin."""
+    """A force, a momentum or an impulse: (f, n), where n is the moment about the frame's origin."""
 
     __slots__ = ()
 
     def dot(self, motion: Motion) -> _Array:
-        """Returns the power, of shape (…)."""
+        """Returns the power of this force along a motion, of shape (…)."""
         if not isinstance(motion, Motion):
             raise TypeError("the product of a force is with a motion")
         return motion.dot(self)
@@ -185,7 +185,7 @@ class SE3:
     __hash__ = None  # type: ignore[assignment]
 
     def __init__(self, rotation: ArrayLike, translation: ArrayLike) -> None:
-        """rotation: R, (…, 3, 3); translation: p (m), (…, 3)."""
+        """Creates a pose. rotation: R, (…, 3, 3); translation: p (m), (…, 3)."""
         R, p = np.array(rotation, float), _shaped(translation, "translation", 3)
         if R.shape[-2:] != (3, 3):
             raise ValueError(f"rotation: expected shape (…, 3, 3), found {R.shape}")
@@ -201,13 +201,13 @@ class SE3:
 
     @classmethod
     def identity(cls) -> "SE3":
-        """Returns the identity."""
+        """Returns the identity pose."""
         return cls(np.eye(3), np.zeros(3))
 
     @classmethod
     def from_homogeneous(cls, X: ArrayLike) -> "SE3":
-        """Creates a pose from a matrix [R, p; 0, 1], (…, 4, 4), as `forward_kinematics` and `frame_placement` return
-        it.
+        """Creates a pose from a matrix [R, p; 0, 1], (…, 4, 4). `forward_kinematics` and `frame_placement` return such
+        matrices.
         """
         X = np.asarray(X, float)
         if X.shape[-2:] != (4, 4):
@@ -286,7 +286,9 @@ class SE3:
 
 
 def exp3(w: ArrayLike) -> _Array:
-    """Returns R = exp ŵ = 1 + sinc θ ŵ + ½ sinc² θ/2 ŵ², (…, 3, 3), for rotation vectors (…, 3)."""
+    """Returns the rotation matrices R = exp ŵ = 1 + sinc θ ŵ + ½ sinc² θ/2 ŵ², (…, 3, 3), for rotation vectors (…,
+    3).
+    """
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
     R: _Array = np.eye(3) + np.sinc(theta / np.pi) * W + 0.5 * np.sinc(theta / (2.0 * np.pi)) ** 2 * (W @ W)
@@ -294,8 +296,8 @@ def exp3(w: ArrayLike) -> _Array:
 
 
 def log3(R: ArrayLike) -> _Array:
-    """Returns the rotation vector w, |w| ≤ π, with exp ŵ = R. It is computed from the quaternion of R, which is
-    accurate near 0 and π.
+    """Returns the rotation vector w, |w| ≤ π, with exp ŵ = R. The vector is computed from the quaternion of R, because
+    this method is accurate near 0 and π.
     """
     q = quaternion(R)
     xyz, w = q[..., :3], q[..., 3:]
@@ -346,7 +348,8 @@ def Jlog3(w: ArrayLike) -> _Array:
 def Jexp6(m: ArrayLike | Motion) -> _Array:
     """Returns the right Jacobian of `exp6`, Σ (−m×)ᵏ / (k + 1)!, (…, 6, 6): [J, C; 0, J] with J of `Jexp3`.
 
-    C couples the linear part to the angular part; it is computed by the closed formula of Barfoot and Furgale (2014).
+    The block C couples the linear part to the angular part. It is computed by the closed formula of Barfoot and Furgale
+    (2014).
     """
     x = m.vector if isinstance(m, Motion) else _shaped(m, "m", 6)
     A = -Motion.from_vector(x).action
@@ -380,7 +383,8 @@ def quaternion(R: ArrayLike) -> _Array:
     a, b, c = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    # each tuple has four times the products of one component with (x, y, z, w): the quaternion times a factor
+    # each tuple contains 4 times the products of one component with (x, y, z, w), so the tuple is a multiple of the
+    # quaternion
     by_x, by_y = (1 + a - b - c, xy, xz, x), (xy, 1 - a + b - c, yz, y)
     by_z, by_w = (xz, yz, 1 - a - b + c, z), (x, y, z, 1 + a + b + c)
     products = np.stack([np.stack(row, -1) for row in (by_x, by_y, by_z, by_w)], -2)

@@ -14,7 +14,7 @@ for the other functions. Functions may be called from several threads at a time 
 
 With `states=N` a function takes N states, one in each column, like `f.map(N)`. But values, Jacobian and Hessian of all
 states are computed in one call, and `rnea` and `aba` compute several states in SIMD lanes. Use `states` for direct
-collocation, where the number of points is known: it takes two to four times less time.
+collocation, where the number of points is known: the calls then take two to four times less time.
 
 >>> many = condyle.casadi.rnea(arm, states=50)
 >>> many.size_in("q"), many.size_out("tau")
@@ -22,13 +22,13 @@ collocation, where the number of points is known: it takes two to four times les
 
 A position q has nq numbers. The quaternions in q, and the pairs (cos, sin) of continuous joints, are first divided by
 their lengths. So exact derivatives with respect to all nq numbers exist; a length of 0 gives NaN. An optimisation must
-keep these lengths at 1 by a constraint, or integrate in the tangent space.
+keep these lengths at 1 by a constraint, or must integrate in the tangent space.
 
 A function exists only in the process that made it. If a function is saved or pickled, alone or inside another function,
 and then loaded, calls of the loaded function raise an error and print a line to the standard error. Create the function
-again instead. If the original function is in the same process, its calls then raise the same error, because CasADi
-gives both functions one name and they cannot be distinguished. At most 64 functions exist at a time; any number of
-expressions may use each function. The same function of the same robot counts once.
+again instead. If the original function is in the same process, calls of the original then raise the same error. The
+reason is that CasADi gives both functions one name, so they cannot be distinguished. At most 64 functions exist at a
+time; any number of expressions may use each function. Functions of the same name and the same robot count once.
 
 CasADi is an optional dependency: `pip install condyle[casadi]`.
 """
@@ -80,7 +80,9 @@ def _function(model: Model, function: str, states: int, **options: Any) -> "_cas
 
 
 def _external(name: str) -> "_casadi.Function":
-    """Returns the CasADi function of a slot that is held."""
+    """Returns the CasADi function of a slot, and releases the hold of the slot. The argument is the name of the
+    slot.
+    """
     try:
         return _casadi.external(name, _condyle.__file__)
     finally:
@@ -174,23 +176,24 @@ def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
     """Returns the function of the next state and the cost at a knot of an optimal control problem: (x, u) -> (next,
     cost).
 
-    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. If it contains Python functions, `ProblemError` is
-        raised: write them as CasADi expressions instead.
+    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. Raises `ProblemError` if the action or problem
+        contains Python functions: write these functions as CasADi expressions instead.
     t: the index of the knot, from 0 to N for a problem; for an action, t selects the `costs_at`. With None, t is an
         argument of the function, (x, u, t) -> (next, cost), so that one function serves all knots of an action:
         `f.map(N)(xs, us, range(N))`.
 
-    For a knot without controls, such as an impact, the function is x -> (next, cost); for the terminal knot it is x ->
-    cost. Bounds on controls, limits and the constraints of a `ConstrainedAction` are not included: give them to the
-    optimiser. Quaternions and pairs (cos, sin) in x are divided by their lengths, as in the other functions; in `next`
-    they have length 1. So multiple shooting, x⁺ = next(x, u), keeps the lengths at 1.
+    For a knot without controls, such as an impact, the function is x -> (next, cost); for the terminal knot the
+    function is x -> cost. Bounds on controls, limits and the constraints of a `ConstrainedAction` are not included:
+    pass them to the optimiser. Quaternions and pairs (cos, sin) in x are divided by their lengths, as in the other
+    functions; quaternions and pairs in `next` have length 1. So multiple shooting, x⁺ = next(x, u), keeps the lengths
+    at 1.
 
     First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. For a robot, the Hessian of the
     cost is the Gauss–Newton approximation w (∂r)ᵀ a″ ∂r, with residual r and activation a; for an `Lqr` and a
-    `Unicycle` it is exact. The Hessian of the next state is exact for `Lqr` and `Unicycle`, and for `FreeDynamics` and
-    `FreeInverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are treated as linear in
-    the tangent space of the state. An approximate Hessian does not change the optimum, but an optimiser may need more
-    iterations.
+    `Unicycle` this Hessian is exact. The Hessian of the next state is exact for `Lqr` and `Unicycle`, and for
+    `FreeDynamics` and `FreeInverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta steps are
+    treated as linear in the tangent space of the state. An approximate Hessian does not change the optimum, but an
+    optimiser may need more iterations.
 
     >>> import condyle, condyle.casadi
     >>> from condyle.optimal import Cost, FreeDynamics, Residual
@@ -262,7 +265,9 @@ def action(
 
 
 class _Mapped:
-    """A CasADi function of arrays with one row for each knot. It returns an array (rows, m, n) for each result."""
+    """A CasADi function whose arguments are arrays with one row for each knot. The function returns an array (rows, m,
+    n) for each result.
+    """
 
     def __init__(self, kind: Any, arguments: list[Any], results: list[Any]) -> None:
         results = [_casadi.densify(kind(result)) for result in results]
@@ -273,13 +278,13 @@ class _Mapped:
 
     def __call__(self, *arguments: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         rows = len(arguments[0])
-        # n before m, because CasADi stores matrices by columns
+        # the shape has n before m, because CasADi stores matrices by columns
         results = [np.empty((rows, n, m)) for m, n in self._shapes]
         with self._lock:
             if rows not in self._buffers:
                 self._buffers[rows] = self._function.map(rows).buffer()
             buffer, call = self._buffers[rows]
-            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # kept alive until the call has ended
+            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # arrays in use until the call ends
             for k, argument in enumerate(inputs):
                 buffer.set_arg(k, argument.data)
             for k, result in enumerate(results):

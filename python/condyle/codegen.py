@@ -8,9 +8,9 @@ arrays.
 >>> bool(np.abs(a - condyle.aba(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7)).max() < 1e-9)
 True
 
-The library's algorithms run once on numbers that record how they were computed. Constants of the robot are folded,
-zeros are dropped, and each value is computed once. The generated code has no loops and no branches. It computes a
-single robot; a changed copy of the model needs new code.
+The library's algorithms run once on symbolic numbers, which record the operations that compute them. Constants of the
+robot are folded, zeros are dropped, and each value is computed once. The generated code has no loops and no branches.
+The code is valid for a single robot; a changed copy of the model needs new code.
 
 `functions` lists the available names. Arguments and results are the same as for the functions of `condyle` with these
 names. There are two additional functions. 'frames' takes q and v and returns for each frame the rotation, the
@@ -79,7 +79,7 @@ def source(
         external_forces: whether dynamics takes external forces; inputs: which of 'inertia', 'armature' and 'gravity'
         are arguments instead of constants. partitions: the number of threads per state in CUDA, as for
         `condyle.cuda.compile`. Names of C and CUDA functions begin with the name of their files: the robot's name, then
-        '_float' and '_x4' or '_x8' if the language has these.
+        '_float', '_x4' or '_x8' if the name of the language contains 'float', '4' or '8'.
 
     >>> arm = condyle.robots.arm7()
     >>> list(condyle.codegen.source(arm, "rnea")), list(condyle.codegen.source(arm, "rnea", "rust"))
@@ -102,9 +102,9 @@ def source(
 
 
 class Compiled:
-    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of its arguments and results.
+    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of the arguments and results.
 
-    It may be called from several threads at a time.
+    The function may be called from several threads at a time.
     """
 
     def __init__(self, name: str, function: Any, inputs: list[Any], outputs: list[Any], library: Path) -> None:
@@ -114,7 +114,7 @@ class Compiled:
             name: (rows,) if columns == 1 else (rows, columns) for name, rows, columns in outputs
         }
         self.library: Path = library
-        """The shared library."""
+        """The path of the compiled shared library."""
         self._function = function
         fields = [f"{output}_" if output == "lambda" else output for output in self.outputs]
         self._result: Any = namedtuple(name, fields) if len(outputs) > 1 else None
@@ -123,7 +123,7 @@ class Compiled:
         return f"{self.name}({', '.join(self.inputs)}) -> {', '.join(self.outputs)}"
 
     def __call__(self, *arguments: ArrayLike) -> Any:
-        """Computes the results for one state, or for many states if the arguments have one more axis in front.
+        """Computes the results for one state, or for many states if the arguments have an additional first axis.
 
         Returns an array, or a named tuple if there are several results.
         """
@@ -162,8 +162,8 @@ def compile(  # noqa: A001
     compiler: str | None = None,
     cache: "str | os.PathLike[str] | None" = None,
 ) -> Compiled:
-    """Compiles a function of a robot with the system's C compiler, or reads it from the cache if it was compiled
-    before.
+    """Compiles a function of a robot with the system's C compiler, or loads the compiled function from the cache if it
+    was compiled before.
 
     name: one of `functions`; frames, constraints, external_forces, inputs: as for `source`. compiler: a command that
         understands the options of GCC and Clang; by default the environment variable CC, else `cc`. cache: a folder; by
@@ -259,4 +259,4 @@ def _build(
         told = Path(folder) / "about.json"
         told.write_text(json.dumps({"inputs": inputs, "outputs": outputs}), encoding="utf-8")
         os.replace(told, about)
-        os.replace(made, library)  # the library is moved last: if it exists, the other file exists, too
+        os.replace(made, library)  # the library is moved last: if the library exists, the other file exists, too

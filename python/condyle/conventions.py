@@ -11,7 +11,7 @@ array([4., 5., 6., 1., 2., 3.])
 >>> conventions.wxyz([0.0, 0.0, 0.6, 0.8])  # as MuJoCo and Drake have it
 array([0.8, 0. , 0. , 0.6])
 
-`Coordinates` converts a whole state to another library's coordinates:
+`Coordinates` converts states of a robot to another library's coordinates:
 
 >>> quadruped = condyle.robots.quadruped()
 >>> mujoco = conventions.Coordinates(quadruped, "mujoco")
@@ -50,8 +50,8 @@ _Array = NDArray[np.float64]
 
 
 def swap_halves(x: ArrayLike, axis: int = -1) -> _Array:
-    """Exchanges the linear and angular halves of spatial vectors along an axis of length 6. The function is its own
-    inverse.
+    """Exchanges the linear and angular halves of spatial vectors along an axis of length 6. A second call restores the
+    vectors.
 
     A Jacobian of shape (6, nv) is swapped along axis -2. Raises a ValueError if the axis has another length.
     """
@@ -152,20 +152,22 @@ def spatial_acceleration(a: ArrayLike, v: ArrayLike) -> _Array:
 
 
 class FreeJoint(NamedTuple):
-    """A library's conventions for the coordinates of a freely moving body."""
+    """A library's conventions for the coordinates of a free joint."""
 
     position_first: bool
-    """Whether q is [position, quaternion]; else it is [quaternion, position]."""
+    """Whether q is [position, quaternion]. Otherwise q is [quaternion, position]."""
     w_last: bool
-    """Whether quaternions are x, y, z, w; else they are w, x, y, z."""
+    """Whether quaternions are x, y, z, w. Otherwise quaternions are w, x, y, z."""
     linear_first: bool
-    """Whether v is [linear, angular]; else it is [angular, linear]."""
+    """Whether v is [linear, angular]. Otherwise v is [angular, linear]."""
     linear: Literal["body", "world"]
-    """The axes of the linear velocity."""
+    """The axes along which the linear velocity of a free joint is given."""
     angular: Literal["body", "world"]
-    """The axes of the angular velocity."""
+    """The axes along which the angular velocity of a free joint is given."""
     angle: bool
-    """Whether the position of a revolute joint without limits is its angle; else it is cosine and sine."""
+    """Whether the position of a revolute joint without limits is the angle. Otherwise the position is cosine and
+    sine.
+    """
 
 
 LIBRARIES = {
@@ -183,11 +185,12 @@ class Coordinates:
     library: a name in `LIBRARIES`, or a `FreeJoint` that describes a library. Joints keep Condyle's order; if the other
         library numbers joints differently, permute them by name. Spherical joints have their quaternion in the
         library's order, and their angular velocity along the axes of the child body, as in MuJoCo and
-        RigidBodyDynamics.jl. Some libraries represent joints in another form: Drake planar and spherical joints, all
-        except Pinocchio planar joints. For such a joint, a ValueError with its name is raised.
+        RigidBodyDynamics.jl. Some libraries represent some joints in another form: this holds for planar and spherical
+        joints of Drake, and for planar joints of all libraries except Pinocchio. For such a joint, a ValueError with
+        the joint's name is raised.
 
     Efforts follow from power: τᵀ v is the same number in both libraries. Accelerations are time derivatives of
-    velocities. So if a library has velocities along the world's axes, its accelerations are classical.
+    velocities. So if a library has velocities along the world's axes, the library's accelerations are classical.
     """
 
     def __init__(self, model: Model, library: str | FreeJoint) -> None:
@@ -206,7 +209,8 @@ class Coordinates:
         if any(model.mimics):
             raise ValueError("a robot whose joints follow others has fewer coordinates than there")
         self._joints: list[tuple[str, slice, slice, slice]] = []
-        """For each joint: its kind, its positions in Condyle and in the library, and its velocities (the same in both).
+        """For each joint: the kind, the slices of the joint's positions in Condyle's q and in the library's q, and the
+        slice of its velocities, which is the same in both.
         """
         nq = 0
         columns = zip(model.joint_types, model.idx_qs, model.nqs, model.idx_vs, model.nvs, strict=True)
@@ -272,7 +276,9 @@ class Coordinates:
         return self._shifted(v, a, -1.0)
 
     def effort(self, q: ArrayLike, tau: ArrayLike) -> _Array:
-        """Returns the library's efforts from Condyle's q and τ: τᵀ v is the same in both, so only the axes change."""
+        """Returns the library's efforts from Condyle's q and τ: τᵀ v is the same in both libraries, so only the axes
+        change.
+        """
         return self._out(_last(q, "q", self.model.nq), _last(tau, "tau", self.model.nv))
 
     def effort_from(self, q: ArrayLike, tau: ArrayLike) -> _Array:

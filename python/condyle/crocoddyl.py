@@ -7,9 +7,9 @@ An existing `crocoddyl.ShootingProblem` is solved by Condyle's solvers in two li
 
 where xs and us are arrays of Crocoddyl's states and controls. The numbers of states and controls, their order, and the
 iterates are the same as in Crocoddyl. Gains have the opposite sign: u = ū + α k + K (x ⊖ x̄).
-`project_warm_start=False` matters only if controls are bounded: it keeps a warm start outside the bounds, as Crocoddyl
-does. In the other direction, `differential_action(model)` returns a `crocoddyl.DifferentialActionModelAbstract` for
-Crocoddyl's solvers, which computes with Condyle's dynamics.
+`project_warm_start=False` has an effect only if controls are bounded: a warm start outside the bounds is not moved into
+the bounds, as in Crocoddyl. In the other direction, `differential_action(model)` returns a
+`crocoddyl.DifferentialActionModelAbstract` for Crocoddyl's solvers, which computes with Condyle's dynamics.
 
 The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. Condyle does not install Crocoddyl: PyPI
 has version 3.2.1, for Pinocchio 4.0.
@@ -59,15 +59,16 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
     """Converts a `crocoddyl.ShootingProblem` to a `Problem`.
 
     The following knots are converted: Euler and Runge–Kutta steps, with controls as polynomials, of free and contact
-    dynamics, forward and inverse; impulses; LQR; the unicycle. They may contain: actuation models τ = S u with constant
-    S; contacts of 1, 2, 3 and 6 dimensions; all residuals except ResidualModelContactControlGrav (which ignores the
-    forces in version 3.2.1); quadratic, weighted and smooth activations and barriers; and constraints of residuals. A
-    knot with other contents, such as an action or a cost that is written in Python, is computed by Crocoddyl, which
-    Condyle's solver calls; a warning names these contents.
+    dynamics, forward and inverse; impulses; LQR; the unicycle. These knots may contain: actuation models τ = S u with
+    constant S; contacts of 1, 2, 3 and 6 dimensions; all residuals except ResidualModelContactControlGrav (which
+    ignores the forces in version 3.2.1); quadratic, weighted and smooth activations and barriers; and constraints of
+    residuals. A knot with other contents, such as an action or a cost that is written in Python, is computed by
+    Crocoddyl: Condyle's solver calls Crocoddyl for this knot, and a warning names these contents.
 
     Constraints and the equations of inverse dynamics become limits, which `AugmentedLagrangian` enforces.
 
-    shooting_problem: the problem; its data are copied, and it is kept only for knots that Crocoddyl computes.
+    shooting_problem: the problem of Crocoddyl. Its data are copied. The problem itself is kept only for knots that
+    Crocoddyl computes.
     bounded: whether to use the bounds of controls. Crocoddyl's SolverFDDP and SolverDDP ignore bounds, SolverBoxFDDP
         and SolverBoxDDP use them.
     strict: whether contents without a counterpart in Condyle are an error.
@@ -82,7 +83,7 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
 
 
 class _Reader:
-    """Converts actions; each robot and each action is converted once."""
+    """A converter of actions, which converts each robot and each action once."""
 
     def __init__(self, bounded: bool, strict: bool) -> None:
         self.bounded, self.strict = bounded, strict
@@ -153,7 +154,9 @@ class _Reader:
 
     @staticmethod
     def _at_each_node(bound: _Array | None, nu: int) -> _Array | None:
-        """Returns the bounds of one node, if all nodes of a control polynomial have the same bounds."""
+        """Returns the bounds of the nu controls at one time. All times of a control polynomial must have the same
+        bounds.
+        """
         if bound is None or len(bound) == nu:
             return bound
         first: _Array = bound[:nu]
@@ -211,7 +214,7 @@ class _Reader:
         return ImpulseDynamics(robot.model, contacts, costs, theirs.r_coeff, theirs.JMinvJt_damping, limits)
 
     def _called(self, theirs: Any, end: bool) -> Action:
-        """Returns an action whose functions call Crocoddyl."""
+        """Returns an `Action` whose Python functions call the action of Crocoddyl."""
         data, state = theirs.createData(), theirs.state
         nu = 0 if end else theirs.nu
 
@@ -308,7 +311,7 @@ class _OnOurs:
         data.Lu[:], data.Luu[:] = node.r, (node.R[0] if one else node.R)
 
     def quasiStatic(self, data: Any, x: _Array, maxiter: int = 100, tol: float = 1e-9) -> _Array:
-        """Returns the quasi-static controls."""
+        """Returns the quasi-static controls of the model at the state x."""
         held: _Array = self._running.quasi_static(x)
         return held
 
@@ -317,7 +320,7 @@ _classes: list[Any] = []
 
 
 def _differential_class() -> Any:
-    """Returns the class for `differential_action`; it is created on first use, since this requires Crocoddyl."""
+    """Returns the class for `differential_action`; the class is created on first use, because it requires Crocoddyl."""
     if not _classes:
         base: Any = import_module("crocoddyl").DifferentialActionModelAbstract
         _classes.append(type("DifferentialActionModel", (_OnOurs, base), {"_base": base}))

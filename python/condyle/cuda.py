@@ -8,12 +8,12 @@
     d = aba(q, v, tau)           # a named tuple of tensors; d.da_dq has the shape (7, 7, 100_000)
     aba(q, v, tau, out=d)        # into the same memory
 
-A thread computes one state. If the results need too many registers and there are few states, several threads share a
-state, and each of them computes some of the results. An argument of k numbers for n states is an array of shape (k, n)
-in row order: for each of the k numbers, the values of all states are contiguous. The transpose of such an array, with
-shape (n, k) and strides (1, n), is accepted, too. If the first argument has this form, the results also have the states
-along the first axis. No array is copied: other layouts and dtypes are errors. Results are arrays of the library of the
-first argument.
+A thread computes one state. If the results need too many registers and the number of states is small, several threads
+share a state. Each of these threads computes some of the results. An argument of k numbers for n states is an array of
+shape (k, n) in row order: for each of the k numbers, the values of all states are contiguous. The transpose of such an
+array, with shape (n, k) and strides (1, n), is accepted, too. If the first argument is such a transpose, the results
+also have the states along the first axis. No array is copied: other layouts and dtypes are errors. Results are arrays
+of the library of the first argument.
 
 CUDA itself need not be installed. Two libraries are needed at run time: the driver, which is installed with the GPU,
 and NVIDIA's run-time compiler (`pip install 'condyle[cuda]'`, or a compiler of the system). The environment variables
@@ -41,11 +41,11 @@ __all__ = ["DeviceArray", "Kernel", "array", "compile", "devices", "ptx"]
 
 _LANGUAGES = {"float64": "cuda", "float32": "cuda-float"}
 _PLACES = 2**31 - 1
-"""Maximum number of elements of an array, because kernels use indices of 32 bits."""
+"""Maximum number of elements of an array. The limit exists because kernels use indices of 32 bits."""
 
 
 def devices() -> list[str]:
-    """Returns the names of the devices.
+    """Returns the names of the CUDA devices.
 
     Raises `RuntimeError` if the driver is missing, or finds no device.
     """
@@ -77,8 +77,8 @@ class _Array:
         self.shape: tuple[int, ...] = (rows,) if columns == 1 else (rows, columns)
 
     def in_memory(self, n: int) -> tuple[int, ...]:
-        """Returns the shape of the array as it is stored, in row order: matrices are stored by columns, so their axes
-        are reversed.
+        """Returns the shape of the array as it is stored, in row order: matrices are stored by columns, so the axes of
+        a matrix are reversed.
         """
         return (*reversed(self.shape), n)
 
@@ -116,10 +116,10 @@ class _Array:
 
 
 class Kernel:
-    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arguments and results, and their
-    shapes for one state.
+    """A function of a robot on a GPU. `inputs` and `outputs` are the names of the arguments and results, and the shapes
+    for one state.
 
-    It may be called from several threads at a time.
+    The kernel may be called from several threads at a time.
     """
 
     def __init__(
@@ -139,17 +139,17 @@ class Kernel:
 
     @property
     def device(self) -> int:
-        """The index of the device."""
+        """The index of the device for which the kernel is compiled."""
         return self._function.device.ordinal
 
     @property
     def partitions(self) -> int:
-        """The number of threads that can share a state. Each of them computes some of the results."""
+        """The number of threads that can share a state. Each thread computes some of the results."""
         return self._function.partitions
 
     @property
     def registers(self) -> int:
-        """The number of registers of a thread."""
+        """The number of registers that a thread of the kernel uses."""
         return self._function.registers
 
     @property
@@ -166,14 +166,14 @@ class Kernel:
 
         arguments: arrays on the device, of any library that supports DLPack or `__cuda_array_interface__`. The result
             is an array, or a named tuple if there are several results. The shape of a result is (k, n) or, for
-            matrices, (rows, columns, n). If the states are along the first axis of the first argument, they are also
-            along the first axis of the results. New arrays are allocated, which takes time. In a loop, pass `out`
-            instead: one array of the same shape, or a sequence of arrays for several results. It is filled and
-            returned. A matrix in `out` may also have the shape (rows × columns, n), column by column.
+            matrices, (rows, columns, n). If the states are along the first axis of the first argument, the results also
+            have the states along the first axis. New arrays are allocated, which takes time. In a loop, pass `out`
+            instead: one array of the same shape, or a sequence of arrays for several results. The arrays of `out` are
+            filled and returned. A matrix in `out` may also have the shape (rows × columns, n), column by column.
 
         stream: the stream for the work: a stream of PyTorch or CuPy, or its address. If the first argument is an array
             of PyTorch or CuPy, the default is the current stream of this library, else the legacy default stream. Read
-            `out` on the same stream, or on a stream that waits for it.
+            `out` on the same stream, or on a stream that waits for this stream.
         """
         if len(arguments) != len(self._inputs):
             raise TypeError(f"{self!r}: expected {len(self._inputs)} arguments, found {len(arguments)}")
@@ -203,8 +203,8 @@ class Kernel:
         return results[0] if self._result is None else self._result(*results)
 
     def _room(self, out: list[Any], n: int, stream: int, inputs: list[View]) -> list[View]:
-        """Checks the arrays for the results: they must be writable, and must not share memory with each other or with
-        arguments.
+        """Checks the arrays for the results. These arrays must be writable, and must not share memory with each other
+        or with arguments.
         """
         if len(out) != len(self._outputs):
             raise TypeError(f"{self!r}: out: expected {len(self._outputs)} arrays, found {len(out)}")
@@ -225,8 +225,8 @@ class Kernel:
         return views
 
     def _after(self, stream: int, arrays: Sequence[Any], views: list[View]) -> None:
-        """Records an event after which the results are ready, and keeps arrays of other libraries alive until then, so
-        that these libraries do not reuse the memory.
+        """Records an event after which the results are ready. Keeps arrays of other libraries alive until this event,
+        so that these libraries do not reuse the memory.
         """
         device = self._function.device
         event = Event(device, stream)
@@ -308,13 +308,13 @@ def compile(  # noqa: A001
 ) -> Kernel:
     """Compiles a function of a robot to a kernel with NVIDIA's run-time compiler, or reads it from the cache.
 
-    name: one of `condyle.codegen.functions`; frames, constraints, external_forces, inputs: as for these. dtype: the
-        kind of numbers in the computation. partitions: the number of threads per state, each of which computes some of
-        the results; at most one thread for each limb and one for the trunk. The default is one thread. If one thread
-        would need more registers than it has, and several threads for all states fit on the device at the same time,
-        the default is the fastest number. ptx: the result of the function `ptx` for the same model, name, dtype and
-        options; then the compiler is not needed. cache: a folder; by default the environment variable CONDYLE_CACHE,
-        else `~/.cache/condyle`.
+    name: one of `condyle.codegen.functions`; frames, constraints, external_forces, inputs: as for
+        `condyle.codegen.source`. dtype: the kind of numbers in the computation. partitions: the number of threads per
+        state, each of which computes some of the results; at most one thread for each limb and one for the trunk. The
+        default is one thread. The exception is a kernel for which one thread has too few registers. If several threads
+        for each state then fit on the device at the same time, the default is the fastest number. ptx: the result of
+        the function `ptx` for the same model, name, dtype and options; then the compiler is not needed. cache: a
+        folder; by default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`.
 
     Raises `RuntimeError` if the driver, a device or the compiler is missing, or if the compiler fails; `ValueError` if
     the device does not exist; and the exceptions of `condyle.codegen.source`.

@@ -1,5 +1,5 @@
-"""The ten inertial parameters of a body: a check that they are physical, and a parametrisation in which all values are
-physical.
+"""The ten inertial parameters of a body: a check that the parameters are physical, and a parametrisation in which all
+values are physical.
 
 π = (m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz), in the body's frame, about the origin of this frame.
 Pinocchio and `Model.inertial_parameters` have the same order.

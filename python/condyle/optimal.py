@@ -1,4 +1,4 @@
-"""Optimal control over a horizon: finds the motion of a robot with the lowest cost, by FDDP.
+"""Optimal control over a horizon: finds the motion of a robot with the lowest cost by FDDP (feasibility-driven DDP).
 
 >>> import condyle, numpy as np
 >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual

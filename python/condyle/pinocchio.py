@@ -1,4 +1,5 @@
-"""Pinocchio's API names: a thin layer, so that a script for Pinocchio runs if only its import is changed.
+"""Functions and classes with Pinocchio's names. A script for Pinocchio runs with this module if only the script's
+import is changed.
 
 >>> import condyle, numpy as np
 >>> import condyle.pinocchio as pin
@@ -8,12 +9,13 @@
 >>> pin.computeABADerivatives(model, data, q, v, tau)[0].shape, data.ddq[2].round(2).item()
 ((18, 18), -9.81)
 
-Functions return the same results as Pinocchio's functions in Python, and store them in `data` under the same names, as
-arrays that no later call changes. `model.ours` is the `condyle.Model`, whose functions also take batches. Three details
-should be known: both triangles of M are filled, as in Pinocchio's Python; armature counts in the kinetic energy of all
-joints; and `frames` are `universe`, followed by the frames of the `condyle.Model`. So find frames with `getFrameId`,
-and do not use frame indices from Pinocchio. Geometry, collisions, visualisers and other missing features raise an
-AttributeError with an explanation. For new code use `condyle` itself: its page has a table of both sets of names.
+Functions return the same results as Pinocchio's functions in Python. They store the results in `data` under the same
+names, as arrays that no later call changes. `model.ours` is the `condyle.Model`, whose functions also take batches.
+Three details should be known: both triangles of M are filled, as in Pinocchio's Python; the kinetic energy contains the
+armature of all joints; and `frames` are `universe`, followed by the frames of the `condyle.Model`. So find frames with
+`getFrameId`, and do not use frame indices from Pinocchio. Geometry, collisions, visualisers and other missing features
+raise an AttributeError with an explanation. For new code use `condyle` itself: the README of the package has a table of
+both sets of names.
 """
 
 from collections.abc import Sequence
@@ -116,7 +118,7 @@ def _forces(fext: Sequence[algebra.Force]) -> _Array:
 
 
 def _flat(*states: ArrayLike) -> tuple[_Array, _Array, _Array]:
-    """Returns states as vectors, although some of them are given as columns. If no state is a column, raises the
+    """Returns states as vectors, if some of the states are given as columns. If no state is a column, raises the
     current exception again.
     """
     q, v, x = (np.asarray(state, float) for state in states)

@@ -1,4 +1,4 @@
-"""Simulation of robots: advances (q, v) in time; rotations stay valid in every step.
+"""Simulation of robots: advances the state (q, v) in time. Rotations in q stay valid in every step.
 
 >>> import condyle, numpy as np
 >>> from condyle.simulation import Simulation

@@ -11,8 +11,8 @@ np.True_
 np.int64(180)
 
 `play` shows a motion in the browser, also in a notebook. `plot` and `spy` return figures of matplotlib:
-`matplotlib.pyplot.show()` displays them, and `figure.savefig(path)` saves one to a file. Both packages are imported on
-first use.
+`matplotlib.pyplot.show()` displays them, and `figure.savefig(path)` saves a figure to a file. matplotlib and viser are
+imported on first use.
 """
 
 from importlib import import_module
@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 __all__ = ["Player", "pattern", "play", "plot", "spy"]
 
 _Array = NDArray[np.float64]
-_NAMES = 14  # maximum number of labels: more lines cannot be distinguished in a plot
+_NAMES = 14  # maximum number of labels in a plot: more lines cannot be distinguished
 
 
 def pattern(model: Model) -> NDArray[np.bool_]:
-    """Returns for each entry of M(q) whether the structure of the tree allows it to differ from zero, (nv, nv).
+    """Returns for each entry of M(q) whether the structure of the tree allows the entry to differ from zero, (nv, nv).
 
-    M_ij = 0 unless one of the joints i and j carries the other (Featherstone 2008, section 8.5). With mimic joints, M =
-    Gᵀ M' G, where M' is the inertia matrix of the tree with all joints free.
+    M_ij = 0 unless joint i carries joint j, or joint j carries joint i (Featherstone 2008, section 8.5). With mimic
+    joints, M = Gᵀ M' G, where M' is the inertia matrix of the tree with all joints free.
     """
     widths = [joint.nv if joint else 0 for joint in model.joints]
     related = np.eye(model.nbodies, dtype=bool)
@@ -80,7 +80,7 @@ def spy(M: ArrayLike, model: Model, tolerance: float = 1e-12) -> "Figure":
 def plot(solution: Solution, model: Model, dt: float | None = None) -> "Figure":
     """Plots the positions, velocities and controls of a solution over time, and the convergence of the solver.
 
-    dt: the time between two knots (s), if it is the same for all knots; None plots over the knot's index.
+    dt: the time between two knots (s), if this time is the same for all knots; None plots over the index of the knot.
     """
     xs = np.asarray(solution.xs, float)
     if xs.ndim != 2 or xs.shape[1] != model.nq + model.nv:

@@ -1,4 +1,4 @@
-"""Whole-body control: finds the joint efforts with which a robot in contact fulfils its tasks.
+"""Whole-body control: finds the joint efforts with which a robot in contact fulfils given tasks.
 
 At each tick one cone program finds accelerations, contact forces and efforts that best follow weighted tasks under the
 full dynamics, with exact friction cones: see `WholeBodyController`.

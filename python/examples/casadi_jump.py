@@ -2,8 +2,8 @@
 
     python python/examples/casadi_jump.py        needs CasADi: pip install 'condyle[casadi]'
 
-On the ground, `constrained_dynamics` gives the accelerations and the forces of the feet; in the air, `aba` gives the
-accelerations. The forces must push and stay in their friction cones. When the feet land, they must be on the ground
+On the ground, `constrained_dynamics` computes the accelerations and the forces of the feet; in the air, `aba` computes
+the accelerations. The forces must push and stay in their friction cones. At the landing, the feet must be on the ground
 and at rest. IPOPT receives exact second derivatives of all functions.
 """
 
@@ -14,8 +14,8 @@ import condyle
 import condyle.casadi
 
 FEET = ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
-PUSH, FLIGHT, LAND, DT = 12, 12, 8, 0.02  # knots of each phase; s
-HEIGHT, FORWARD, FRICTION = 0.1, 0.2, 0.6  # m, m
+PUSH, FLIGHT, LAND, DT = 12, 12, 8, 0.02  # numbers of knots of the three phases; time step (s)
+HEIGHT, FORWARD, FRICTION = 0.1, 0.2, 0.6  # height (m) and length (m) of the jump; friction coefficient
 
 
 def contacts() -> list[condyle.ContactConstraint]:
@@ -50,8 +50,9 @@ def transcribe(
 ) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
     """Builds the optimisation of the jump: semi-implicit Euler on knots of 20 ms.
 
-    stance: a function (q, v, τ) -> (a, forces of the feet). flight: a function (q, v, τ) -> a. feet: for each foot, a
-    function of q whose first result is the position, and a function (q, v) -> velocity, linear numbers first.
+    stance: a function (q, v, τ) -> (a, forces of the feet), with accelerations a. flight: a function (q, v, τ) -> a.
+    feet: for each foot, a function of q whose first result is the position, and a function (q, v) -> velocity, linear
+    numbers first.
     """
     knots, nq, nv = PUSH + FLIGHT + LAND, model.nq, model.nv
     opti = casadi.Opti()

@@ -2,8 +2,9 @@
 
     python python/examples/casadi_reach.py        needs CasADi: pip install 'condyle[casadi]'
 
-The duration is also a variable. Accelerations are the controls, and inverse dynamics computes the efforts. This is
-cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on the result of `rnea`.
+The duration is also a variable of the optimisation. Accelerations are the controls, and inverse dynamics computes the
+efforts. Inverse dynamics is cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on the
+result of `rnea`.
 """
 
 import casadi
@@ -31,7 +32,7 @@ def transcribe(
     q, v, a = opti.variable(n, KNOTS), opti.variable(n, KNOTS), opti.variable(n, KNOTS)
     duration = opti.variable()
     h = duration / (KNOTS - 1)
-    for x, rate in ((q, v), (v, a)):  # the trapezoidal rule
+    for x, rate in ((q, v), (v, a)):  # the trapezoidal rule for positions and velocities
         opti.subject_to(x[:, 1:] == x[:, :-1] + h / 2 * (rate[:, 1:] + rate[:, :-1]))
     tau = inverse_dynamics(q, v, a)
     for x, lower, upper in (

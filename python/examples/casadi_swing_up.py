@@ -5,7 +5,7 @@ derivatives.
 
 The shoulder cannot lift the arm, so the arm has to swing. Between two knots the motion is a cubic polynomial that
 satisfies the equation of motion at both ends and in the middle (Hermite and Simpson). Variables are the position,
-velocity and effort at each of these points. The equations of the polynomial are constraints.
+velocity and effort at the ends and in the middle. The equations of the polynomial are constraints.
 """
 
 import casadi
@@ -16,7 +16,7 @@ import condyle.casadi
 
 INTERVALS, DURATION = 40, 3.0
 POINTS = 2 * INTERVALS + 1
-EFFORT = np.array([8.0, 4.0])  # N m; holding the arm level needs 15 and 5
+EFFORT = np.array([8.0, 4.0])  # effort limits (N m); holding the arm level needs 15 and 5 N m
 
 
 def two_links() -> condyle.Model:

@@ -36,9 +36,9 @@ The example needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names of Crocoddyl,
 
 Signs and axes: in Condyle, the feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. In
 both libraries, forces act on the robot, along the axes of the contact. Contacts in Crocoddyl's frame WORLD are
-"local_world_aligned" in Condyle. Fddp enforces the bounds of a knot; SolverFDDP ignores them. Fddp moves a warm start
-into the bounds unless project_warm_start=False; SolverBoxFDDP does not move it. In the terminal knot, costs of controls
-are zero in Crocoddyl and an error in Condyle. All other numbers have the same sign, order and unit.
+"local_world_aligned" in Condyle. Fddp enforces the bounds of a knot; SolverFDDP ignores bounds. Fddp moves a warm start
+into the bounds unless project_warm_start=False; SolverBoxFDDP does not move the warm start. In the terminal knot, costs
+of controls are zero in Crocoddyl and an error in Condyle. All other numbers have the same sign, order and unit.
 """
 
 import time

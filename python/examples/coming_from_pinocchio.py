@@ -2,8 +2,8 @@
 
     python python/examples/coming_from_pinocchio.py
 
-The example needs only Condyle. If Pinocchio is installed, the numbers of both are compared. Names of Pinocchio, and
-names of Condyle:
+The example needs only Condyle. If Pinocchio is installed, the example compares the numbers of both libraries. Names of
+Pinocchio, and names of Condyle:
 
     buildModelFromUrdf(path, JointModelFreeFlyer())     Model.from_urdf(path, root_joint="free_flyer")
     buildModelFromMJCF(path)                            Model.from_mjcf(path)
@@ -87,7 +87,7 @@ for _ in range(steps):
 print(f"written here: the largest difference is {np.abs(q - q_here).max():.0e}")
 assert np.allclose(q, q_here, rtol=0.0, atol=1e-12)
 
-# 3. Dynamics: results are returned together, instead of being left in `data`.
+# 3. Dynamics: a function returns all its results; it does not store results in `data`.
 v, tau = np.linspace(-1.0, 1.0, 7), np.ones(7)
 d = condyle.aba_derivatives(arm, data, q, v, tau)
 print(f"the first joint accelerates by {d.a[0]:.4f} rad/s², and by {d.da_dtau[0, 0]:.4f} more for each N m")
@@ -99,7 +99,7 @@ efforts = condyle.gravity(arm, condyle.Data(arm, threads=2), many)
 assert efforts.shape == (1000, 7)
 print(f"holding the arm still takes at most {np.abs(efforts).max():.2f} N m, all around")
 
-# 5. If Pinocchio is installed, its numbers are compared: they are the same. One call converts models of Pinocchio.
+# 5. If Pinocchio is installed, its numbers are compared with Condyle's. One call converts a model of Pinocchio.
 if find_spec("pinocchio"):
     import pinocchio
 

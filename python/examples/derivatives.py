@@ -1,9 +1,9 @@
-"""Exact derivatives of the dynamics, in closed form, and of functions built on them.
+"""Exact derivatives of the dynamics, in closed form, and derivatives of functions that use the dynamics.
 
     python python/examples/derivatives.py
 
-A derivative with respect to q is taken in the tangent space, along velocities. It has nv columns, even if q has more
-numbers than v.
+A derivative with respect to q is taken in the tangent space, along velocities. Such a derivative has nv columns, even
+if q has more numbers than v.
 """
 
 import numpy as np
@@ -26,11 +26,11 @@ ahead = condyle.aba(robot, data, condyle.integrate(robot, q, step * direction), 
 behind = condyle.aba(robot, data, condyle.integrate(robot, q, -step * direction), v, tau)
 print("differences are off by", abs((ahead - behind) / (2 * step) - d.da_dq @ direction).max())
 
-# Second derivatives of a number λᵀ q̈, which solvers for optimal control need, in four blocks.
+# Second derivatives of the number λᵀ q̈, in four blocks. Solvers for optimal control need these derivatives.
 hessian = condyle.aba_hessian(robot, data, q, v, tau, np.ones(robot.nv))
 assert np.allclose(hessian.dqdq, hessian.dqdq.T)
 
-# Derivatives of your own function: it is called with hyper-dual numbers, which all functions of Condyle accept.
+# Derivatives of a function that you write: Condyle calls it with hyper-dual numbers.
 arm = condyle.robots.arm7()
 arm_data, at = condyle.Data(arm), np.full(7, 0.3)
 
@@ -41,7 +41,8 @@ def reach_and_effort(q: np.ndarray) -> np.ndarray:
     return 100.0 * ((tool - [0.4, 0.2, 0.5]) ** 2).sum() + 0.01 * (condyle.gravity(arm, arm_data, q) ** 2).sum()
 
 
-# With the exact Hessian, Newton's method needs few steps. The Gauss-Newton matrix would also work, in more steps.
+# With the exact Hessian, Newton's method needs few steps. With the Gauss-Newton matrix, the method would need more
+# steps.
 steps = 0
 while True:
     value, gradient = condyle.gradient(arm, at, reach_and_effort)

@@ -3,7 +3,7 @@
     python python/examples/dynamics.py
 
 A `Model` is the robot and never changes. A `Data` is the scratch memory of calls. All algorithms are functions of a
-model, a data, the state (position q, velocity v), and further arguments such as accelerations or efforts.
+`Model`, a `Data`, the state (position q, velocity v), and further arguments such as accelerations or efforts.
 """
 
 import numpy as np
@@ -14,11 +14,11 @@ robot = condyle.robots.quadruped()  # or condyle.Model.from_urdf("robot.urdf", r
 data = condyle.Data(robot)
 print(robot)  # prints a table of joints; print(robot.tree()) prints the tree of bodies
 
-# q has nq numbers: the base's position and quaternion (x, y, z, w), then a number for each joint. v has nv.
+# q has nq numbers: the base's position and quaternion (x, y, z, w), then a number for each joint. v has nv numbers.
 q, v = condyle.neutral(robot), np.zeros(robot.nv)
-q[2], q[7:] = 0.5, np.tile([0.0, 0.7, -1.4], 4)  # half a metre up, the knees bent
+q[2], q[7:] = 0.5, np.tile([0.0, 0.7, -1.4], 4)  # the base is half a metre up, and the knees are bent
 
-# Inverse dynamics: the efforts τ = M a + h that hold the robot still. For the base, τ is the weight: it has no motor.
+# Inverse dynamics: the efforts τ = M a + h that hold the robot still. The base has no motor: its effort is the weight.
 tau = condyle.rnea(robot, data, q, v, np.zeros(robot.nv))
 print(f"the ground must carry {tau[2]:.1f} N, and {robot.total_mass * 9.81:.1f} N is the robot's weight")
 
@@ -48,7 +48,7 @@ tau[:6] = 0.0  # the base has no motors
 contact = condyle.constrained_dynamics(robot, data, stance, q, v, tau)
 print(f"on its feet it falls with {abs(contact.a[2]):.2f} m/s²; they are pushed by {contact.lambda_[2::3].round(1)} N")
 
-# Many states in one call: arrays have one more axis, the first. SIMD registers compute several states at a time.
+# Many states in one call: arrays have an additional first axis. SIMD registers compute several states at a time.
 states = np.stack([condyle.random_configuration(robot, seed=k) for k in range(1000)])
 masses = condyle.crba(robot, data, states)
 print(f"{len(masses)} inertia matrices: {masses.shape}")

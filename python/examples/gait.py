@@ -21,8 +21,8 @@ HOLD = 40.0  # decay rate of a foot's slip (1/s)
 
 
 class Gait:
-    """Gait under construction: the knots that were added so far, and the positions of feet and centre of mass after the
-    last knot.
+    """A gait that is built phase by phase: the knots added so far, and the positions of feet and centre of mass after
+    the last knot.
     """
 
     def __init__(self, model, q, feet, dt):
@@ -74,7 +74,8 @@ class Gait:
     def step(self, swinging, length, height, knots):
         """Moves the given feet ahead by `length` in an arc of the given height, and sets them down.
 
-        The feet leave the ground and touch it again nearly at rest, so that a robot can follow the motion.
+        The feet are nearly at rest when they leave the ground and when they touch the ground again. So a robot can
+        follow the motion.
         """
         support = [k for k in range(len(self.feet)) if k not in swinging]
         com, places, ahead = self.com.copy(), self.places.copy(), np.array([length, 0.0, 0.0])

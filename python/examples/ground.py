@@ -22,8 +22,8 @@ class Ground:
         self.sets = {}
 
     def step(self, tau, dt, f_ext=None):
-        """Makes a step of dt with efforts τ and external forces on bodies. Returns the force on each foot along the
-        world's axes (N).
+        """Makes a step of length dt with efforts τ and external forces on bodies. Returns the force on each foot along
+        the world's axes (N).
         """
         forces = np.zeros((len(self.feet), 3))
         while True:
@@ -36,8 +36,8 @@ class Ground:
             self.standing[held[pulled]] = False  # release feet that the ground would have to pull
         for k, force in zip(held, here, strict=True):
             forces[k] = force
-        self.v = self.v + dt * found.a  # v⁺ = v + Δt q̈
-        self.q = condyle.integrate(self.model, self.q, dt * self.v)  # q⁺ = q ⊕ Δt v⁺
+        self.v = self.v + dt * found.a  # semi-implicit Euler: v⁺ = v + Δt q̈, then q⁺ = q ⊕ Δt v⁺
+        self.q = condyle.integrate(self.model, self.q, dt * self.v)
         self._land()
         return forces
 

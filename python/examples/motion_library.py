@@ -5,8 +5,8 @@ on the workers of Ray.
 
 Each start has its own plan with feedback; the nominal plan is the first guess of each solve. With Ray (`pip install
 condyle[ray]`) the processors of this machine share the work, or the processors of a cluster whose address is the
-argument `cluster` of `sweep`. The problem is sent to each worker once. If a worker is lost, another worker computes its
-variations. All these ways give bit-identical results.
+argument `cluster` of `sweep`. The problem is sent to each worker once. If a worker is lost, another worker computes the
+lost worker's variations. The results are bit-identical in one process, on one machine and on a cluster.
 """
 
 import importlib.util

@@ -34,7 +34,7 @@ def costs(step: int, controls: int) -> list[Cost]:
     ]
 
 
-# One action serves all knots. Each knot has its own costs; when the horizon is shifted, they move with the knot.
+# One action serves all knots. Each knot has its own costs; when the horizon is shifted, the costs move with the knot.
 knot = FreeDynamics(arm, DT, [], costs_at={t: costs(t, 7) for t in range(HORIZON)})
 end = FreeDynamics(arm, None, costs(HORIZON, 0))
 problem = Problem(rest, [knot], [0] * HORIZON, end)

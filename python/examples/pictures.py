@@ -2,8 +2,8 @@
 
     python python/examples/pictures.py [--stay]
 
-The example needs `pip install condyle[viz]`. It writes plot.png and spy.png to the current folder. With --stay, the
-page stays open until Enter is pressed.
+The example needs `pip install condyle[viz]`. The example writes plot.png and spy.png to the current folder. With
+--stay, the page stays open until Enter is pressed.
 """
 
 import sys
@@ -20,11 +20,11 @@ import condyle
 from condyle import viz
 
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
-DT = 0.01  # s
+DT = 0.01  # time step (s)
 
 robot = condyle.robots.quadruped()
 q = condyle.neutral(robot)
-q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
+q[7:] = [0.0, 0.7, -1.4] * 4  # joint angles with bent knees
 
 gait = Gait(robot, q, FEET, DT)
 gait.stand(10)

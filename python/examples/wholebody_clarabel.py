@@ -7,7 +7,8 @@ A quadruped stands on four point feet and is pushed. Each millisecond the progra
     J_c q̈ + J̇_c v = 0                              the feet stay
     ‖f_t‖ ≤ μ f_n                                  each foot in its cone
 
-is written in Clarabel's form and solved by Clarabel. For comparison, `WholeBodyController` computes the same tick.
+is written in Clarabel's form and solved by Clarabel. For comparison, `WholeBodyController` computes a command for the
+same state.
 
     pip install clarabel
     python python/examples/wholebody_clarabel.py
@@ -24,19 +25,17 @@ from condyle.wholebody import FrictionContact, Gains, Settings, Task, WholeBodyC
 
 FEET = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"]
 FRICTION = 0.4
-EFFORT = 60.0  # N m
-STIFFNESS, DAMPING = 60.0, 15.5  # 1/s², 1/s
-TRUNK, POSTURE, SMALL_A, SMALL_F = 10.0, 0.1, 1e-6, 1e-4  # w, w_p, ε_a, ε_f
-TOLERANCE = (
-    1e-11  # of both solvers; if a foot just reaches its cone, errors of torques are the square root of the tolerance
-)
-DT = 1e-3  # s
-PUSH = 60.0  # N, to the left, from 0.1 s to 0.3 s
+EFFORT = 60.0  # maximum effort τ_max (N m)
+STIFFNESS, DAMPING = 60.0, 15.5  # gains of the tasks (1/s², 1/s)
+TRUNK, POSTURE, SMALL_A, SMALL_F = 10.0, 0.1, 1e-6, 1e-4  # weights w, w_p, ε_a, ε_f
+TOLERANCE = 1e-11  # tolerance of both solvers; torques have errors of its square root if a foot just reaches its cone
+DT = 1e-3  # time step (s)
+PUSH = 60.0  # force to the left (N), from 0.1 s to 0.3 s
 ALIGNED = "local_world_aligned"
 
 
 class Standing:
-    """A posture to hold, and the cone program that holds it at a given state."""
+    """A posture to hold, and the cone program that holds this posture at a given state."""
 
     def __init__(self, model, q_ref, trunk):
         self.model, self.data, self.q_ref, self.trunk = model, condyle.Data(model), q_ref, trunk
@@ -57,19 +56,19 @@ class Standing:
         pose = condyle.frame_placement(model, data, q, "trunk")
         turn = Rotation.from_matrix(self.trunk[:3, :3] @ pose[:3, :3].T).as_rotvec()
         error = np.r_[self.trunk[:3, 3] - pose[:3, 3], turn]
-        wanted = STIFFNESS * error - DAMPING * J @ v - drift  # a* − J̇ v
+        wanted = STIFFNESS * error - DAMPING * J @ v - drift  # the difference a* − J̇ v
         joints = STIFFNESS * condyle.difference(model, q, self.q_ref) - DAMPING * v
         weights = np.where(np.arange(nv) < 6, 0.0, POSTURE)
-        share = np.tile([0.0, 0.0, -model.gravity[2] * model.total_mass / len(FEET)], len(FEET))  # f_ref
+        share = np.tile([0.0, 0.0, -model.gravity[2] * model.total_mass / len(FEET)], len(FEET))  # forces f_ref
 
-        # ½ xᵀ P x + cᵀ x with x = (q̈, f)
+        # cost ½ xᵀ P x + cᵀ x with x = (q̈, f)
         P = np.zeros((nv + nf, nv + nf))
         P[:nv, :nv] = TRUNK * J.T @ J + np.diag(weights + SMALL_A)
         P[nv:, nv:] = SMALL_F * np.eye(nf)
         c = -np.r_[TRUNK * J.T @ wanted + weights * joints, SMALL_F * share]
-        # A x + s = b: s = 0, s ≥ 0, s in second-order cones
-        E = np.hstack([M, -J_c.T])  # τ = E x + h
-        cone = np.zeros((3, 3))  # s = (μ f_n, f_t)
+        # constraints A x + s = b, with s = 0, s ≥ 0, and s in second-order cones
+        E = np.hstack([M, -J_c.T])  # efforts τ = E x + h
+        cone = np.zeros((3, 3))  # slack s = (μ f_n, f_t)
         cone[0, 2], cone[1, 0], cone[2, 1] = -FRICTION, -1.0, -1.0
         cones = np.hstack([np.zeros((nf, nv)), np.kron(np.eye(len(FEET)), cone)])
         A = np.vstack([E[:6], np.hstack([J_c, np.zeros((nf, nf))]), E[6:], -E[6:], cones])

@@ -1,4 +1,4 @@
-"""A humanoid stands on two soles, shifts its weight to one of them, lifts the other foot, and sets it down.
+"""A humanoid stands on two soles, shifts its weight to one sole, lifts the other foot, and sets this foot down.
 
 The contact of the lifted foot fades: its force limit decreases before lift-off, and increases after touch-down.
 
@@ -12,12 +12,14 @@ import condyle
 from condyle.wholebody import FrictionContact, Gains, Settings, Task, WholeBodyController
 
 SOLES = ["left_sole", "right_sole"]
-DT = 1e-3  # s
-LIFT = 0.1  # m
+DT = 1e-3  # time step (s)
+LIFT = 0.1  # height to which the foot is lifted (m)
 
 
 def ramp(t: float, begin: float, end: float) -> np.ndarray:
-    """Returns value, rate and acceleration of a smooth function of time that is 0 until `begin` and 1 after `end`."""
+    """Returns the value and the first two derivatives of a smooth function of time that is 0 until `begin` and 1 after
+    `end`.
+    """
     s, w = np.clip((t - begin) / (end - begin), 0.0, 1.0), 1.0 / (end - begin)
     value = s**3 * (10.0 + s * (6.0 * s - 15.0))
     return np.array([value, 30.0 * w * (s * (1.0 - s)) ** 2, 60.0 * w**2 * s * (1.0 - s) * (1.0 - 2.0 * s)])
@@ -28,7 +30,7 @@ def main() -> None:
     q = condyle.neutral(model)
     for name, i in zip(model.names, model.idx_qs, strict=True):
         if name.endswith(("hip_pitch", "knee", "ankle_pitch")):
-            q[i] = 0.8 if name.endswith("knee") else -0.4  # knees bent
+            q[i] = 0.8 if name.endswith("knee") else -0.4  # joint angles with bent knees
 
     contacts = [FrictionContact.sole(sole, 0.7, [0.2, 0.1]) for sole in SOLES]
     tasks = [

@@ -1,7 +1,7 @@
-"""A quadruped stands on four point feet. A push makes it sway, and it returns to its posture.
+"""A quadruped stands on four point feet. A push makes the robot sway, and the robot returns to its posture.
 
-Each millisecond one cone program gives the torques: whole-body control with exact friction cones. The controller does
-not know the push; it measures only the state. The ground holds each touching foot as long as the ground pushes it. The
+Each millisecond one cone program gives the torques: whole-body control with exact friction cones. The controller
+measures only the state, not the push. The ground holds each touching foot as long as the ground pushes the foot. The
 ground's friction is unlimited, so the example checks each force, and reports the largest fraction of the friction limit
 that was used.
 
@@ -18,8 +18,8 @@ from condyle.wholebody import FrictionContact, Gains, Task, WholeBodyController
 
 FEET = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"]
 FRICTION = 0.6
-DT = 1e-3  # s
-PUSH = 50.0  # N, to the left, from 0.2 s to 0.6 s
+DT = 1e-3  # time step (s)
+PUSH = 50.0  # force to the left (N), from 0.2 s to 0.6 s
 
 
 def main() -> None:

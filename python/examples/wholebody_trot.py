@@ -1,4 +1,5 @@
-"""A quadruped trots: FDDP finds the plan, and whole-body control tracks it at 1 kHz on ground that only pushes.
+"""A quadruped trots: FDDP finds the plan, and whole-body control tracks it at 1 kHz on ground that can push but not
+pull.
 
 python python/examples/wholebody_trot.py
 """
@@ -12,13 +13,13 @@ from condyle.wholebody import FrictionContact, Gains, Settings, Task, WholeBodyC
 
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 FRICTION = 0.7
-DT = 1e-3  # s
+DT = 1e-3  # time step (s)
 
 
 def main() -> None:
     robot = condyle.robots.quadruped()
     q = condyle.neutral(robot)
-    q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
+    q[7:] = [0.0, 0.7, -1.4] * 4  # joint angles with bent knees
 
     gait = Gait(robot, q, FEET, 0.01)
     gait.stand(10)

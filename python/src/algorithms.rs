@@ -1,6 +1,6 @@
 //! Dynamics and its derivatives: one Python function for each function of the library.
 //!
-//! A call for one state takes microseconds and keeps the interpreter's lock; a call for many states releases it.
+//! A call for one state takes microseconds and keeps the interpreter's lock; a call for many states releases this lock.
 
 use crate::arrays::{Give, Number, Symmetric, give_named};
 use crate::functions::{any, functions, regular};
@@ -28,8 +28,9 @@ functions! {
 /// Computes the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a (inverse dynamics),
 /// nv numbers (N m, N); O(n).
 ///
-/// q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m). It acts at the body's origin and
-/// is expressed in the body's frame; row 0 belongs to the world.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: (nbodies, 6), a force on each body
+/// (N, then N m). Each force acts at the origin of its body and is expressed in the body's frame; row 0 belongs to the
+/// world.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
@@ -43,11 +44,11 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea
 /// Computes the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) (forward dynamics), nv numbers (rad/s², m/s²);
 /// O(n).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
+/// q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`.
 ///
-/// Raises `ModelError` if M is singular at every position. M may also be singular only at this position, as for a point
-/// mass on the axis about which it turns. Then the result is not finite, or is a large number caused by rounding
-/// errors.
+/// Raises `ModelError` if M is singular at every position. M may also be singular at this position only, for example if
+/// a point mass lies on the axis of its joint. Then the acceleration is not finite, or is a large number caused by
+/// rounding errors.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -63,10 +64,10 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> One { 
 /// Computes forward dynamics, like `aba`, by the method that `method` names: the acceleration q̈, nv numbers (rad/s²,
 /// m/s²).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', a
-/// dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros of the tree, O(n d²) for depth d; None, the
-/// fastest of these: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to
-/// rounding.
+/// q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`. method: 'aba', the
+/// articulated-body algorithm, O(n); 'dense', a dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros
+/// of the tree, O(n d²) for depth d; None, the fastest of these: 'sparse' for a robot with mimic joints, else 'aba'.
+/// All methods give the same numbers, up to rounding.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -85,7 +86,7 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; method: M
 /// Computes the joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n
 /// depth).
 ///
-/// q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
+/// q: position, nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> M = condyle.crba(arm, condyle.Data(arm), [0.3] * 7)
@@ -99,7 +100,7 @@ batch b: any(q: Position) -> One { b.crba(model, q) }
 /// Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled. M itself is not
 /// computed.
 ///
-/// q: nq numbers.
+/// q: position, nq numbers.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q = condyle.Data(arm), [0.3] * 7
@@ -113,7 +114,7 @@ batch b: regular(q: Position) -> One { b.minv(model, q) }
 
 /// Computes the nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 ///
-/// q: nq numbers; v: nv.
+/// q: position, nq numbers; v: velocity, nv numbers.
 fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
     condyle::nonlinear_effects(model, data, &q, &v)
 }
@@ -121,7 +122,7 @@ batch b: any(q: Position, v: Tangent) -> One { b.nonlinear_effects(model, q, v) 
 
 /// Computes the gravity efforts g(q) that hold the robot still, nv numbers: the efforts of `rnea` with v = a = 0.
 ///
-/// q: nq numbers.
+/// q: position, nq numbers.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> g = condyle.gravity(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -135,7 +136,7 @@ batch b: any(q: Position) -> One { b.gravity(model, q) }
 /// Computes the efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N);
 /// O(n).
 ///
-/// q: nq numbers; f_ext: as for `rnea`. The result equals `rnea` with v = a = 0.
+/// q: position, nq numbers; f_ext: as for `rnea`. The result equals `rnea` with v = a = 0.
 fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::terms::static_torque(model, data, &q, &f_ext)
 }
@@ -143,7 +144,7 @@ batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque(model, q, f_ex
 
 /// Computes the Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 ///
-/// q: nq numbers; v: nv.
+/// q: position, nq numbers; v: velocity, nv numbers.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
@@ -158,8 +159,9 @@ batch b: any(q: Position, v: Tangent) -> One { b.coriolis_matrix(model, q, v) }
 /// Computes the exact derivatives of `rnea` with respect to q, v and a in O(n depth), as `RneaDerivatives(dtau_dq,
 /// dtau_dv, dtau_da)`, each (nv, nv).
 ///
-/// q: nq numbers; v, a: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent space:
-/// the change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: as for `rnea`, constant in the
+/// bodies' frames. ∂τ/∂q is taken in the tangent space, as the derivative of τ at `integrate(q, δ)` with respect to δ,
+/// at δ = 0. out: three arrays, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
@@ -175,8 +177,9 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaD
 /// Computes the acceleration of `aba` and its exact derivatives with respect to q, v and τ, as `AbaDerivatives(a,
 /// da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent
-/// space: the change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+/// q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`, constant in the
+/// bodies' frames. ∂q̈/∂q is taken in the tangent space, as the derivative of q̈ at `integrate(q, δ)` with respect to
+/// δ, at δ = 0. out: four arrays, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data = condyle.Data(arm)

@@ -1,9 +1,9 @@
 //! Calls for many states: arguments and results have one more axis, along which the states are stored.
 //!
 //! An argument without this axis is shared by all states. Functions that the library computes in SIMD lanes release the
-//! interpreter's lock. They compute groups of states, each for some milliseconds, and write directly to the returned
-//! arrays. Functions without `Data` are computed state by state, also without the lock. All other functions are called
-//! once for each state. Signals are checked between groups and between states.
+//! interpreter's lock. These functions compute groups of states, which take some milliseconds each, and write directly
+//! to the returned arrays. Functions without `Data` are computed state by state, also without the lock. All other
+//! functions are called once for each state. Signals are checked between groups and between states.
 
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
@@ -18,13 +18,13 @@ use pyo3::types::{PyDict, PyString, PyTuple, PyType};
 use std::iter;
 use std::ops::{Deref, Range};
 
-/// Properties of an argument that a call needs before it reads the argument.
+/// Properties of an argument that are determined before the argument's numbers are read.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Look {
     /// Whether the argument contains hyper-dual numbers.
     pub(crate) dual: bool,
-    /// Number of states for which the argument is given. `None` if it is given for a single state, or does not depend
-    /// on the state.
+    /// Number of states for which the argument is given. `None` if the argument is given for a single state, or does
+    /// not depend on the state.
     pub(crate) states: Option<usize>,
 }
 
@@ -75,7 +75,7 @@ pub(crate) fn agreed(arguments: &[(&str, Look)]) -> PyResult<Option<usize>> {
     }
 }
 
-/// Returns the part of an argument that belongs to one state; arguments without an axis for states are returned whole.
+/// Returns the numbers of an argument for one state. An argument without an axis for states is returned unchanged.
 pub(crate) fn at<'py>(given: &Bound<'py, PyAny>, axes: usize, state: Option<usize>) -> PyResult<Bound<'py, PyAny>> {
     match state {
         Some(k) if states(given, axes)?.is_some() => given.get_item(k),
@@ -142,7 +142,7 @@ pub(crate) fn stack<'py>(
 pub(crate) enum Rows<'py> {
     /// The numbers in the caller's array, without a copy.
     Array(Input<'py, Ix2>),
-    /// A copy, because results may be written over the argument.
+    /// A copy of the caller's numbers, because results may be written over the argument.
     Copy(Vec<f64>),
 }
 
@@ -156,12 +156,12 @@ impl Deref for Rows<'_> {
     }
 }
 
-/// The form in which a function computed in SIMD lanes returns its results.
+/// The Python type of the results of a function that is computed in SIMD lanes.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
-    /// One array.
+    /// A single array.
     One,
-    /// Derivatives of an acceleration with respect to q and v.
+    /// The derivatives of an acceleration with respect to q and v, as two arrays.
     Pair,
     /// A named tuple of this class.
     Named(&'static str),
@@ -170,7 +170,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Makes the function's result from its arrays.
+    /// Combines the computed arrays into the object that the Python function returns.
     fn assembled<'py>(self, py: Python<'py>, mut arrays: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         match self {
             Self::One => Ok(arrays.remove(0)),
@@ -184,7 +184,8 @@ impl Kind {
         }
     }
 
-    /// Returns the arrays in `out` in which the caller wants the results, if `out` is given.
+    /// Returns the caller's arrays in `out`, to which the results are written. Without `out`, the caller gives no
+    /// arrays.
     fn places<'py>(self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
         match self {
             Self::One => Ok(vec![out.cloned()]),
@@ -209,15 +210,15 @@ fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
 /// Maximum number of states that each thread computes between two checks for signals.
 pub(crate) const MOST_STATES: usize = 2048;
 
-/// Returns the number of states that a thread computes as one part, if the results have `numbers` numbers per state. A
-/// part takes up to a millisecond, so the third of a microsecond to start it is negligible. A part fills at least two
-/// registers.
+/// Returns the number of states in a part, which is the unit of work of a thread. `numbers` is the size of the results
+/// per state. A part takes up to a millisecond. So the third of a microsecond that its start takes is negligible. A
+/// part fills at least two SIMD registers.
 fn part_size(numbers: usize) -> usize {
     const NUMBERS: usize = 1 << 18;
     (NUMBERS / numbers.max(1)).next_multiple_of(16).clamp(16, MOST_STATES)
 }
 
-/// Returns an argument's numbers for the states in the range `some`.
+/// Returns an argument's numbers for the states with indices in the range `some`.
 pub(crate) fn part<'a, T>(of: &'a [T], some: &Range<usize>, states: usize) -> &'a [T] {
     let each = of.len() / states;
     &of[some.start * each..some.end * each]
@@ -233,7 +234,7 @@ pub(crate) fn run<'py>(
     out: Option<&Bound<'py, PyAny>>,
     mut compute: impl FnMut(&mut BatchWriter<'_, '_, f64>, Range<usize>) + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
-    compute(&mut batch.writer(&mut []), 0..0); // a call without states, which only finds the shapes of the results
+    compute(&mut batch.writer(&mut []), 0..0); // a call without states finds the shapes of the results
     let shapes: Vec<Vec<usize>> = batch.last_shapes().map(<[_]>::to_vec).collect();
     let mut given = kind.places(py, out)?.into_iter().chain(iter::repeat(None));
     let sizes: Vec<usize> = shapes.iter().map(|shape| shape.iter().product()).collect();

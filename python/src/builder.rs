@@ -19,19 +19,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct BodyId {
     inner: condyle::tree::BodyId,
-    /// Number of the builder that made the body; `None` for the world.
+    /// Identifying number of the builder that made the body; `None` for the world.
     builder: Option<u64>,
 }
 
 #[pymethods]
 impl BodyId {
-    /// Returns `condyle.WORLD` for the world, and the same text for all other bodies.
+    /// Returns `condyle.WORLD` for the world, and `<condyle.BodyId>` for every other body.
     fn __repr__(&self) -> &'static str {
         if self.builder.is_none() { "condyle.WORLD" } else { "<condyle.BodyId>" }
     }
 }
 
-/// Returns the world, which is the parent of the first joints.
+/// Returns the identity of the world, which is the parent of root joints.
 pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
     static WORLD: PyOnceLock<Py<BodyId>> = PyOnceLock::new();
     WORLD.get_or_try_init(py, || Py::new(py, BodyId { inner: condyle::WORLD, builder: None }))
@@ -40,9 +40,9 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 /// A builder that makes a `Model` body by body, parents first.
 ///
 /// Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass.
-/// Pinocchio's composite, universal and spherical ZYX joints are a `chain` of bodies here. The chain has the same q and
-/// v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext include these
-/// bodies.
+/// A builder makes Pinocchio's composite, universal and spherical ZYX joints as a `chain` of bodies. The chain has the
+/// same q and v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext
+/// include these bodies.
 ///
 /// name: the name of the robot.
 ///
@@ -61,7 +61,7 @@ pub(crate) struct ModelBuilder {
     /// The library's builder; `None` once the model is built.
     inner: Option<condyle::ModelBuilder>,
     name: String,
-    /// A number that differs from the numbers of all other builders.
+    /// Identifying number of this builder; no other builder has the same number.
     number: u64,
 }
 
@@ -150,11 +150,11 @@ impl ModelBuilder {
     }
 
     /// Adds a body at the end of a chain of joints: a composite joint. The placement of each joint is relative to the
-    /// frame of the joint before.
+    /// frame of the previous joint.
     ///
     /// The coordinates of the joints follow one another in q and v. Bodies without mass, named `name#1`, `name#2`, and
-    /// so on, connect the joints. Returns the last body, which has `inertia`. A universal joint about unit vectors a
-    /// and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+    /// so on, connect the joints. Returns the last body, to which `inertia` belongs. A universal joint about unit
+    /// vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
     ///
     /// joints: a list of (joint, placement).
     #[pyo3(signature = (name, parent, joints, inertia=None))]
@@ -178,8 +178,8 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y, then by q₂ about the new x; v
-    /// = q̇.
+    /// Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y axis, then by q₂ about the new
+    /// x axis; v = q̇.
     ///
     /// M is singular where q₁ = ±π/2. `Joint.spherical` has no singular position.
     #[pyo3(signature = (name, parent, placement=None, inertia=None))]
@@ -231,8 +231,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Makes a joint follow another one: the follower's position is ratio q + offset, where q is the leader's position.
-    /// The follower has no coordinate in q.
+    /// Makes a joint follow another joint: the follower's position is ratio q + offset, where q is the leader's
+    /// position. The follower has no coordinate in q.
     ///
     /// follower, leader: the bodies that the joints carry.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
@@ -248,8 +248,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a whole robot. The pose of its world in the frame of `parent` is `placement`. `prefix` is added before all
-    /// its names.
+    /// Adds all bodies of another robot. The other robot's world has the pose `placement` in the frame of `parent`.
+    /// `prefix` is added before all names of the other robot.
     ///
     /// >>> from condyle import ModelBuilder, WORLD
     /// >>> two = ModelBuilder("two arms")
@@ -303,7 +303,7 @@ impl ModelBuilder {
     }
 
     /// Supports a fraction of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
-    /// mass. If the inertia of the body changes later, the force changes with it.
+    /// mass. If the inertia of the body changes later, the force changes with the inertia.
     ///
     /// ratio: the supported fraction of the weight; 1 supports the whole weight.
     /// part: None for the whole body, or the inertia of the part of the body to which `ratio` applies. The inertia of
@@ -328,7 +328,7 @@ impl ModelBuilder {
     }
 
     /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. Limits, armature and
-    /// damping belong to the joints; an actuator does not change them.
+    /// damping belong to the joints; an actuator does not change these values.
     ///
     /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
     /// tendon: the tendon's name, if the actuator drives a tendon.
@@ -386,8 +386,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Builds the model: checks all data and numbers the bodies depth first, and siblings in the order of the calls
-    /// that added them. The builder cannot be used afterwards.
+    /// Builds the model, and checks all data. The bodies are numbered depth first, and siblings in the order of the
+    /// calls that added them. The builder cannot be used afterwards.
     ///
     /// Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
     /// joint with an invalid leader.

@@ -1,10 +1,11 @@
-//! Attributes of a model as Python objects, made on first access and then kept, since a model never changes.
+//! Attributes of a model as Python objects. The objects are made on first access and then kept, since a model never
+//! changes.
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyList, PyTuple};
 
-/// Attributes of a model whose Python objects are made once.
+/// An attribute of a model whose Python object is made once, on first access.
 #[derive(Clone, Copy)]
 pub(crate) enum Attribute {
     Names,
@@ -33,7 +34,7 @@ pub(crate) enum Attribute {
     Frames,
 }
 
-/// The Python objects of the attributes that were accessed so far.
+/// The Python objects of a model's attributes; an object is empty until the first access to its attribute.
 pub(crate) struct Cached([PyOnceLock<Py<PyAny>>; Attribute::Frames as usize + 1]);
 
 impl Cached {
@@ -41,7 +42,7 @@ impl Cached {
         Self([const { PyOnceLock::new() }; _])
     }
 
-    /// Returns an immutable value, made on first access.
+    /// Returns the immutable value of an attribute. `make` creates the value on first access.
     pub(crate) fn value<'py>(
         &self,
         py: Python<'py>,
@@ -52,7 +53,8 @@ impl Cached {
         Ok(value.bind(py).clone())
     }
 
-    /// Returns a new list, which the caller may change, of items made on first access.
+    /// Returns a new list with the items of an attribute; the caller may change the list. `make` creates the items on
+    /// first access.
     pub(crate) fn list<'py, T>(
         &self,
         py: Python<'py>,

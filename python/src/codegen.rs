@@ -1,5 +1,5 @@
-//! Robots as straight-line code, for `condyle.codegen`: the text of the code, and arguments and results of its
-//! functions.
+//! Robots as straight-line code, for `condyle.codegen`: the text of the code, and arguments and results of the
+//! generated functions.
 
 use crate::constrained::constraint;
 use crate::exceptions::{exception, wrong_word};
@@ -21,8 +21,8 @@ fn arrays(arrays: &[Array]) -> Arrays {
     arrays.iter().map(|a| (a.name.clone(), a.rows, a.columns)).collect()
 }
 
-/// Generates the code of functions of a robot; returns its name, its files, and its functions with their arguments and
-/// results.
+/// Generates the code of functions of a robot. Returns the name of the code, the files, and the functions with their
+/// arguments and results.
 #[pyfunction]
 #[pyo3(
     name = "_generate",

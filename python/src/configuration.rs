@@ -40,7 +40,7 @@ fn neutral(model;) {
 
 /// Computes the position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 ///
-/// q: nq numbers; v: nv.
+/// q: position, nq numbers; v: tangent vector, nv numbers.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q0 = condyle.neutral(quadruped)
@@ -52,9 +52,10 @@ fn integrate(model; q: Position, v: Tangent; out) {
 }
 each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved); }
 
-/// Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations it is the shortest such vector.
+/// Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations, v is the shortest vector with
+/// this property.
 ///
-/// q0, q1: nq numbers.
+/// q0, q1: positions, nq numbers each.
 fn difference(model; q0: Position, q1: Position; out) {
     Computed::new([model.nv()], |v| condyle::difference(model, &q0, &q1, v))
 }
@@ -62,7 +63,7 @@ each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1
 
 /// Computes the position q₀ ⊕ t (q₁ ⊖ q₀) on the path from q₀ (t = 0) to q₁ (t = 1) at constant velocity, nq numbers.
 ///
-/// q0, q1: nq numbers; t: a number, which may be below 0 or above 1.
+/// q0, q1: positions, nq numbers each; t: a number, which may be below 0 or above 1.
 ///
 /// >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
 /// array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
@@ -77,7 +78,7 @@ each(q0: Position, q1: Position; t: Real) -> [nq] |q| {
 
 /// Computes the distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) have equal weight.
 ///
-/// q0, q1: nq numbers.
+/// q0, q1: positions, nq numbers each.
 fn distance(model; q0: Position, q1: Position) {
     condyle::configuration::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
 }
@@ -85,10 +86,10 @@ each(q0: Position, q1: Position) -> [] |to| {
     to[0] = condyle::configuration::distance(model, q0, q1, &mut vec![0.0; model.nv()])
 }
 
-/// Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument
-/// itself does not change unless it is `out`.
+/// Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument q
+/// does not change unless q is also `out`.
 ///
-/// q: nq numbers.
+/// q: position, nq numbers.
 ///
 /// Raises `ModelError` for a quaternion or a pair whose length is 0 or not finite.
 ///
@@ -109,8 +110,8 @@ each(q: Scalable) -> [nq] |to| {
 
 /// Transports the columns of X, which are tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 ///
-/// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
-/// equals `transport` with −v.
+/// v: tangent vector, nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies X by ∂(q ⊕ v)/∂q
+/// instead. Its result equals `transport` with −v.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> v = np.full(18, 0.1)
@@ -123,10 +124,10 @@ fn transport(model; v: Tangent, X: Tangents; out) {
     moved
 }
 
-/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not
-/// depend on q.
+/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. The Jacobian does
+/// not depend on q.
 ///
-/// v: nv numbers; argument: 'position' for q or 'velocity' for v.
+/// v: tangent vector, nv numbers; argument: 'position' for q or 'velocity' for v.
 fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
     let argument = match argument {
         "position" => IntegrateArgument::Position,
@@ -138,8 +139,8 @@ fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
     J
 }
 
-/// Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. It depends
-/// only on the difference of the positions.
+/// Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. The
+/// Jacobian depends only on the difference of the positions.
 ///
 /// d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
 fn difference_jacobian(model; d: Tangent, argument: Word; out) {

@@ -68,7 +68,7 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
 pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult<Bound<'py, PyDict>> {
     let constraints = PyDict::new(py);
     let joint = |body: usize| &*model.bodies()[body].joint_name;
-    // give the frame's index instead of its name if another frame has the same name
+    // a frame is given by its index, not its name, if another frame has the same name
     let frame = |index: usize| -> PyResult<Bound<'py, PyAny>> {
         let name = &*model.frames()[index].name;
         if model.frame(name) == Ok(index) { name.into_bound_py_any(py) } else { index.into_bound_py_any(py) }
@@ -116,13 +116,14 @@ fn aim(
 /// Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
 /// set.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. In the first iteration λ' is 0, in each later one it is
-/// the previous λ. Redundant constraints then share the forces so that the forces are smallest. Choose μ small compared
-/// with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
-/// Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
+/// With μ > 0 the forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', where b is the right-hand side without regularisation.
+/// In the first iteration λ' is 0; in each later iteration λ' is the previous λ. Redundant constraints then share the
+/// forces, with the smallest norm of λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration
+/// is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
+/// sparse resolution of constrained dynamic equations (2021).
 ///
 /// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
-/// to 10000; none of them is skipped.
+/// to 10000; all of them are computed.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
 /// the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is
@@ -136,9 +137,10 @@ fn aim(
 #[pyclass(module = "condyle")]
 pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
-    /// The set for hyper-dual numbers, made when it is first needed after a change of the targets.
+    /// The set of constraints for hyper-dual numbers. The set is made on first use, and again on first use after a
+    /// change of the targets.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
-    /// The constraints for many states in SIMD lanes, made when they are first needed.
+    /// The constraints for many states in SIMD lanes, made on first use.
     lanes: Option<Box<condyle::batch::BatchConstraints>>,
     /// The constraints with their current targets.
     constraints: Vec<ContactConstraint>,
@@ -160,7 +162,8 @@ impl ConstraintSet {
         Ok(Self { inner, dual: None, lanes: None, constraints, nv: robot.nv(), made_for, robot })
     }
 
-    /// Returns the same constraints for many states, as scratch memory that fits the batch.
+    /// Returns the scratch memory of these constraints for many states in SIMD lanes. The memory has the size of the
+    /// batch.
     pub(crate) fn side_by_side(
         &mut self,
         batch: &condyle::Batch,
@@ -222,7 +225,7 @@ impl ConstraintSet {
         Self::make(model, constraints, ProximalSettings { mu, iterations })
     }
 
-    /// Returns the parts of a pickle: the robot, and the constraints with their current targets.
+    /// Returns the function and the arguments from which `pickle` makes an equal set. The current targets are included.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.borrow();
         let ProximalSettings { mu, iterations } = this.inner.proximal;
@@ -262,8 +265,8 @@ impl ConstraintSet {
         Ok(PySlice::new(py, range.start as isize, range.end as isize, 1))
     }
 
-    /// Changes the target of constraint k: placement, velocity and acceleration of its frame. Members that are not
-    /// given do not change.
+    /// Changes the target of constraint k: placement, velocity and acceleration of the constraint's frame. Members that
+    /// are not given do not change.
     ///
     /// Raises `ModelError` for numbers that are not finite and for an invalid placement; then the old target is kept.
     #[pyo3(signature = (k, placement=None, velocity=None, acceleration=None))]
@@ -299,9 +302,9 @@ functions! {
 /// Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
 /// dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. If constraints contradict each
-/// other, or a constraint cannot be satisfied at a singular posture, the results are finite and `residual` is above
-/// zero.
+/// constraints: a `ConstraintSet`; q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as
+/// for `rnea`. If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the
+/// results are finite and `residual` is above zero.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -322,8 +325,9 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 /// Computes the result of `constrained_dynamics` and its exact derivatives with respect to q, v and τ, as
 /// `ConstrainedDerivatives`.
 ///
-/// constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces
-/// move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
+/// constraints: a `ConstraintSet`, whose targets are fixed; q: position, nq numbers; v, tau: velocity and efforts, nv
+/// numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space. out: one
+/// array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -345,9 +349,9 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
 /// `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
-/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`;
-/// the forces move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an
-/// earlier result.
+/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position, nq numbers; v, tau: velocity and
+/// efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space.
+/// out: one array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -366,8 +370,8 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 /// Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
 /// lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q: nq
-/// numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+/// constraints: a `ConstraintSet`, whose gains and targets of velocity and acceleration are ignored; q: position, nq
+/// numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])

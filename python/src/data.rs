@@ -13,9 +13,9 @@ use std::sync::Arc;
 
 /// Scratch memory of the algorithms for one model: made once, and used by one thread at a time.
 ///
-/// It can be used with all models that have the same bodies and joints, even with other gravity, armature or inertias.
-/// No algorithm reads results of an earlier call, so the order of calls does not matter. Use from two threads at once
-/// is a `RuntimeError`; use with another robot's model is a `ValueError`.
+/// A `Data` can be used with all models that have the same bodies and joints. Gravity, armature and inertias may
+/// differ. No algorithm reads results of an earlier call, so the order of calls does not matter. Use from two threads
+/// at once is a `RuntimeError`; use with another robot's model is a `ValueError`.
 ///
 /// model: the robot; threads: the number of threads for calls with many states (q of shape (N, nq)), at most 1024. Such
 /// calls also compute several states at once in SIMD lanes, and release the interpreter's lock.
@@ -30,9 +30,9 @@ pub(crate) struct Data {
     /// The model for which this `Data` was made.
     robot: Arc<condyle::Model>,
     threads: usize,
-    /// The scratch for hyper-dual numbers, made when it is first needed.
+    /// The scratch memory for hyper-dual numbers, made on first use.
     dual: Option<Box<condyle::Data<Hyper>>>,
-    /// The scratch for many states, large enough for all calls so far.
+    /// The scratch memory for many states, large enough for all calls so far.
     batch: Option<Box<condyle::Batch>>,
 }
 
@@ -47,7 +47,7 @@ impl Data {
         Ok(Self { inner, made_for, robot: model.inner.clone(), threads, dual: None, batch: None })
     }
 
-    /// Returns the parts of a pickle, which make a new, equivalent `Data` for the same model.
+    /// Returns the class and the arguments from which `pickle` makes an equivalent `Data` for the same model.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.borrow();
         let model = Model::from((*this.robot).clone());
@@ -91,9 +91,9 @@ impl Holds<Hyper> for Data {
     }
 }
 
-/// A scratch argument: made for one model, and used by one call at a time.
+/// An argument that is scratch memory, made for one model and used by one call at a time.
 pub(crate) trait Scratch: PyClass<Frozen = False> {
-    /// Name of the argument.
+    /// Name of the argument, for error messages.
     const ARGUMENT: &'static str;
     /// Returns the models with which this object may be used.
     fn made_for(&self) -> &MadeFor;
@@ -103,12 +103,12 @@ pub(crate) trait Scratch: PyClass<Frozen = False> {
 pub(crate) trait Holds<S>: Scratch {
     /// The library's type for this scratch memory.
     type Held;
-    /// Returns the library's scratch memory, made now if it does not exist yet.
+    /// Returns the library's scratch memory for this type of number. Creates the memory if it does not exist yet.
     fn held(&mut self, model: &condyle::Model) -> PyResult<&mut Self::Held>;
 }
 
-/// Borrows scratch memory for a call. Raises an error if another call uses the memory, or if it belongs to another
-/// robot.
+/// Borrows scratch memory for a call. Raises an error if another call uses the memory, or if the memory belongs to
+/// another robot.
 pub(crate) fn take<'py, T: Scratch>(model: &Model, scratch: &Bound<'py, T>) -> PyResult<PyRefMut<'py, T>> {
     let scratch = scratch.try_borrow_mut().map_err(|_| {
         let (argument, class) = (T::ARGUMENT, T::NAME);

@@ -36,10 +36,11 @@ functions! {
 /// Computes the derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers other than q, v and a; exact, at
 /// most O(n) per column.
 ///
-/// q: nq numbers; v, a: nv; wrt: the input; f_ext: as for `rnea`. Values of wrt: 'gravity', the acceleration of free
-/// fall, 3 numbers; 'armature', nv numbers; 'damping', nv numbers, as if `passive_torque` were added to τ; ('force',
-/// body), the external force on a body in the body's frame, 6 numbers; ('inertia', body), the 10 inertial parameters of
-/// a body; or ('friction', smoothing), nv numbers, with the smoothing of `passive_torque`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; wrt: the input; f_ext: as for `rnea`.
+/// Values of wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', nv numbers; 'damping', nv numbers,
+/// as if `passive_torque` were added to τ; ('force', body), the external force on a body in the body's frame, 6
+/// numbers; ('inertia', body), the 10 inertial parameters of a body; or ('friction', smoothing), nv numbers, with the
+/// smoothing of `passive_torque`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
@@ -58,7 +59,8 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces; wrt: InputOf) -
 /// Computes the derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers other than q, v and τ; exact, at
 /// most O(n²) per column.
 ///
-/// q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
+/// q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; wrt: as for `rnea_input_derivative`; f_ext:
+/// as for `rnea`.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
@@ -78,9 +80,10 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; wrt: Inpu
 /// Computes the exact Hessian of λᵀ τ(q, v, a), with τ of `rnea`, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv,
 /// dadq)`, each (nv, nv); the other blocks are zero.
 ///
-/// q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is the
-/// derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. Derivatives with respect
-/// to q are derivatives with respect to δ at `integrate(q, δ)`.
+/// q: position, nq numbers; v, a, lambda_: velocity, acceleration and λ, nv numbers each; f_ext: as for `rnea`,
+/// constant in the bodies' frames. Entry [j, k] of dvdq is the derivative with respect to v_j and q_k, entry [j, k] of
+/// dadq with respect to a_j and q_k. Derivatives with respect to q are derivatives with respect to δ at `integrate(q,
+/// δ)`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -97,9 +100,9 @@ batch b: any(q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Force
 /// Computes the exact Hessian of λᵀ q̈(q, v, τ), with q̈ of `aba`, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv,
 /// nv); the other blocks are zero.
 ///
-/// q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is
-/// the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. Derivatives with
-/// respect to q are derivatives with respect to δ at `integrate(q, δ)`.
+/// q: position, nq numbers; v, tau, lambda_: velocity, efforts and λ, nv numbers each; f_ext: as for `rnea`, constant
+/// in the bodies' frames. Entry [j, k] of dvdq is the derivative with respect to v_j and q_k, entry [j, k] of dtaudq
+/// with respect to τ_j and q_k. Derivatives with respect to q are derivatives with respect to δ at `integrate(q, δ)`.
 fn aba_hessian(model, data; q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
     condyle::derivatives::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
@@ -111,8 +114,9 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext:
 /// Computes the exact second derivatives of `rnea` as full tensors in O(n² depth), as `RneaSecondDerivatives(dqdq,
 /// dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 ///
-/// q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. If the product of
-/// the tensors with a vector is enough, `rnea_hessian` is many times faster.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: as for `rnea`. Each Hessian has
+/// the index order of `rnea_hessian`. If the product of the tensors with a vector is enough, `rnea_hessian` is many
+/// times faster.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
@@ -134,7 +138,8 @@ motions! {
 /// Computes the derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. The derivative with respect to v is
 /// the frame's Jacobian.
 ///
-/// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: as for
+/// `frame_jacobian`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
@@ -145,26 +150,29 @@ fn frame_velocity_derivative(frame: FrameOf) after forward_velocities(q: Positio
 /// Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). The
 /// derivative with respect to the joint accelerations is the frame's Jacobian.
 ///
-/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+/// reference: as for `frame_jacobian`.
 fn frame_acceleration_derivatives(frame: FrameOf)
     after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 
 /// Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). The
 /// derivative with respect to the joint accelerations is the frame's Jacobian.
 ///
-/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+/// reference: as for `frame_jacobian`.
 fn frame_classical_acceleration_derivatives(frame: FrameOf)
     after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 
 /// Computes the derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of the body's own frame.
 ///
-/// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_velocity_derivative(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq) -> One;
 
 /// Computes the derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
 /// `frame_acceleration_derivatives` of the body's own frame.
 ///
-/// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; body: as for `body_jacobian`; reference:
+/// as for `frame_jacobian`.
 fn body_acceleration_derivatives(body: BodyOf)
     after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 }
@@ -173,7 +181,7 @@ functions! {
 /// Computes the exact derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and
 /// a in O(n), as `CentroidalDerivatives`.
 ///
-/// q: nq numbers; v, a: nv. The accelerations do not include gravity.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each. The accelerations do not include gravity.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
@@ -190,16 +198,16 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> Named("CentroidalDerivative
 /// Computes the exact derivatives of kinetic energy T and potential energy V in O(n), as `EnergyDerivatives(dT_dq,
 /// dT_dv, dV_dq)`, nv numbers each.
 ///
-/// q: nq numbers; v: nv.
+/// q: position, nq numbers; v: velocity, nv numbers.
 fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
     condyle::derivatives::energy_derivatives(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> Named("EnergyDerivatives") { b.energy_derivatives(model, q, v) }
 
-/// Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces it is also
-/// the derivative of `gravity`.
+/// Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces, ∂τ/∂q is
+/// also the derivative of `gravity`.
 ///
-/// q: nq numbers; f_ext: as for `rnea`; the forces move with the bodies.
+/// q: position, nq numbers; f_ext: as for `rnea`, constant in the bodies' frames.
 fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::derivatives::static_torque_derivative(model, data, &q, &f_ext)
 }
@@ -208,7 +216,7 @@ batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque_derivative(mod
 /// Computes the exact derivatives of C(q, v) v, the Coriolis and centrifugal efforts, in O(n depth), as
 /// `CoriolisDerivatives(dq, dv)`, each (nv, nv).
 ///
-/// q: nq numbers; v: nv.
+/// q: position, nq numbers; v: velocity, nv numbers.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7

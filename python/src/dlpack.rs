@@ -48,8 +48,8 @@ const VERSIONED: &CStr = c"dltensor_versioned";
 /// (kind of device, device index), flags.
 type Description = (usize, (u8, u8, u16), Vec<i64>, Option<Vec<i64>>, (i32, i32), u64);
 
-/// Describes the array that a DLPack capsule lends. The caller keeps the capsule as long as it uses the array;
-/// ownership is not taken.
+/// Describes the array that a DLPack capsule lends. The caller must keep the capsule alive while it uses the array.
+/// This function does not take ownership of the array.
 #[pyfunction]
 #[pyo3(name = "_borrowed")]
 pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
@@ -69,7 +69,8 @@ pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
             return Err(PyTypeError::new_err("DLPack: expected a capsule that nobody has taken over"));
         }
     };
-    // SAFETY: the capsule's name determines its structure. It has `ndim` sizes and as many strides, or null strides.
+    // SAFETY: the capsule's name determines its structure. The structure has `ndim` sizes and as many strides, or null
+    // strides.
     unsafe {
         let tensor = &*tensor;
         let numbers = |from: *mut i64| match usize::try_from(tensor.ndim) {
@@ -92,13 +93,13 @@ struct Lent<M> {
 /// Takes back a lent array.
 ///
 /// # Safety
-/// `context` comes from a `Box<Lent<M>>`, and the caller does not use it afterwards.
+/// `context` comes from a `Box<Lent<M>>`, and the caller does not use `context` afterwards.
 unsafe fn take_back<M>(context: *mut c_void) {
     // SAFETY: the caller promises that `context` comes from a `Box<Lent<M>>`.
     let mut lent = unsafe { Box::from_raw(context.cast::<Lent<M>>()) };
     let mut owner = lent.owner.take();
     if Python::try_attach(|_| drop(owner.take())).is_none() {
-        core::mem::forget(owner); // the interpreter has ended
+        core::mem::forget(owner); // the interpreter has ended, so the owner cannot be released
     }
 }
 
@@ -108,12 +109,12 @@ unsafe extern "C" fn delete_plain(managed: *mut Managed) {
 }
 
 unsafe extern "C" fn delete_versioned(managed: *mut Versioned) {
-    // SAFETY: as above.
+    // SAFETY: the borrower calls this function once.
     unsafe { take_back::<Versioned>((*managed).context) }
 }
 
 /// Destroys a capsule. A library that takes over the array renames the capsule. If the name is unchanged, no library
-/// did so, and the lent array is taken back.
+/// took over the array, and the array is taken back.
 unsafe extern "C" fn end(capsule: *mut ffi::PyObject) {
     // SAFETY: capsules with this destructor and an unchanged name hold the structure that `lend` stored.
     unsafe {
@@ -147,16 +148,16 @@ pub(crate) fn lend(
     let (managed, name): (*mut c_void, _) = if versioned {
         let managed = Versioned { version: VERSION, context, deleter: Some(delete_versioned), flags: 0, tensor };
         let lent = Box::into_raw(Box::new(Lent { managed, _numbers, owner }));
-        // SAFETY: the pointer comes from the box above.
+        // SAFETY: the pointer comes from `Box::into_raw`, and no other code uses it yet.
         unsafe { (*lent).managed.context = lent.cast() };
-        // SAFETY: as above.
+        // SAFETY: the pointer comes from `Box::into_raw`.
         (unsafe { &raw mut (*lent).managed }.cast(), VERSIONED)
     } else {
         let managed = Managed { tensor, context, deleter: Some(delete_plain) };
         let lent = Box::into_raw(Box::new(Lent { managed, _numbers, owner }));
-        // SAFETY: as above.
+        // SAFETY: the pointer comes from `Box::into_raw`, and no other code uses it yet.
         unsafe { (*lent).managed.context = lent.cast() };
-        // SAFETY: as above.
+        // SAFETY: the pointer comes from `Box::into_raw`.
         (unsafe { &raw mut (*lent).managed }.cast(), PLAIN)
     };
     // SAFETY: the name is a constant; `end` takes back the lent array.

@@ -57,7 +57,7 @@ pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
 }
 
-/// Returns the value of an integer argument if it is between `least` and `most`; otherwise an error.
+/// Returns an integer argument if its value is between `least` and `most`; otherwise an error.
 pub(crate) fn within(name: &str, found: usize, least: usize, most: usize) -> PyResult<usize> {
     if found < least {
         return Err(PyValueError::new_err(format!("{name}: expected at least {least}, found {found}")));

@@ -11,8 +11,8 @@ use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 
-/// Defines a class for a factor of a matrix. Both kinds of factor get the same methods, besides a constructor and
-/// methods that only one of them has.
+/// Defines the class of a factor of a matrix. The macro writes the methods that all such classes have. The constructor
+/// and the methods of only one class are arguments of the macro.
 macro_rules! factor {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -20,7 +20,7 @@ macro_rules! factor {
         pub(crate) struct $class {
             inner: condyle::dynamics::$class<f64>,
             size: usize,
-            /// Whether `factorize` was called.
+            /// Whether `factorize` has computed the factor.
             done: bool,
         }
 
@@ -43,8 +43,9 @@ macro_rules! factor {
             /// Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
             /// cost.
             ///
-            /// M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
-            /// signal handler, such as KeyboardInterrupt, stops the computation between rows. Then no factor exists.
+            /// M is not checked: if M is not positive definite, solutions are wrong or not finite. An exception of a
+            /// signal handler, such as KeyboardInterrupt, stops the computation between rows. After that no factor is
+            /// available.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
                 let (py, M) = (M.py(), matrix("M", M, [self.size, self.size])?.to_matrix());
                 self.done = false;
@@ -169,9 +170,9 @@ Ltdl {
 factor! {
 /// The factor M = L Lᵀ of any symmetric positive definite matrix.
 ///
-/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`: it has the same
-/// methods, and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm
-/// 4.2.1.
+/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`, which has the
+/// same methods and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition),
+/// algorithm 4.2.1.
 ///
 /// n: the number of rows of M, at most 4096.
 ///
@@ -197,11 +198,11 @@ Cholesky {
 /// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and scratch memory.
 ///
 /// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
-/// joining two pieces costs about six times as much as eliminating a body. With two threads and two runs, the algorithm
-/// is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with mimic joints,
-/// the passes run once with all joints free, and once more for each joint that shares a coordinate. The results are
-/// bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for
-/// parallel O(log(n)) calculation of rigid-body dynamics (1999).
+/// joining two parts of the robot costs about six times as much as eliminating a body. With two threads and two runs,
+/// the algorithm is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with
+/// mimic joints, the passes run once with all joints free, and once more for each joint that shares a coordinate. The
+/// results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
+/// algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 ///
 /// model: the robot; grain: the maximum number of bodies in a run.
 ///
@@ -235,7 +236,7 @@ impl DivideConquer {
         format!("<condyle.DivideConquer of '{}': {} bodies in {} runs>", self.made_for.name, size.bodies, size.runs)
     }
 
-    /// The numbers of operations of the assembly, and the depth of its pieces, which run one after the other, as
+    /// The numbers of operations of the assembly, and the number of steps that must be computed one after the other, as
     /// `AssemblySize`.
     #[getter]
     fn size<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -247,7 +248,8 @@ impl DivideConquer {
     /// Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
     /// + grain) steps.
     ///
-    /// model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
+    /// model: the planned model, or another model with the same bodies and joints; q: position, nq numbers; v, tau:
+    /// velocity and efforts, nv numbers each;
     /// f_ext: as for `rnea`.
     #[pyo3(signature = (model, q, v, tau, f_ext=None, out=None))]
     fn aba<'py>(

@@ -12,9 +12,9 @@
 //! Each argument has a kind, which is a type below; the type defines how the argument is read. The last expression is
 //! the result for Python: an array or a tuple of arrays, or `out` if it is given. Scratch memory other than `data` is
 //! declared after `data`, with its type. The call borrows its scratch memory before it inspects any other argument, so
-//! that nested use of the same memory is an error. It reads all inputs before it writes to `out`, so `out` may be one
-//! of the inputs. Positions, tangent vectors and forces may be given for many states, with one more axis. The results
-//! then have this axis, too; see `batch.rs`. An example of a line `batch` is
+//! that nested use of the same memory is an error. The call reads all inputs before it writes to `out`, so `out` may be
+//! one of the inputs. Positions, tangent vectors and forces may be given for many states, with an additional first
+//! axis. The results then have this axis, too; see `batch.rs`. An example of a line `batch` is
 //!
 //! ```text
 //! batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
@@ -23,10 +23,11 @@
 //! This line defines the computation for many states. Its parts are a check of the robot (`any`), the arguments, the
 //! kind of result (`One`), and the call of the library's `Batch`. Arguments that all states share follow after a
 //! semicolon. `batch b, constraints` instead of `batch b` adds a set of constraints. A function without `Data` is
-//! called state by state. Instead of `batch`, its line begins with `each` and gives the shape of the result.
+//! called state by state. The line of such a function begins with `each` instead of `batch`, and gives the shape of the
+//! result.
 //!
-//! Each part of a declaration has its macro: `function!` the signature, `many!` a line `batch`, `each!` a line `each`,
-//! and `one!` the body. The code that does not depend on the declaration is in functions.
+//! Each part of a declaration has its own macro: `function!` for the signature, `many!` for a line `batch`, `each!` for
+//! a line `each`, and `one!` for the body. The code that does not depend on the declaration is in functions.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
@@ -42,16 +43,16 @@ use pyo3::prelude::*;
 use pyo3::types::{PyInt, PyString};
 use std::ops::Range;
 
-/// A kind of argument.
+/// A kind of argument, which defines how an argument is read from Python.
 pub(crate) trait Argument<'a, 'py> {
-    /// The value that Python passes.
+    /// Type of the value that Python passes.
     type Given;
-    /// The value that the library takes.
+    /// Type of the value that the library takes for one state.
     type Read<S: Number>;
-    /// The value that the library takes for many states.
+    /// Type of the value that the library takes for many states.
     type All;
-    /// Reads the argument without running Python code, if it has the simplest form for a single state: a double array
-    /// in C order, or a word. Returns `None` if the argument has another form or is invalid.
+    /// Reads the argument without running Python code, if the argument has the simplest form for a single state: a
+    /// double array in C order, or a word. Returns `None` if the argument has another form or is invalid.
     fn at_once(_given: &Self::Given, _model: &Model) -> Option<Self::Read<f64>> {
         None
     }
@@ -59,16 +60,16 @@ pub(crate) trait Argument<'a, 'py> {
     fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
     }
-    /// Reads the argument as numbers of any type: for a single state, or for state `state` if it is given for many
-    /// states.
+    /// Reads the argument as numbers of any type: for a single state, or for state `state` if the argument is given for
+    /// many states.
     fn read_at<S: Number>(
         name: &str,
         given: &Self::Given,
         model: &Model,
         state: Option<usize>,
     ) -> PyResult<Self::Read<S>>;
-    /// Finds the number of states of an argument, and whether it contains hyper-dual numbers, before any argument is
-    /// read.
+    /// Finds the number of states of an argument, and whether the argument contains hyper-dual numbers. The call does
+    /// this before it reads any argument.
     fn look(_name: &str, _given: &Self::Given, _model: &Model) -> PyResult<Look> {
         Ok(Look::default())
     }
@@ -83,7 +84,7 @@ pub(crate) trait Argument<'a, 'py> {
     ) -> PyResult<Self::All>;
 }
 
-/// An argument of a call, and its numbers if `at_once` could read it.
+/// An argument of a call, and its numbers if `Argument::at_once` could read the argument.
 pub(crate) struct Given<'a, 'py: 'a, K: Argument<'a, 'py>> {
     pub(crate) given: K::Given,
     read: Option<K::Read<f64>>,
@@ -105,7 +106,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
     /// Returns the argument's doubles for one of many states, or for the single state. `at_once` is true if
     /// `Argument::at_once` read all arguments of the call.
     #[inline(always)]
-    #[allow(clippy::extra_unused_type_parameters)] // has the type parameter of `duals`
+    #[allow(clippy::extra_unused_type_parameters)] // `duals` has the same type parameter
     pub(crate) fn numbers<S>(
         &mut self,
         name: &str,
@@ -119,7 +120,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
         }
     }
 
-    /// Returns the numbers as hyper-dual numbers.
+    /// Returns the argument's numbers as hyper-dual numbers.
     pub(crate) fn duals<S: Number>(
         &mut self,
         name: &str,
@@ -345,20 +346,20 @@ shared! {
         }
     } }
 
-    /// A number.
+    /// A real or hyper-dual number, the same for all states.
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
         dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
     /// A point: three numbers, the same for all states.
     Point<S>: &'a Bound<'py, PyAny> => condyle::Vec3<f64> { |name, given, _| crate::arrays::three(name, given) }
 
-    /// A number, the same for all states.
+    /// A real number, the same for all states.
     Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given), at once if |_| true }
 
     /// A positive speed.
     Speed<S>: f64 => f64 { |name, given, _| positive_speed(name, *given) }
 
-    /// A word, which the function itself interprets.
+    /// A word (`str`) whose meaning the function itself checks.
     Word<S>: &'a str => &'a str { |_, given, _| Ok(*given), at once if |_| true }
 }
 
@@ -395,8 +396,8 @@ pub(crate) fn regular(model: &Model) -> PyResult<()> {
     }
 }
 
-/// Returns whether an argument contains hyper-dual numbers, and the number of states if the arguments are given for
-/// many.
+/// Returns whether any argument contains hyper-dual numbers, and the number of states if arguments are given for many
+/// states.
 pub(crate) fn inspect(looks: &[(&str, Look)]) -> PyResult<(bool, Option<usize>)> {
     Ok((looks.iter().any(|(_, look)| look.dual), batch::agreed(looks)?))
 }
@@ -418,7 +419,8 @@ pub(crate) fn call_serially<'py>(
     batch::stack(py, results, out)
 }
 
-/// Declares functions; see above. It divides a declaration into its parts and leaves them to `function!`.
+/// Declares functions, with the syntax in the documentation of this module. The macro splits each declaration into its
+/// parts and passes them to `function!`.
 macro_rules! functions {
     ($(
         $(#[$doc:meta])*
@@ -435,8 +437,9 @@ macro_rules! functions {
     )*};
 }
 
-/// Declares one function of a model, of a `Data` if `data` follows it, and of other scratch memory after that. It
-/// borrows the scratch memory, inspects the arguments, and computes the results by one of the macros below.
+/// Declares one function. The first arguments are a model, a `Data` if the declaration contains `data`, and other
+/// scratch memory. The function borrows the scratch memory, inspects the other arguments, and computes the results by
+/// one of the macros below.
 macro_rules! function {
     (
         $(#[$doc:meta])* $name:ident
@@ -463,8 +466,8 @@ macro_rules! function {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            // Fast path: most calls have one state in arrays of doubles, which are read here. If one argument has
-            // another form, all arguments are inspected first.
+            // Fast path: most calls have one state in arrays of doubles, and these arrays are read by the lines below.
+            // If one argument has another form, all arguments are inspected first.
             $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
             let at_once = true $(&& $arg.is_read())*;
             let (dual, states) = if at_once { (false, None) } else {
@@ -475,7 +478,7 @@ macro_rules! function {
             };
             $crate::functions::many! { (py, $model, states, dual, out) [$($data)?] $($many)* }
             $crate::functions::each! { (py, $model, states, dual, out) $($each)* }
-            #[allow(unused_variables)] // by functions without a `Data` or without arguments
+            #[allow(unused_variables)] // unused in functions without a `Data` or without arguments
             let call = |state: Option<usize>, out: Option<&Bound<'py, PyAny>>| match dual {
                 false => $crate::functions::one! {
                     f64, numbers, (py, $model, state, out, at_once) [$($data $(, $scratch)?)?] ($($arg),*) $body
@@ -490,7 +493,7 @@ macro_rules! function {
     };
 }
 
-/// Reads the arguments of many states, and those that all states share.
+/// Reads the arguments that are given for many states, and the arguments that all states share.
 macro_rules! read_all {
     (
         ($model:ident, $states:ident, $out:ident)
@@ -503,7 +506,7 @@ macro_rules! read_all {
     };
 }
 
-/// Returns the results of many states, computed in lanes, if the function has a line `batch`.
+/// Returns the results of many states, computed in SIMD lanes, if the function's declaration has a line `batch`.
 macro_rules! many {
     ($call:tt $data:tt) => {};
     (
@@ -527,7 +530,7 @@ macro_rules! many {
     };
 }
 
-/// Returns the results of many states, computed one after the other, if the function has a line `each`.
+/// Returns the results of many states, computed one after the other, if the function's declaration has a line `each`.
 macro_rules! each {
     ($call:tt) => {};
     (
@@ -547,7 +550,8 @@ macro_rules! each {
     };
 }
 
-/// Computes one state with doubles or with hyper-dual numbers, `$S`; `$read` reads the arguments as such numbers.
+/// Computes one state with numbers of type `$S`: doubles or hyper-dual numbers. `$read` reads the arguments as numbers
+/// of this type.
 macro_rules! one {
     (
         $S:ty, $read:ident, ($py:ident, $model:ident, $state:ident, $out:ident, $at_once:ident)

@@ -10,8 +10,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// A hyper-dual number for the library's computations. Its operations are not inlined, because a model's functions
-/// contain thousands of operations. Most of the time is spent on creating and reading the Python objects.
+/// A hyper-dual number for the library's computations. Its operations are not inlined, because the library's functions
+/// contain thousands of operations and would become very long. Little speed is lost: most of the time is spent on
+/// creating and reading Python objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hyper(HyperDual64);
 
@@ -110,12 +111,12 @@ impl Scalar for Hyper {
     }
 }
 
-/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
-/// directions, and the mixed second derivative.
+/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. The number carries its derivatives in
+/// two directions, and the mixed second derivative.
 ///
-/// Store these numbers in NumPy arrays of objects. Arithmetic and NumPy's elementary functions accept such arrays. All
-/// functions of a model and a state accept them, too, and then return such arrays. Comparisons use `re`.
-/// `condyle.jacobian`, `gradient` and `hessian` create these numbers and read the derivatives.
+/// Store these numbers in NumPy arrays of objects. Arithmetic, NumPy's elementary functions, and all functions of a
+/// model and a state accept such arrays, and then return such arrays. Comparisons use `re`. `condyle.jacobian`,
+/// `gradient` and `hessian` create these numbers and read the derivatives.
 ///
 /// Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 ///
@@ -126,8 +127,8 @@ impl Scalar for Hyper {
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct HyperDual(HyperDual64);
 
-/// The other operand of an operation: a hyper-dual or real number. Arrays are not accepted, since NumPy handles their
-/// operations.
+/// The operand of an operation that is not `self`: a hyper-dual or real number. Arrays are not accepted, since NumPy
+/// handles operations with arrays.
 pub(crate) struct Operand(HyperDual64);
 
 impl<'py> FromPyObject<'_, 'py> for Operand {
@@ -151,22 +152,22 @@ impl HyperDual {
         Self(HyperDual64::new(re, eps1, eps2, eps1eps2))
     }
 
-    /// The value.
+    /// The value of the number, without derivatives.
     #[getter]
     fn re(&self) -> f64 {
         self.0.re
     }
-    /// The derivative in the first direction.
+    /// The derivative of the number in the first direction.
     #[getter]
     fn eps1(&self) -> f64 {
         self.0.eps1
     }
-    /// The derivative in the second direction.
+    /// The derivative of the number in the second direction.
     #[getter]
     fn eps2(&self) -> f64 {
         self.0.eps2
     }
-    /// The mixed second derivative.
+    /// The mixed second derivative of the number in the two directions.
     #[getter]
     fn eps1eps2(&self) -> f64 {
         self.0.eps1eps2
@@ -176,7 +177,7 @@ impl HyperDual {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = self.0;
         format!("HyperDual({re}, eps1={eps1}, eps2={eps2}, eps1eps2={eps1eps2})")
     }
-    /// Returns the parts of a pickle.
+    /// Returns the class and the arguments from which `pickle` makes an equal number.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = slf.get().0;
         Ok((slf.get_type(), (re, eps1, eps2, eps1eps2)).into_pyobject(slf.py())?.into_any())

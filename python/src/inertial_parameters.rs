@@ -59,7 +59,7 @@ pub(crate) fn from_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound<'
 
 /// Returns the `Inertia` with the ten parameters π; the inverse of `from_inertia`.
 ///
-/// pi: 10 numbers.
+/// pi: the ten parameters π.
 #[pyfunction]
 pub(crate) fn to_inertia<'py>(pi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     give_inertia(pi.py(), rust::to_inertia(array("pi", pi)?))
@@ -68,7 +68,7 @@ pub(crate) fn to_inertia<'py>(pi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
 /// Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
 /// kg m and kg.
 ///
-/// J is linear in the parameters. It is positive definite if and only if a body of positive density can have this
+/// J is linear in the parameters. J is positive definite if and only if a body of positive density can have this
 /// inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
 /// identification (2018).
 ///
@@ -81,9 +81,10 @@ pub(crate) fn pseudo_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound
     rust::pseudo_inertia(read_inertia("inertia", inertia)?).give(inertia.py(), None)
 }
 
-/// Checks that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
+/// Checks that a body of positive density can have this inertia: its pseudo-inertia J must be positive definite. Raises
+/// `NotPhysicalError` otherwise.
 ///
-/// Point masses, rods and plates have no volume: their J is singular, and they are refused.
+/// Point masses, rods and plates have no volume. The J of such bodies is singular, so this function rejects them.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
@@ -114,8 +115,8 @@ pub(crate) fn log_cholesky<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound<'
     rust::log_cholesky(read_inertia("inertia", inertia)?).map_err(refused)?.give(inertia.py(), None)
 }
 
-/// Returns the `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of
-/// `log_cholesky`.
+/// Returns the `Inertia` with the log-Cholesky parameters θ. The inertia is physical for all values of θ. This function
+/// is the inverse of `log_cholesky`.
 ///
 /// theta: 10 numbers; α within ±32 and dᵢ within ±64.
 #[pyfunction]

@@ -6,7 +6,7 @@ use condyle::Vec3;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// The kind of a joint, with its axis and pitch if it has them.
+/// The kind of a joint, with its axis and pitch if the joint has these.
 ///
 /// | | q | v |
 /// | --- | --- | --- |
@@ -44,7 +44,7 @@ impl Joint {
         Ok(Self(condyle::Joint::Prismatic { axis: three("axis", axis)? }))
     }
 
-    /// Returns a screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis per radian about it.
+    /// Returns a screw joint: q = [θ], v = [θ̇], with a translation along the axis of `pitch` metres per radian.
     #[staticmethod]
     fn helical(axis: &Bound<'_, PyAny>, pitch: f64) -> PyResult<Self> {
         Ok(Self(condyle::Joint::Helical { axis: three("axis", axis)?, pitch }))
@@ -68,8 +68,8 @@ impl Joint {
         Self(condyle::Joint::Translation)
     }
 
-    /// Returns a joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the
-    /// body's frame.
+    /// Returns a joint that does not restrict the motion of its body: q = [position, quaternion (x, y, z, w)], v =
+    /// [linear, angular] in the body's frame.
     #[staticmethod]
     fn free_flyer() -> Self {
         Self(condyle::Joint::FreeFlyer)
@@ -93,7 +93,7 @@ impl Joint {
         self.0.axis().map(|axis| axis.give(py, None)).transpose()
     }
 
-    /// The metres along the axis per radian about it; None unless the joint is helical.
+    /// The translation along the axis per rotation about the axis (m/rad); None unless the joint is helical.
     #[getter]
     fn pitch(&self) -> Option<f64> {
         if let condyle::Joint::Helical { pitch, .. } = self.0 { Some(pitch) } else { None }
@@ -105,7 +105,7 @@ impl Joint {
         format!("<condyle.Joint {}{axis}>", kind(self.0))
     }
 
-    /// Returns the parts of a pickle.
+    /// Returns the method and the arguments from which `pickle` makes an equal joint.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, joint) = (slf.py(), slf.get().0);
         let axis = joint.axis().map(Vec3::to_array);
@@ -133,7 +133,8 @@ pub(crate) fn kind(joint: condyle::Joint) -> &'static str {
     }
 }
 
-/// Returns the joint between the world and a root link, given by its word; `None` for a fixed root link.
+/// Returns the joint between the world and the root link that the word `root_joint` names; `None` for a fixed root
+/// link.
 pub(crate) fn root(root_joint: Option<&str>) -> PyResult<Option<condyle::Joint>> {
     match root_joint {
         None => Ok(None),

@@ -36,9 +36,9 @@ pub(crate) use motions;
 functions! {
 /// Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 ///
-/// q: nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is the
-/// world. The pose of a frame f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also
-/// `frame_placement`.
+/// q: position, nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is
+/// the world. The pose of a frame f is the pose of its body times the placement of the frame: `poses[f.body] @
+/// f.placement`. See also `frame_placement`.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data = condyle.Data(quadruped)
@@ -53,7 +53,7 @@ batch b: any(q: Position) -> One { b.forward_kinematics(model, q) }
 /// Computes the pose oXf of a frame in the world: a homogeneous matrix (4, 4) that maps coordinates in the frame to
 /// coordinates in the world; O(n).
 ///
-/// q: nq numbers; frame: its name or index.
+/// q: position, nq numbers; frame: the frame's name or index.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
@@ -68,8 +68,8 @@ batch b: any(q: Position; frame: FrameOf) -> One { b.frame_placement(model, q, f
 functions! {
 /// Computes the Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 ///
-/// q: nq numbers; frame: its name or index. reference: 'local', the velocity of the frame's origin, along the frame's
-/// axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
+/// q: position, nq numbers; frame: the frame's name or index. reference: 'local', the velocity of the frame's origin,
+/// along the frame's axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
 /// 'local_world_aligned', the velocity of the frame's origin, along the world's axes.
 ///
 /// >>> arm = condyle.robots.arm7()
@@ -87,8 +87,8 @@ batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
 
 /// Computes the Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 ///
-/// q: nq numbers; body: its index or its joint's name, 0 being the world; reference: as for `frame_jacobian`, for the
-/// body's own frame.
+/// q: position, nq numbers; body: the index of the body, or the name of its joint; index 0 is the world; reference: as
+/// for `frame_jacobian`, for the body's own frame.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q = condyle.Data(arm), [0.3] * 7
@@ -110,8 +110,9 @@ functions! {
 /// Computes the Jacobian J of a point of a frame, (3, nv): the point's velocity along the axes of the world is J v
 /// (m/s).
 ///
-/// q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, where p is the point
-/// in the world's frame and S has a column (S_v, S_ω) for each joint between the world and the frame.
+/// q: position, nq numbers; frame: the frame's name or index; point: position in the frame, 3 numbers (m). J = S_v +
+/// S_ω × p, where p is the point in the world's frame and S has a column (S_v, S_ω) for each joint between the world
+/// and the frame.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
@@ -126,7 +127,7 @@ fn frame_point_jacobian(model, data; q: Position, frame: FrameOf, point: Point; 
 
 /// Computes the Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
 ///
-/// q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+/// q: position, nq numbers; body: as for `body_jacobian`; point: position in the frame of the body, 3 numbers (m).
 fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out) {
     let mut J = nalgebra::DMatrix::from_element(3, model.nv(), condyle::Scalar::zero());
     condyle::forward_kinematics(model, data, &q).body_point_jacobian(body, point.lift(), &mut J);
@@ -135,7 +136,8 @@ fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out
 
 /// Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s).
 ///
-/// q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
+/// q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; point: position in the frame, 3
+/// numbers (m).
 fn frame_point_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, point: Point; out) {
     condyle::forward_velocities(model, data, &q, &v).frame_point_velocity(frame, point.lift()).to_array()
 }
@@ -143,7 +145,8 @@ fn frame_point_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, po
 /// Computes the velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of
 /// the body's own frame.
 ///
-/// q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+/// q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; point: position in the frame of the
+/// body, 3 numbers (m).
 fn body_point_velocity(model, data; q: Position, v: Tangent, body: BodyOf, point: Point; out) {
     condyle::forward_velocities(model, data, &q, &v).body_point_velocity(body, point.lift()).to_array()
 }
@@ -153,7 +156,8 @@ motions! {
 /// Computes the velocity of a frame, 6 numbers: the velocity of the body's point at the origin of the reference (m/s),
 /// then the angular velocity (rad/s); O(n).
 ///
-/// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: as for
+/// `frame_jacobian`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
@@ -162,17 +166,19 @@ motions! {
 /// True
 fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). It is the rate of the frame's
-/// spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
+/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). The spatial acceleration is the
+/// rate of the frame's spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
 ///
-/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+/// reference: as for `frame_jacobian`.
 fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// Computes the classical acceleration of a frame, 6 numbers; O(n). The linear part v̇ + ω × v (m/s²) belongs to the
 /// body's point at the origin of the reference; the angular acceleration follows (rad/s²). In 'local_world_aligned' the
 /// linear part is p̈ of the frame's origin p.
 ///
-/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+/// reference: as for `frame_jacobian`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
@@ -185,30 +191,32 @@ fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: P
 
 /// Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
-/// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-/// acceleration for 'local' and 'world'. For 'local_world_aligned', whose origin moves with the frame, it is the
-/// classical acceleration.
+/// q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: as for
+/// `frame_jacobian`. dJ v + J a is the spatial acceleration for 'local' and 'world'. For 'local_world_aligned', whose
+/// origin moves with the frame, this sum is the classical acceleration.
 fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 
 /// Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of the body's own frame; O(n).
 ///
-/// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
 /// Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_acceleration` of the body's own
 /// frame; O(n).
 ///
-/// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; body: as for `body_jacobian`; reference:
+/// as for `frame_jacobian`.
 fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of the
 /// body's own frame; O(n).
 ///
-/// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; body: as for `body_jacobian`; reference:
+/// as for `frame_jacobian`.
 fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
 /// Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of the body's own frame.
 ///
-/// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+/// q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 }

@@ -14,7 +14,8 @@
 //! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
 //! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
-//! The doc comments here are the docstrings in Python; `stubs.py` writes them to `condyle/_condyle.pyi`.
+//! The doc comments of Python classes and functions become docstrings; `stubs.py` writes these to
+//! `condyle/_condyle.pyi`.
 #![allow(non_snake_case)]
 #![allow(clippy::too_many_arguments)] // Python functions may have many arguments
 

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 /// and joints.
 pub(crate) struct MadeFor {
     structure: u64,
-    /// Hash of the placements of joints and frames; `None` if they do not matter.
+    /// Hash of the placements of joints and frames; `None` if the placements are not compared.
     geometry: Option<u64>,
     /// Name of the model for which the object was made.
     pub(crate) name: String,
@@ -19,13 +19,14 @@ impl MadeFor {
         Self { structure: model.structure, geometry: None, name: model.inner.name().to_owned() }
     }
 
-    /// Makes a check that accepts only models with the same bodies and joints and with equal placements of joints and
+    /// Creates a check that accepts only models with the same bodies and joints and with equal placements of joints and
     /// frames.
     pub(crate) fn with_geometry(model: &Model) -> Self {
         Self { geometry: Some(model.inner.geometry_hash()), ..Self::new(model) }
     }
 
-    /// Raises a `ValueError` if the model does not match; `argument` is the name of the argument with the object.
+    /// Raises a `ValueError` if the model does not match; `argument` is the name of the argument that contains the
+    /// object.
     pub(crate) fn check(&self, argument: &str, model: &Model) -> PyResult<()> {
         let elsewhere = self.geometry.is_some_and(|geometry| geometry != model.inner.geometry_hash());
         if self.structure == model.structure && !elsewhere {

@@ -1,4 +1,5 @@
-//! The class `Model`, a robot in Python: its tree, names and frames. The submodules have its other methods.
+//! The class `Model`, a robot in Python: the tree, the names and the frames. The submodules contain the other methods
+//! of `Model`.
 
 mod files;
 mod numbers;
@@ -19,11 +20,11 @@ use pyo3::types::{PyBytes, PyList, PyString};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 
-/// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
+/// A robot: bodies, joints, frames, inertias, limits. A model never changes and may be shared between threads.
 ///
 /// Body 0 is the world. The other bodies are numbered as in Pinocchio: depth first, parents before children, and
 /// siblings by the names of their joints. A model is read from a file, built by a `ModelBuilder`, or taken from
-/// `condyle.robots`; it can be pickled.
+/// `condyle.robots`; a model can be pickled.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> arm.nq, arm.nv, arm.names[:3]
@@ -67,14 +68,14 @@ pub(crate) fn body_index(
     numbered(expected, body, least, model.bodies().len())
 }
 
-/// Returns the items of an argument that is a list; an error message calls the items `what`.
+/// Returns the items of an argument that is a list; `what` names the items in error messages.
 pub(crate) fn members_of<'py>(
     argument: &str,
     what: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let wrong = |found: String| PyTypeError::new_err(format!("{argument}: expected a list of {what}, found {found}"));
-    // refuse text and named tuples, such as a single constraint: they are iterable, but they are no lists of items
+    // refuse text and named tuples, such as a single constraint: they are iterable, but are not lists of items
     if given.is_instance_of::<PyString>() || given.is_instance_of::<PyBytes>() || given.hasattr("_fields")? {
         let found = given.repr()?;
         return Err(wrong(format!("{found}; write [{found}]")));
@@ -114,8 +115,8 @@ impl Model {
     /// The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
     /// `line`.
     ///
-    /// They report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in the
-    /// file, and contents that a model cannot represent.
+    /// Warnings report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in
+    /// the file, and contents that a model cannot represent.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Warnings, || {
@@ -153,7 +154,7 @@ impl Model {
         self.inner.nv()
     }
 
-    /// The number of bodies, the world included. It is the number of rows of f_ext and of the result of
+    /// The number of bodies, the world included. This is also the number of rows of f_ext and of the result of
     /// `forward_kinematics`.
     #[getter]
     fn nbodies(&self) -> usize {
@@ -198,33 +199,31 @@ impl Model {
         self.cached.list(py, Attribute::Parents, || Ok(self.of_bodies(|b| b.parent)))
     }
 
-    /// The index in q at which each joint's position begins; for a mimic joint, the index for the joint that it
-    /// follows.
+    /// The index in q at which each joint's position begins. For a mimic joint this is the index of its leader.
     #[getter]
     fn idx_qs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxQs, || Ok(self.of_bodies(|b| b.idx_q)))
     }
 
-    /// The index in v at which each joint's velocity begins; for a mimic joint, the index for the joint that it
-    /// follows.
+    /// The index in v at which each joint's velocity begins. For a mimic joint this is the index of its leader.
     #[getter]
     fn idx_vs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxVs, || Ok(self.of_bodies(|b| b.idx_v)))
     }
 
-    /// The number of coordinates that each joint has in q: 0 if it mimics another joint, and 0 for the world.
+    /// The number of coordinates that each joint has in q: 0 for mimic joints and for the world.
     #[getter]
     fn nqs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Nqs, || Ok(self.of_joints(|b| b.joint.nq())))
     }
 
-    /// The number of coordinates that each joint has in v: 0 if it mimics another joint, and 0 for the world.
+    /// The number of coordinates that each joint has in v: 0 for mimic joints and for the world.
     #[getter]
     fn nvs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Nvs, || Ok(self.of_joints(|b| b.joint.nv())))
     }
 
-    /// The rule by which each mimic joint follows another one, as `Mimic(ratio, offset)`; None for other joints.
+    /// The rule by which each mimic joint follows another joint, as `Mimic(ratio, offset)`; None for other joints.
     #[getter]
     fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Mimics, || {
@@ -234,8 +233,8 @@ impl Model {
         })
     }
 
-    /// The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed one, there are two
-    /// frames: one of the joint and one of its link.
+    /// The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed joint, there are
+    /// two frames: the joint's frame and the frame of its child link.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Frames, || {
@@ -307,12 +306,12 @@ impl Model {
         self.inner.to_string().trim_end().to_owned()
     }
 
-    /// Returns the model itself, since it never changes.
+    /// Returns the model itself, since a model never changes.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
 
-    /// Returns the model itself, since it never changes.
+    /// Returns the model itself, since a model never changes.
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
         let _ = memo;
         slf

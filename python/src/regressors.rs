@@ -11,8 +11,9 @@ functions! {
 /// Computes the joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
 /// `Model.inertial_parameters`; O(n depth).
 ///
-/// q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors, τ = Y π + armature · a. For the
-/// linear coordinates of a free joint, armature · (a + ω × v) replaces armature · a.
+/// q: position, nq numbers; v, a: velocity and acceleration, nv numbers each. Each body except the world has ten
+/// columns. With rotors, τ = Y π + armature · a. For the linear coordinates of a free joint, armature · (a + ω × v)
+/// replaces armature · a.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -27,7 +28,7 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.joint_torque_regres
 /// Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers; O(n). T = y · π is `kinetic_energy` without
 /// the rotors, as a linear function of π, the `Model.inertial_parameters`.
 ///
-/// q: nq numbers; v: nv.
+/// q: position, nq numbers; v: velocity, nv numbers.
 fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
     condyle::regressors::kinetic_energy_regressor(model, data, &q, &v)
 }
@@ -36,7 +37,7 @@ batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy_regressor(model,
 /// Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers; O(n). V = y · π is `potential_energy` as a
 /// linear function of π, the `Model.inertial_parameters`.
 ///
-/// q: nq numbers.
+/// q: position, nq numbers.
 fn potential_energy_regressor(model, data; q: Position; out) {
     condyle::regressors::potential_energy_regressor(model, data, &q)
 }
@@ -45,11 +46,12 @@ batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 /// Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
 /// damping coefficient is d = d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. The effort of a
-/// spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for joints with several
-/// degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. The only
-/// exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of
-/// actuators. No other function of a model includes passive torques: add them to τ where needed.
+/// q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 %
+/// of f. The effort of a spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for
+/// joints with several degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's
+/// `qfrc_passive`. The only exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation
+/// among the efforts of actuators. No other function of a model includes passive torques: add passive torques to τ
+/// where needed.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> q, v = np.zeros(7), np.ones(7)
@@ -66,8 +68,9 @@ each(q: Position, v: Tangent; smoothing: Speed) -> [nv] |tau| {
 
 /// Computes the exact derivatives of `passive_torque`, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal, except for free joints with friction or
-/// polynomial damping. ∂τ/∂q has a block for each spring, and couples joints if gravity is compensated.
+/// q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal, except for free
+/// joints with friction or polynomial damping. ∂τ/∂q has a block for each spring, and couples joints if gravity is
+/// compensated.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> d = condyle.passive_torque_derivatives(arm, np.zeros(7), np.ones(7), 1e-3)
@@ -80,7 +83,7 @@ fn passive_torque_derivatives(model; q: Position, v: Tangent, smoothing: Speed; 
 }
 }
 
-/// The derivatives of passive efforts.
+/// The derivatives of passive efforts with respect to q and v.
 struct PassiveDerivatives<S> {
     dtau_dq: DMatrix<S>,
     dtau_dv: DMatrix<S>,

@@ -1,4 +1,5 @@
-//! Signals during a call, such as Ctrl-C: Python's handlers run within the call, and their exceptions end it.
+//! Signals during a call, such as Ctrl-C: Python's signal handlers run within the call, and an exception of a handler
+//! ends the call.
 
 use crate::arrays::class;
 use condyle::optimal as rust;
@@ -45,8 +46,8 @@ impl Signals {
         if self.is_due() { py.check_signals() } else { Ok(()) }
     }
 
-    /// Checks as `look` does, for a call that has released the interpreter's lock. Returns whether to continue;
-    /// `finish` returns the exception.
+    /// Checks for signals if a check is due, for a call that has released the interpreter's lock. Returns whether the
+    /// call shall continue; `finish` returns the exception.
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
         if self.raised.is_some() {
             return ControlFlow::Break(());
@@ -81,7 +82,7 @@ pub(crate) struct Interruptions<'a> {
     pub(crate) signals: Signals,
     /// Returns whether a Python function has failed.
     pub(crate) failed: &'a (dyn Fn() -> bool + Sync),
-    /// Function called after each iteration; the solve ends if it returns False.
+    /// Function called after each iteration. The solve ends if the function returns False.
     pub(crate) observer: Option<Py<PyAny>>,
     /// Exception that the observer has raised.
     pub(crate) raised: Option<PyErr>,

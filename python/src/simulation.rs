@@ -18,13 +18,13 @@ use std::sync::Arc;
 /// A motion is q(t) = q₀ ⊕ ξ(t), with a tangent vector ξ(t). The equations of motion are q̇ = v, with the velocity v in
 /// the body's frame, and v̇ = aba(q, v, τ). τ and the external forces are constant during a step.
 ///
-/// model: the robot; it starts at rest at `neutral`, at time 0.
+/// model: the robot, which starts at rest at `neutral`, at time 0.
 /// integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
 ///     momentum is conserved up to rounding.
 /// dt: h, the length of a step (s), above 0.
 /// passive: the smoothing ε (rad/s, m/s) of `passive_torque`, which is then added to τ: damping, friction, springs and
-///     gravity compensation. None leaves it out.
+///     gravity compensation. None leaves the passive torque out.
 /// tolerance: for 'variational', Newton's method ends when the imbalance of the momenta is at most this fraction of the
 ///     sum of the momenta.
 /// max_iterations: the maximum number of iterations of Newton's method.
@@ -164,13 +164,13 @@ impl Simulation {
         format!("<condyle.simulation.Simulation of '{}' at {} s>", self.inner.model().name(), self.inner.time())
     }
 
-    /// The position, nq numbers.
+    /// The position of the robot, nq numbers.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.q().give(py, None)
     }
 
-    /// The velocity, nv numbers.
+    /// The velocity of the robot, nv numbers.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.inner.v().give(py, None)
@@ -233,7 +233,7 @@ impl Simulation {
         visit.call(&self.model)
     }
 
-    /// Returns the parts of a pickle: the constructor's arguments, and the state.
+    /// Returns the class, the constructor's arguments, and the state, from which `pickle` makes an equal simulation.
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>, Bound<'py, PyAny>)> {
@@ -245,7 +245,7 @@ impl Simulation {
         Ok((slf.get_type().into_any(), made, (time, q, v, impulses).into_pyobject(py)?.into_any()))
     }
 
-    /// Restores the state of a pickle.
+    /// Restores the state that a pickle contains.
     fn __setstate__(&mut self, state: (f64, Vec<f64>, Vec<f64>, Vec<f64>)) -> PyResult<()> {
         let (time, q, v, impulses) = state;
         self.inner.restore(&State { time, q, v, impulses }).map_err(exception)
@@ -254,8 +254,8 @@ impl Simulation {
     /// Makes a number of steps, and calls a control law before each step. If a step fails, ends early and returns the
     /// status of this step. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
     ///
-    /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
-    ///     efforts; then other Python threads can run meanwhile.
+    /// control: a function that takes a `Control` and sets the numbers of `tau` and `f_ext` of this `Control` in place.
+    ///     None means zero efforts. Other Python threads can run during the steps if control is None.
     ///
     /// An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
     /// step is kept.

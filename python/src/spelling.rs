@@ -1,8 +1,8 @@
-//! The most frequently called functions of `condyle.pinocchio`. As in Pinocchio, they use results that an earlier call
-//! stored in `data`.
+//! The most frequently called functions of `condyle.pinocchio`. As in Pinocchio, these functions use results that an
+//! earlier call stored in `data`.
 //!
-//! They are written in Rust, because for a small robot a Python wrapper would take longer than the computation. The
-//! classes of `condyle.pinocchio` derive from the classes here.
+//! The functions are written in Rust, because for a small robot a Python wrapper would take longer than the
+//! computation. The classes of `condyle.pinocchio` derive from the classes of this file.
 
 use crate::algorithms;
 use crate::arrays::{Computed, Give, Number, at_once, class};
@@ -23,7 +23,7 @@ use pyo3::{ffi, intern};
 /// A `condyle.Model` with Pinocchio's interface.
 #[pyclass(name = "_SpelledModel", module = "condyle.pinocchio", frozen, subclass)]
 pub(crate) struct SpelledModel {
-    /// The `condyle.Model`.
+    /// The wrapped `condyle.Model`.
     #[pyo3(get)]
     ours: Py<Model>,
 }
@@ -43,7 +43,7 @@ pub(crate) struct SpelledData {
     q: Vec<f64>,
     v: Vec<f64>,
     a: Vec<f64>,
-    /// Number of vectors among q, v and a that the last `forwardKinematics` was given.
+    /// Number of the vectors q, v and a that were passed to the last call of `forwardKinematics`.
     given: usize,
     poses: Option<Py<PyAny>>,
     frame_poses: Option<Py<PyAny>>,
@@ -63,7 +63,7 @@ impl SpelledData {
         Ok(Self { ours, q, v, a, given: 0, poses: None, frame_poses: None, com: None, hg: None })
     }
 
-    /// The `condyle.Data`.
+    /// The wrapped `condyle.Data`.
     #[getter]
     fn _ours<'py>(&self, py: Python<'py>) -> Bound<'py, Data> {
         self.ours.bind(py).clone()
@@ -75,7 +75,7 @@ impl SpelledData {
         Ok((self.q.give(py, None)?, self.v.give(py, None)?, self.a.give(py, None)?))
     }
 
-    /// The number of vectors among q, v and a that the last `forwardKinematics` was given.
+    /// The number of the vectors q, v and a that were passed to the last call of `forwardKinematics`.
     #[getter]
     fn _given(&self) -> usize {
         self.given
@@ -93,13 +93,13 @@ impl SpelledData {
         made(py, &self.frame_poses)
     }
 
-    /// The centre of mass, in a list.
+    /// The stored centre of mass, as a list with one array.
     #[getter]
     fn com<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 1]> {
         Ok([made(py, &self.com)?])
     }
 
-    /// The centroidal momentum.
+    /// The stored centroidal momentum.
     #[getter]
     fn hg<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         made(py, &self.hg)
@@ -111,7 +111,7 @@ impl SpelledData {
     }
 }
 
-/// Returns a stored result; raises an `AttributeError` if it was not computed yet.
+/// Returns a stored result; raises an `AttributeError` if the result was not computed yet.
 fn made<'py>(py: Python<'py>, what: &Option<Py<PyAny>>) -> PyResult<Bound<'py, PyAny>> {
     what.as_ref().map(|what| what.bind(py).clone()).ok_or_else(|| PyAttributeError::new_err(()))
 }
@@ -167,7 +167,8 @@ fn spatial<'py>(class: &Bound<'py, PyType>, numbers: &Bound<'py, PyAny>) -> PyRe
     Ok(six)
 }
 
-/// Computes data.oMi; with v and a also data.v and data.a, in the bodies' frames.
+/// Computes the poses data.oMi; with v and a also the velocities data.v and the accelerations data.a, in the bodies'
+/// frames.
 #[pyfunction]
 #[pyo3(signature = (model, data, q, v=None, a=None))]
 pub(crate) fn forwardKinematics(
@@ -179,7 +180,7 @@ pub(crate) fn forwardKinematics(
 ) -> PyResult<()> {
     let (py, mut data) = (model.py(), data.try_borrow_mut()?);
     let poses = forward_kinematics(model.get().ours.bind(py), data.ours.bind(py), q, None)?;
-    (data.given, data.poses) = (0, None); // invalid until all results are stored
+    (data.given, data.poses) = (0, None); // the state is invalid until all results are stored
     let SpelledData { q: kept_q, v: kept_v, a: kept_a, .. } = &mut *data;
     copy("q", q, kept_q)?;
     for (name, given, kept) in [("v", v, kept_v), ("a", a, kept_a)] {
@@ -193,7 +194,7 @@ pub(crate) fn forwardKinematics(
     Ok(())
 }
 
-/// Computes data.oMf from the positions of the last forwardKinematics.
+/// Computes the frames' poses data.oMf from the bodies' poses of the last forwardKinematics.
 #[pyfunction]
 pub(crate) fn updateFramePlacements(model: &Bound<'_, SpelledModel>, data: &Bound<'_, SpelledData>) -> PyResult<()> {
     let mut data = data.try_borrow_mut()?;
@@ -201,7 +202,7 @@ pub(crate) fn updateFramePlacements(model: &Bound<'_, SpelledModel>, data: &Boun
     Ok(())
 }
 
-/// Computes data.oMi and data.oMf.
+/// Computes the bodies' poses data.oMi and the frames' poses data.oMf.
 #[pyfunction]
 pub(crate) fn framesForwardKinematics(
     model: &Bound<'_, SpelledModel>,
@@ -389,9 +390,9 @@ macro_rules! left {
     )*};
 }
 left! {
-    /// Computes M with both triangles, also stored as data.M.
+    /// Computes the inertia matrix M with both triangles, also stored as data.M.
     "_spelled_crba" crba(q) = algorithms::crba => "M";
-    /// Computes M⁻¹, also stored as data.Minv.
+    /// Computes the inverse M⁻¹ of the inertia matrix, also stored as data.Minv.
     "computeMinverse" computeMinverse(q) = algorithms::minv => "Minv";
     /// Computes the nonlinear effects C v + g, also stored as data.nle.
     "nonLinearEffects" nonLinearEffects(q, v) = algorithms::nonlinear_effects => "nle";
@@ -403,7 +404,7 @@ left! {
     "jacobianCenterOfMass" jacobianCenterOfMass(q) = com_jacobian => "Jcom";
 }
 
-/// Computes q ⊕ v.
+/// Computes the position q ⊕ v.
 #[pyfunction(name = "_spelled_integrate")]
 pub(crate) fn integrate<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -413,7 +414,7 @@ pub(crate) fn integrate<'py>(
     configuration::integrate(model.get().ours.bind(model.py()), q, v, None)
 }
 
-/// Computes q₁ ⊖ q₀.
+/// Computes the tangent vector q₁ ⊖ q₀.
 #[pyfunction(name = "_spelled_difference")]
 pub(crate) fn difference<'py>(
     model: &Bound<'py, SpelledModel>,

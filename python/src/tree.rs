@@ -22,7 +22,7 @@ pub(crate) fn tree(model: &Model, frames: bool) -> String {
             let _ = write!(text, "\n{indent}· {}", names.join(", "));
         }
     };
-    // stack of bodies that are not yet written: body, indentation, and whether it is the last child of its parent
+    // stack of bodies that are not yet written: body, indentation, whether the body is the last child of its parent
     let begin = |below: &[usize], indent: &str| -> Vec<(usize, String, bool)> {
         below.iter().enumerate().rev().map(|(k, &i)| (i, indent.to_owned(), k + 1 == below.len())).collect()
     };

@@ -1,4 +1,4 @@
-"""Robots for all tests, and a simulated GPU."""
+"""Fixtures of the tests: robots, and a simulated GPU."""
 
 import gc
 import shutil
@@ -49,8 +49,8 @@ def shared_gpu(cuda_libraries: tuple[Path, Path]) -> Gpu:
 
 @pytest.fixture
 def gpu(shared_gpu: Gpu) -> Iterator[Gpu]:
-    """Provides the GPU as another library sees it. After a test, checks that all memory is freed and that the driver
-    reports no errors.
+    """Provides the simulated GPU as another library uses it. After a test, checks that all memory is freed and that the
+    driver reports no errors.
     """
     yield shared_gpu
     gc.collect()

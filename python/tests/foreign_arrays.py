@@ -1,5 +1,5 @@
-"""A replacement of the driver that works without a GPU, and two array libraries that behave like CuPy, PyTorch, JAX and
-Numba.
+"""A replacement of NVIDIA's driver that works without a GPU, and two array libraries that behave like CuPy, PyTorch,
+JAX and Numba.
 
 The structures of DLPack are defined again here, and capsules are made and read by Python's C interface.
 """
@@ -57,13 +57,15 @@ python.PyCapsule_SetName.argtypes = [ctypes.py_object, ctypes.c_char_p]
 USED = {b"dltensor": b"used_dltensor", b"dltensor_versioned": b"used_dltensor_versioned"}
 
 LENT: dict[int, "Speaker"] = {}
-"""Objects that capsules keep alive."""
+"""The owners of lent arrays, which capsules keep alive."""
 DESCRIPTIONS: list[Any] = []
-"""Objects to which capsules point, and the deleters of these capsules; they are kept until the process ends."""
+"""Objects to which capsules point, and the deleters of these capsules; these objects are kept until the process
+ends.
+"""
 
 
 def build(folder: Path) -> tuple[Path, Path]:
-    """Compiles the driver and the compiler."""
+    """Compiles the replacements of NVIDIA's driver and of NVIDIA's compiler."""
     made = []
     for source, name in (("driver.c", "libcuda.so.1"), ("nvrtc.c", "libnvrtc.so.12")):
         made.append(folder / name)
@@ -73,7 +75,9 @@ def build(folder: Path) -> tuple[Path, Path]:
 
 
 class Gpu:
-    """The driver as another library uses it, on device 0. Its two streams do not wait for other streams."""
+    """The replaced driver as another library uses it, on device 0. The library's two streams do not wait for other
+    streams.
+    """
 
     def __init__(self, library: Path) -> None:
         self.library = ctypes.CDLL(str(library))
@@ -107,7 +111,7 @@ class Gpu:
         self.call("cuCtxPopCurrent_v2", None)
 
     def order(self, first: int, then: int) -> None:
-        """Makes the second stream wait for the first one."""
+        """Makes the stream `then` wait for the stream `first`."""
         event = c_void_p()
         with self:
             self.call("cuEventCreate", byref(event), 2)
@@ -123,7 +127,7 @@ class Gpu:
 
 
 class Speaker:
-    """An array that supports DLPack, with or without versions, and works on its own stream."""
+    """An array that supports DLPack, versioned or not. Its library works on a stream of its own."""
 
     gpu: Gpu
     address: int
@@ -152,7 +156,7 @@ class Speaker:
         sizes, steps = ((c_int64 * len(x))(*x) for x in (self.shape, self.strides))
         bits = 8 * self.dtype.itemsize
         code = {"f": 2, "i": 0}[self.dtype.kind]
-        # address and offset as for a part of a larger array
+        # address and offset as if the array were a part of a larger array
         tensor = Tensor(self.address - 8, *self.device, len(sizes), code, bits, 1, sizes, steps, 8)
 
         deleter = ctypes.CFUNCTYPE(None, c_void_p)(lambda _: None)  # these capsules have no consumer

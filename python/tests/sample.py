@@ -1,4 +1,4 @@
-"""A robot and one random state of it."""
+"""A robot for tests, with one random state."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Checks relations between functions that hold for every robot; tests/peers compares the numbers with other
+"""Tests relations between functions that hold for every robot. The tests in tests/peers compare the numbers with other
 libraries.
 """
 
@@ -58,7 +58,7 @@ def test_rnea_derivatives(robot: Robot) -> None:
 
 
 def test_aba_derivatives(robot: Robot) -> None:
-    """Compares with derivatives of the equation M q̈ + h = τ."""
+    """Compares the derivatives of `aba` with derivatives of the equation M q̈ + h = τ."""
     model, data, q, v, _, tau, f_ext = robot
     d = condyle.aba_derivatives(model, data, q, v, tau, f_ext)
     np.testing.assert_allclose(d.a, condyle.aba(model, data, q, v, tau, f_ext), **SOLVED)
@@ -86,7 +86,9 @@ def test_kinematics(robot: Robot) -> None:
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_motion_of_frames(robot: Robot, reference: Any) -> None:
-    """Checks V = J v, A = J a + dJ v, and dJ by differences along the motion."""
+    """Checks a frame's velocity V = J v and acceleration A = J a + dJ v, and compares dJ with differences along the
+    motion.
+    """
     model, data, q, v, a, *_ = robot
     for frame in range(0, len(model.frames), 5):
 
@@ -107,7 +109,9 @@ def test_motion_of_frames(robot: Robot, reference: Any) -> None:
 
 
 def test_points(robot: Robot) -> None:
-    """A point moves like a frame at that point; results for many states equal the results for single states."""
+    """Checks that a point moves like a frame at this point, and that results for many states equal results for single
+    states.
+    """
     model, data, q, v, *_ = robot
     point, at = np.array([0.1, -0.2, 0.3]), np.eye(4)
     at[:3, 3] = point
@@ -144,7 +148,7 @@ def test_frames_are_added() -> None:
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_motion_of_bodies(robot: Robot, reference: Any) -> None:
-    """Bodies move like the frames of their joints at the bodies' origins; the world is at rest."""
+    """Checks that bodies move like the frames of their joints, and that the world is at rest."""
     model, data, q, v, a, *_ = robot
     for body in range(1, model.nbodies):
         name = model.names[body]

@@ -1,4 +1,6 @@
-"""Arrays of any shape, dtype and layout give the same result as a plain array, or an error with the expected shape."""
+"""Tests that arrays of any shape, dtype and layout give the result of a plain array, or an error with the expected
+shape.
+"""
 
 from typing import Any
 
@@ -23,8 +25,8 @@ DTYPES = st.sampled_from(
 
 @st.composite
 def layouts(draw: st.DrawFn, shape: tuple[int, ...]) -> np.ndarray:
-    """Draws an array of this shape. It may be a view that is transposed, reversed, has gaps, is unaligned or cannot be
-    written to.
+    """Draws an array of this shape. The array may be a view: transposed, reversed, unaligned, read-only, or with
+    gaps.
     """
     dtype = np.dtype(draw(DTYPES))
     plain = draw(hnp.arrays(dtype, shape, elements=st.just(0) | st.just(1)))
@@ -90,8 +92,8 @@ SHAPES = hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=9)
 @quiet
 @given(SHAPES, st.sampled_from([np.float64, np.int32, np.complex128, "U3", "M8[s]", object]))
 def test_any_shape_is_read_or_refused(shape: tuple[int, ...], dtype: Any) -> None:
-    """The array is read as one or many states, or an error names the argument, the expected shape and the found
-    shape.
+    """Checks that the array is read as one or many states, or that an error names the argument, the expected shape and
+    the found shape.
     """
     q, zero = np.zeros(shape, dtype), np.zeros(7)
     if shape == (7,) or (len(shape) == 2 and shape[1] == 7 and shape[0] > 0):
@@ -129,7 +131,9 @@ def test_any_out_is_filled_or_refused(shape: tuple[int, ...], dtype: Any, layout
 @quiet
 @given(st.integers(1, 12), st.integers(1, 12))
 def test_matrices_of_any_size_are_turned(rows: int, columns: int) -> None:
-    """Matrices of all sizes are returned correctly: Rust stores them by columns, and transposes them tile by tile."""
+    """Checks that matrices of all sizes are returned correctly. Rust stores matrices by columns, and transposes them
+    tile by tile.
+    """
     builder, body = condyle.ModelBuilder("chain"), condyle.WORLD
     inertia = condyle.Inertia.from_com(1.0, [0.1, 0.2, 0.3], np.eye(3))
     for k in range(rows):

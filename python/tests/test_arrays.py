@@ -1,4 +1,4 @@
-"""Arrays as arguments and results: shapes, dtypes, strides, `out`, and errors."""
+"""Tests of arrays as arguments and results: shapes, dtypes, strides, `out`, and errors."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ Call = Callable[..., Any]
 
 
 def calls(robot: Robot) -> dict[str, Call]:
-    """Returns every function that returns one array, as a function of `out`."""
+    """Returns calls of every function that returns one array. Each call is a function of `out`."""
     model, data, q, v, a, tau, f_ext = robot
     tip = [0.1, 0.2, 0.3]
     return {
@@ -63,7 +63,7 @@ def calls(robot: Robot) -> dict[str, Call]:
 
 
 def several(robot: Robot) -> dict[str, Call]:
-    """Returns the functions that return several arrays."""
+    """Returns calls of the functions that return several arrays. Each call is a function of `out`."""
     model, data, q, v, a, tau, f_ext = robot
     return {
         "rnea_derivatives": lambda **k: condyle.rnea_derivatives(model, data, q, v, a, f_ext, **k),

@@ -1,4 +1,4 @@
-"""Many states in one call: every function that takes a state, compared with one call for each state."""
+"""Tests calls for many states: every function that takes a state is compared with one call for each state."""
 
 import inspect
 import threading
@@ -11,7 +11,7 @@ from sample import Robot, make
 import condyle
 
 N = 11
-"""Number of states: larger than the number of SIMD lanes, and not a multiple of it."""
+"""Number of states: larger than the number of SIMD lanes, and not a multiple of this number."""
 CLOSE = {"rtol": 1e-9, "atol": 1e-9}
 """Tolerance for rounding errors: a call for a single state may compute a robot's limbs in parallel lanes, with sums in
 another order. The condition number of M amplifies the difference.
@@ -71,7 +71,7 @@ FIXED = """<robot name="fixed">
 
 @pytest.mark.parametrize("name", functions())
 def test_without_coordinates(name: str) -> None:
-    """For a robot with only fixed joints no function fails, for one state or for many."""
+    """Checks that no function fails for a robot with only fixed joints, for one state or for many."""
     test_as_one_by_one(name, make(condyle.Model.from_urdf_str(FIXED)))
 
 
@@ -152,8 +152,8 @@ def test_errors(robot: Robot) -> None:
 
 
 def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
-    """A call for many states releases the interpreter's lock. If another thread uses the same `Data` during the call,
-    it gets an error.
+    """Checks that another thread gets an error if it uses the same `Data` during a call for many states. Such a call
+    releases the interpreter's lock.
     """
     model, data = quadruped.model, condyle.Data(quadruped.model)
     q, v, tau = (argument(name, quadruped, 4000) for name in ("q", "v", "tau"))
@@ -178,7 +178,9 @@ def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("shift", [0, 1, 40])
 def test_out_over_an_input(shift: int, threads: int) -> None:
-    """`out` may be an input, or share memory with it: all states are computed from the original numbers."""
+    """Checks that all states are computed from the original numbers, if `out` is an input or shares memory with an
+    input.
+    """
     arm = condyle.robots.arm7()
     states = 30_000  # the call is computed in several parts
     data, memory = condyle.Data(arm, threads=threads), np.random.default_rng(0).standard_normal((states + 40, 7))
@@ -186,7 +188,7 @@ def test_out_over_an_input(shift: int, threads: int) -> None:
     expected = condyle.rnea(arm, data, q, q, q)
     assert condyle.rnea(arm, data, q, q, q, out=out) is out
     np.testing.assert_array_equal(out, expected)
-    # the same for functions that compute state by state
+    # the same check for functions that compute state by state
     q, out = memory[40 - shift : 140 - shift], memory[40:140]
     expected = condyle.integrate(arm, q, q)
     condyle.integrate(arm, q, q, out=out)
@@ -204,7 +206,9 @@ def test_out_over_forces() -> None:
 
 @pytest.mark.parametrize("states", [(), (20,)])
 def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
-    """Two results in one array are an error, and nothing is written; two inputs may be the same array."""
+    """Checks that two results in one array are an error, before any result is written. Two inputs may be the same
+    array.
+    """
     model, data = quadruped.model, quadruped.data
     q = np.broadcast_to(quadruped.q, (*states, 19)).copy()
     v = np.zeros((*states, 18))
@@ -214,7 +218,7 @@ def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
     overlapping = memory.reshape(-1)[18 : 18 + memory[0].size].reshape(memory[0].shape)
     with pytest.raises(ValueError, match="^out: the arrays for dtau_dv and dtau_da share memory$"):
         condyle.rnea_derivatives(model, data, q, v, v, out=(memory[2], overlapping, memory[0]))
-    with pytest.raises(ValueError, match="share memory$"):  # functions that compute state by state
+    with pytest.raises(ValueError, match="share memory$"):  # also for functions that compute state by state
         condyle.coriolis_derivatives(model, data, q, v, out=(memory[0], memory[0]))
     assert not memory.any()
     condyle.rnea_derivatives(model, data, q, v, v, out=tuple(memory[:3]))

@@ -1,4 +1,4 @@
-"""The book in `docs`: its Python blocks run and print the output on the pages, and its links are valid."""
+"""Tests of the book in `docs`: its Python blocks run and print the output on the pages, and its links are valid."""
 
 import contextlib
 import importlib.util
@@ -43,7 +43,9 @@ def test_readme() -> None:
 
 @pytest.mark.parametrize("part", ["Using Condyle", "The course"])
 def test_parts_are_programs(part: str) -> None:
-    """Each page of the book's first two parts is a program. Its results are checked by assertions or by its output."""
+    """Checks that each page of the book's first two parts is a program whose results are checked, by assertions or by
+    output.
+    """
     pages = BOOK.chapters(part)
     assert len(pages) >= 7
     for name in pages:
@@ -56,8 +58,8 @@ def test_structure() -> None:
 
 
 def test_figures() -> None:
-    """Each sentence with measured figures is on its page. If the JSON file of measurements exists, all figures equal
-    its numbers.
+    """Checks that each sentence with measured figures is on its page. If the file of measurements exists, the figures
+    must equal the numbers in this file.
     """
     figures = load(ROOT / "benches" / "figures.py")
     for page, sentence, _ in figures.QUOTES:
@@ -70,7 +72,7 @@ def test_figures() -> None:
 
 
 def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A wrong output of a block on a page is found, and a missing output is reported."""
+    """Checks that a wrong output of a block on a page is found, and that a missing output is reported."""
     monkeypatch.setattr(BOOK, "BOOK", tmp_path / "docs")
     (tmp_path / "docs").mkdir()
     (tmp_path / "README.md").write_text("# a\n")
@@ -86,7 +88,9 @@ def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_formulas() -> None:
-    """Each formula is LaTeX that can be converted to MathML; code with dollar signs does not change."""
+    """Checks that each formula can be converted from LaTeX to MathML, and that code with dollar signs does not
+    change.
+    """
     mathml = load(ROOT / "docs" / "mathml.py")
     assert "<math" in mathml.with_mathml("an $x_i$ b") and mathml.with_mathml("`$x$`") == "`$x$`"
     for chapter in BOOK.chapters():
@@ -97,7 +101,7 @@ def test_formulas() -> None:
 
 
 def test_mdbook(tmp_path: Path) -> None:
-    """mdBook builds the book, if mdBook is installed."""
+    """Checks that mdBook builds the book, if mdBook is installed."""
     program = shutil.which("mdbook")
     if program is None:
         pytest.skip("mdbook is not installed")
@@ -108,8 +112,8 @@ def test_mdbook(tmp_path: Path) -> None:
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
 
 
-# For each worked example: the block that defines the algorithm (in the chapter or in rnea.md), the example's block,
-# and mistakes in the definition, each as a pair (right text, wrong text).
+# For each worked example: the block that defines the algorithm (in the chapter or in rnea.md), and the example's block.
+# Further, mistakes in the definition, each as a pair (right text, wrong text).
 RNEA = [
     (" + cross(vel[i]) @ vJ", ""),
     (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),
@@ -197,7 +201,7 @@ MISTAKES = {
 
 @pytest.mark.parametrize("example", MISTAKES)
 def test_examples_detect_mistakes(example: str) -> None:
-    """The check of a worked example fails if one term of its algorithm is left out."""
+    """Checks that the assertions of a worked example fail if a term of the example's algorithm is wrong or left out."""
     chapter = example.partition("#")[0]
     definition, begins, mistakes = MISTAKES[example]
     text = (ROOT / "docs" / chapter).read_text()

@@ -1,4 +1,6 @@
-"""Models that are built by hand or from other models; tests/peers compares the numbers with other libraries."""
+"""Tests of models that are built body by body or from other models. The tests in tests/peers compare the numbers with
+other libraries.
+"""
 
 import gc
 from typing import Any
@@ -15,14 +17,14 @@ CLOSE = {"rtol": 1e-12, "atol": 1e-12}
 
 
 def at(x: float, y: float, z: float) -> NDArray[np.float64]:
-    """Returns a placement without rotation."""
+    """Returns a placement at (x, y, z) without rotation, as a homogeneous matrix."""
     X = np.eye(4)
     X[:3, 3] = x, y, z
     return X
 
 
 def turned(angle: float, axis: int) -> NDArray[np.float64]:
-    """Returns a rotation about an axis of the frame."""
+    """Returns a placement that is a rotation about an axis of the frame."""
     X, (j, k) = np.eye(4), ((axis + 1) % 3, (axis + 2) % 3)
     X[j, j] = X[k, k] = np.cos(angle)
     X[k, j], X[j, k] = np.sin(angle), -np.sin(angle)

@@ -17,7 +17,7 @@ casadi = pytest.importorskip("casadi")
 
 import condyle.casadi  # noqa: E402
 
-# Tolerance for the same numbers, up to some hundreds, computed in two ways.
+# Tolerance for numbers up to some hundreds that two methods compute.
 ROUNDING = 1e-9
 # Central differences with the step h = 1e-5 have errors of about 1e-8: h² times a third derivative, and 1e-13 / h.
 # The tolerance is larger, since second derivatives of accelerations are up to some thousands.
@@ -73,7 +73,7 @@ def contacts(robot: str) -> list[condyle.ContactConstraint]:
 
 
 def function(name: str, robot: str, states: int = 1) -> "casadi.Function":
-    """Returns a function of `condyle.casadi`."""
+    """Returns the function of `condyle.casadi` with this name, for a robot and a number of states."""
     model, make = MODELS[robot], getattr(condyle.casadi, name)
     if name in ("forward_kinematics", "frame_velocity"):
         return make(model, TIPS[robot][0], states=states)
@@ -100,14 +100,14 @@ def direct(name: str, robot: str, x: Arrays) -> Arrays:
 
 
 def state(name: str, robot: str, seed: int = 0) -> Arrays:
-    """Returns random arguments, with quaternions of length 1."""
+    """Returns random arguments of a function, with quaternions of length 1."""
     model, rng = MODELS[robot], np.random.default_rng(3 + seed)
     arguments = function(name, robot).n_in()
     return [condyle.random_configuration(model, seed=2 + seed), *rng.standard_normal((2, model.nv))][:arguments]
 
 
 def stretched(name: str, robot: str) -> Arrays:
-    """Returns the same arguments, but with quaternions of another length than 1, as in the iterates of an
+    """Returns the arguments that `state` returns, but with quaternions whose length is not 1, as in the iterates of an
     optimisation.
     """
     q, *others = state(name, robot)
@@ -199,8 +199,8 @@ def test_zeros_of_the_tree() -> None:
 
 @each
 def test_many_states_are_a_map(name: str) -> None:
-    """Results, derivatives and sparsity are the same as with `Function.map`, even for more states than are computed at
-    the same time.
+    """Checks that results, derivatives and sparsity are the same as with `Function.map`. The number of states is larger
+    than the number that is computed at the same time.
     """
     robot, states = "every joint", 37
     one, many = function(name, robot), function(name, robot, states)
@@ -226,8 +226,8 @@ def derived(f: casadi.Function) -> casadi.Function:
 
 
 def test_where_a_tree_stands_moves_with_nothing_but_gravity() -> None:
-    """If coordinate q₀ moves a whole tree, ∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero and not in the sparsity, as in a graph of
-    expressions.
+    """Checks that ∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero and not in the sparsity, if coordinate q₀ moves a whole tree. A graph
+    of expressions has the same sparsity.
     """
     arm = MODELS["arm"]
     for name in ("rnea", "aba"):
@@ -292,8 +292,8 @@ def test_loaded_functions_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_copy_within_the_process_is_refused_until_it_is_dropped() -> None:
-    """Calls of the original and of the copy are errors, since CasADi cannot distinguish them; a newly created function
-    works again.
+    """Checks that calls of a function and of its copy are errors, since CasADi cannot distinguish the two. A newly
+    created function works again.
     """
     robot = MODELS["arm"].with_gravity([0.0, 1.0, 0.0])
     f = condyle.casadi.rnea(robot)
@@ -322,8 +322,8 @@ def test_examples() -> None:
 
 
 def test_swing_up_by_ipopt() -> None:
-    """A pendulum on a cart swings up, by direct transcription with exact Hessians. The resulting motion satisfies the
-    dynamics.
+    """Checks that a pendulum on a cart swings up, by direct transcription with exact Hessians, and that the resulting
+    motion satisfies the dynamics.
     """
     builder = ModelBuilder("cart")
     cart = builder.body(

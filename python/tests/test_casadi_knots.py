@@ -1,5 +1,5 @@
-"""Knots of optimal control as `casadi.Function`s: values, first and second derivatives, and sparsity. Optima are
-compared with those found by FDDP.
+"""Tests of knots of optimal control as `casadi.Function`s: values, first and second derivatives, and sparsity. Optima
+are compared with optima that FDDP finds.
 """
 
 import sys
@@ -37,12 +37,12 @@ from condyle.optimal import (  # noqa: E402
     Unicycle,
 )
 
-# Tolerance for the same numbers, up to some hundreds, computed in two ways.
+# Tolerance for numbers up to some hundreds that two methods compute.
 ROUNDING = 1e-9
-# Step and tolerance of central differences, also for second derivatives, up to some thousands: see test_casadi.py.
+# Step and tolerance of central differences, also of second derivatives of some thousands. See test_casadi.py.
 STEP = 1e-5
 DIFFERENCES = 1e-6
-# Tolerance for optima. IPOPT's is 1e-8 for scaled equations, FDDP's is 1e-9 for the expected change of the cost.
+# Tolerance for optima. IPOPT's tolerance is 1e-8 for scaled equations, FDDP's is 1e-9 for the expected change of cost.
 OPTIMUM = 1e-6
 # Tolerance for motions: the relative error of the cost is 1e-8, so controls are less accurate where the cost is flat.
 MOTION = 1e-3
@@ -108,8 +108,8 @@ def sizes(name: str) -> tuple[int, int]:
 
 
 def arguments(name: str, stretch: float = 1.0) -> list[np.ndarray]:
-    """Returns a random state and controls. The lengths of quaternions and pairs (cos, sin) are multiplied by
-    `stretch`.
+    """Returns the arguments of a knot's function: a random state, and controls. Quaternions and pairs (cos, sin) have
+    the length `stretch`.
     """
     (nx, nu), robot, rng = sizes(name), KNOTS[name][1], np.random.default_rng(7)
     x, u = rng.standard_normal(nx), rng.standard_normal(nu)
@@ -174,8 +174,8 @@ def test_first_derivatives(name: str, stretch: float) -> None:
 
 @pytest.mark.parametrize("name", ["arm", "arm, accelerations", "unicycle"])
 def test_first_derivatives_are_those_of_a_problem(name: str) -> None:
-    """If positions are vectors, the first derivatives are A, B, q and r of the problem, and Q, S, R are the Hessian of
-    the cost.
+    """Checks that the first derivatives are A, B, q and r of the problem, and that Q, S, R are the Hessian of the cost.
+    Positions must be vectors.
     """
     model, (x, u) = KNOTS[name][0], arguments(name)
     node = Problem(x, [model], [0], end(name)).derivatives([x, x], [u])[0]
@@ -196,7 +196,7 @@ def test_second_derivatives_of_the_next_state(name: str) -> None:
     hessian = casadi.Function("hessian", [x, multipliers], [hessian])
     gradient = casadi.Function("gradient", [x, multipliers], [gradient])
     weights = np.random.default_rng(4).standard_normal(y.numel())
-    weights[-1] = weights[-1] if KNOTS[name][1] is None else 0.0  # not compared for a robot: Gauss–Newton
+    weights[-1] = weights[-1] if KNOTS[name][1] is None else 0.0  # not compared for a robot: its Hessian is approximate
     for stretch in (1.0, 1.1):
         point = np.concatenate(arguments(name, stretch))
         found = np.array(casadi.densify(hessian(point, weights)))
@@ -218,7 +218,7 @@ def test_ends_have_a_cost_only() -> None:
 def test_zeros_of_a_knot() -> None:
     lands = condyle.casadi.knot(KNOTS["quadruped lands"][0]).jacobian()
     nq, nv = QUADRUPED.nq, QUADRUPED.nv
-    # q⁺ = q: each number depends on itself, and each number of the quaternion on all four
+    # q⁺ = q: each number depends on itself, and each number of the quaternion on all four numbers of the quaternion
     # v⁺ depends on the whole state except the position of the trunk
     assert lands.nnz_out(0) <= (nq - 4) + 16 + nv * (nq + nv - 3)
     given = condyle.casadi.knot(KNOTS["arm, accelerations"][0]).jacobian()
@@ -238,7 +238,7 @@ def test_a_knot_is_that_of_its_number() -> None:
     assert close(condyle.casadi.knot(problem, 4)(x), costs[4], ROUNDING)
     each = condyle.casadi.knot(step, None)
     assert close(each.map(4)(np.tile(x[:, None], 4), np.tile(u[:, None], 4), np.arange(4))[1], costs[:4], ROUNDING)
-    assert each.jacobian().nnz_out(2) == each.jacobian().nnz_out(5) == 0  # derivatives with respect to t
+    assert each.jacobian().nnz_out(2) == each.jacobian().nnz_out(5) == 0  # the derivatives with respect to t are zero
     with pytest.raises(ProblemError, match="t: expected 0 to 4, found 5"):
         condyle.casadi.knot(problem, 5)
     with pytest.raises(ProblemError, match="t: expected the number of a knot of the problem, found None"):

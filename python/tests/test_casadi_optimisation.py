@@ -1,5 +1,5 @@
-"""Optimisations by IPOPT with functions of `condyle.casadi`, compared with optimisations of the same functions written
-as CasADi expressions.
+"""Tests of optimisations by IPOPT with functions of `condyle.casadi`. For comparison, the same problems are solved with
+CasADi expressions.
 """
 
 import sys

@@ -1,5 +1,5 @@
-"""Invalid input raises an error in the call that gets it, with the argument's name and numbers. It never leads to a NaN
-or a wrong result.
+"""Tests that invalid input raises an error in the call that gets the input, with the argument's name and numbers.
+Invalid input never leads to a NaN or a wrong result.
 """
 
 import json

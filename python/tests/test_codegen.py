@@ -1,5 +1,5 @@
-"""Compares generated code, compiled by the system's C compiler, with the library's functions. Skipped if the system has
-no C compiler.
+"""Tests of generated code: the code, compiled by the system's C compiler, must give the results of the library's
+functions. The tests are skipped if the system has no C compiler.
 """
 
 import os

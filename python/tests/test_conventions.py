@@ -1,4 +1,6 @@
-"""Conversions between conventions: the conversions in the two directions are inverse, and do not change powers."""
+"""Tests of conversions between conventions: the two directions of a conversion are inverse, and powers do not
+change.
+"""
 
 from typing import Any
 
@@ -62,7 +64,9 @@ def test_there_and_back(library: str) -> None:
 
 @pytest.mark.parametrize("library", sorted(LIBRARIES))
 def test_acceleration_is_the_rate_of_velocity(robot: Robot, library: str) -> None:
-    """Compares accelerations with central differences of velocities, along a motion with constant v̇."""
+    """Compares converted accelerations with central differences of converted velocities, along a motion with constant
+    v̇.
+    """
     there, h = Coordinates(robot.model, library), 1e-5
     sides = []
     for step in (-h, h):
@@ -109,8 +113,8 @@ def test_frames_of_twists(robot: Robot) -> None:
 
 
 def test_forces_by_their_power(robot: Robot) -> None:
-    """Power is the same in the axes of the body and of the world, and the conversions in the two directions are
-    inverse.
+    """Checks that power is the same in the axes of the body and of the world, and that the two conversions of forces
+    are inverse.
     """
     rng = np.random.default_rng(0)
     oXb = condyle.forward_kinematics(robot.model, robot.data, robot.q)
@@ -123,7 +127,7 @@ def test_forces_by_their_power(robot: Robot) -> None:
 
 
 def test_weight_as_an_external_force(robot: Robot) -> None:
-    """Weights at the centres of mass, as external forces, have the same effect as gravity."""
+    """Checks that external forces equal to the weights, at the centres of mass, have the same effect as gravity."""
     model, data, q = robot.model, robot.data, robot.q
     oXb = condyle.forward_kinematics(model, data, q)
     com = np.array([X[:3, :3] @ inertia.com + X[:3, 3] for X, inertia in zip(oXb, model.inertias, strict=True)])

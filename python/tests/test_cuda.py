@@ -1,5 +1,5 @@
-"""Kernels that are called through a replacement of the driver, which needs no GPU, and compared with the library's
-functions. Skipped if the system has no C and C++ compilers.
+"""Tests of kernels: their results are compared with the library's functions. A replacement of the driver runs the
+kernels without a GPU. The tests are skipped if the system has no C and C++ compilers.
 """
 
 import gc
@@ -70,7 +70,7 @@ def test_single_precision(gpu: Gpu) -> None:
 
 
 def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -> None:
-    """Several threads share a state if all threads fit on the device at the same time, in eight blocks of 256
+    """Checks that several threads share a state if all threads fit on the device at the same time: eight blocks of 256
     threads.
     """
     kernel = condyle.cuda.compile(quadruped.model, "rnea_derivatives")
@@ -94,8 +94,8 @@ def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -
 @pytest.mark.parametrize("is_versioned", [False, True])
 @pytest.mark.parametrize("transposed", [False, True])
 def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: bool) -> None:
-    """Arrays are used without a copy, after the pending work of their library. The library then reads the correct
-    results.
+    """Checks that a kernel uses another library's arrays without a copy, after the library's pending work. The library
+    must then read the correct results.
     """
     kernel = condyle.cuda.compile(ARM, "rnea_derivatives")
     given = states(ARM, 50)
@@ -116,7 +116,9 @@ def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: boo
 
 
 def test_a_consumer_that_does_not_wait_sees_nothing(gpu: Gpu) -> None:
-    """A consumer that does not wait reads no results. So the other tests would detect a missing wait."""
+    """Checks that a consumer that does not wait reads no results. This shows that the other tests would detect a
+    missing wait.
+    """
     kernel = condyle.cuda.compile(ARM, "gravity")
     q = condyle.cuda.array(states(ARM, 3)[0])  # kept alive, because freeing memory would wait for the work on it
     found = kernel(q)

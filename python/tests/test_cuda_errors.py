@@ -1,4 +1,4 @@
-"""Errors of `condyle.cuda` for wrong arguments, and for a missing driver, device or compiler."""
+"""Tests of the errors of `condyle.cuda` for wrong arguments, and for a missing driver, device or compiler."""
 
 import os
 import subprocess

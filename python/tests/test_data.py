@@ -1,4 +1,4 @@
-"""A `Data` belongs to one robot, and to one call at a time."""
+"""Tests that a `Data` belongs to one robot, and to one call at a time."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -25,7 +25,7 @@ def test_data_of_another_robot(quadruped: Robot) -> None:
 
 
 def test_order_of_calls_does_not_matter(robot: Robot) -> None:
-    """No function reads results that another function left in the scratch memory."""
+    """Checks that no function reads results that an earlier call left in the scratch memory."""
     model, data, q, v, a, tau, f_ext = robot
     other = condyle.random_configuration(model, seed=9)
     functions = [
@@ -55,7 +55,7 @@ def test_order_of_calls_does_not_matter(robot: Robot) -> None:
 
 
 class Interrupting:
-    """An array that runs a function when it is read. At this time the call has already begun."""
+    """An argument that runs a function when a call reads the argument. At this time the call has already begun."""
 
     def __init__(self, array: NDArray[np.float64], action: Any) -> None:
         self.array, self.action = array, action
@@ -66,8 +66,8 @@ class Interrupting:
 
 
 def test_two_threads_at_once(quadruped: Robot) -> None:
-    """While a call runs, a call of a second thread with the same `Data` is an error. The result of the first call is
-    correct.
+    """Checks that a second thread gets an error if it uses the `Data` of a running call. The result of the running call
+    must be correct.
     """
     model, data, q, *_ = quadruped
     expected = condyle.gravity(model, data, q)

@@ -1,4 +1,4 @@
-"""Actions in continuous time that are written in Python, with the library's integrators."""
+"""Tests of actions in continuous time that are written in Python, with the library's integrators."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from condyle.optimal import Cost, DifferentialAction, Fddp, FreeDynamics, Proble
 
 ARM = condyle.robots.arm7()
 SCHEMES = ("semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4")
-# Tolerance for exact derivatives whose sums have another order.
+# Tolerance for exact derivatives that are summed in another order.
 EXACT = 1e-10
 DIFFERENCES = 1e-5
 

@@ -1,4 +1,6 @@
-"""Hyper-dual numbers: every function of a model and a state accepts them; derivatives of user functions."""
+"""Tests of hyper-dual numbers: every function of a model and a state accepts these numbers. Also tests derivatives of
+user functions.
+"""
 
 import math
 from collections.abc import Callable
@@ -146,15 +148,17 @@ def test_along_a_direction(robot: Robot, name: str) -> None:
     along = rng.standard_normal((2, 2 * model.nv))
 
     def at(x: NDArray[Any]) -> NDArray[Any]:
-        """Returns f at the state (q, v) moved by x."""
+        """Returns the function's value at the state (q, v) moved by x."""
         return flat(f(robot, condyle.integrate(model, robot.q, x[: model.nv]), robot.v + x[model.nv :]))
 
     def moved(first: float) -> NDArray[Any]:
-        """Returns f at the state moved along the first direction, with ε₁ in the second direction."""
+        """Returns the function's value at the state moved along the first direction, with derivatives in the second
+        direction.
+        """
         return at(np.array([HyperDual(first * a, eps1=b) for a, b in zip(*along, strict=True)], dtype=object))
 
     def slope(f: Callable[[float], NDArray[Any]]) -> NDArray[Any]:
-        """Returns df/ds at 0."""
+        """Returns the derivative df/ds at s = 0, by four-point differences."""
         near, far = f(STEP) - f(-STEP), f(2.0 * STEP) - f(-2.0 * STEP)
         return (8.0 * near - far) / (12.0 * STEP)
 

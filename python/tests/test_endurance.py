@@ -1,7 +1,8 @@
-"""Over very many calls, memory does not grow and results do not change; with eight threads, results do not change
-either.
+"""Tests that memory does not grow and results do not change over very many calls, and that eight threads get the same
+results.
 
-Memory must not grow over 10⁷ calls with `CONDYLE_FULL`, which `./test full` sets, and over 10⁵ calls without it.
+If the environment variable `CONDYLE_FULL` is set, as by `./test full`, memory is observed over 10⁷ calls, else over
+10⁵.
 """
 
 import gc
@@ -17,8 +18,8 @@ import pytest
 import condyle
 
 CALLS = 10**7 if "CONDYLE_FULL" in os.environ else 10**5
-# Maximum growth of memory: allocators may keep some for later, and a pointer lost in each call is twice as much.
-# Maximum growth of the number of Python objects: one object lost in every fourth call of a kind exceeds it.
+# Maximum growth of memory: allocators may keep some memory; losing a pointer in each call would cost twice as much.
+# Maximum growth of the number of Python objects: losing an object in every fourth call of a kind exceeds the maximum.
 BYTES = 400_000
 BLOCKS = 2000
 
@@ -80,8 +81,8 @@ def test_memory_is_flat() -> None:
 
 
 def test_eight_threads_on_one_model() -> None:
-    """Each thread has its own `Data` and makes calls of all kinds, while the threads access the model's attributes for
-    the first time.
+    """Checks that eight threads get the same results. Each thread has its own `Data`. The threads access the model's
+    attributes for the first time.
     """
     robot, states, rounds = condyle.robots.humanoid(), 40, 25
     rng = np.random.default_rng(2)

@@ -1,4 +1,4 @@
-"""The examples of `python/examples` run without changes."""
+"""Tests that the examples of `python/examples` run without changes."""
 
 import os
 import subprocess

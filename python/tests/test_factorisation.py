@@ -15,7 +15,7 @@ SOLVED = {"rtol": 1e-8, "atol": 1e-8}
 
 
 def factors(robot: Robot) -> tuple[list[Any], NDArray[np.float64]]:
-    """Returns M, and factors of M of both kinds, for which `factorize` was called."""
+    """Returns an `Ltdl` and a `Cholesky` of M, for which `factorize` was called, and M itself."""
     M = condyle.crba(robot.model, robot.data, robot.q)
     made: list[Any] = [condyle.Ltdl(robot.model), condyle.Cholesky(robot.model.nv)]
     for factor in made:

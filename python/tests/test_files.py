@@ -1,5 +1,5 @@
-"""Robots that are read from files and written to files: attributes of warnings, JSON, and copies of a file with other
-numbers.
+"""Tests of robots that are read from files and written to files: attributes of warnings, JSON, and copies of a file
+with other numbers.
 """
 
 import json
@@ -162,7 +162,7 @@ def test_other_damping_and_friction() -> None:
     assert (model.damping.tolist(), model.friction.tolist()) == ([0.5, 0.25], [0.0, 0.125])
     assert np.array_equal(model.damping_polynomial, [[0.25, 0.5], [0.0, 0.0]])
     assert np.array_equal(model.with_damping([0.5, 0.25], [[0, 0], [1, 2]]).damping_polynomial, [[0, 0], [1, 2]])
-    # at the speeds 2 and 1, damping is −(0.5 + 0.25 · 2 + 0.5 · 4) 2 and −0.25; the second joint also has friction
+    # damping torques at the speeds 2 and 1: −(0.5 + 0.25 · 2 + 0.5 · 4) 2 and −0.25; the second joint also has friction
     weightless = model.with_gravity([0, 0, 0]).with_damping([0.5, 0.25])
     found = condyle.passive_torque(weightless, [0.1, -0.5], [2.0, 1.0], 1e-3)
     np.testing.assert_allclose(found, [-6.0, -0.375], atol=1e-12)

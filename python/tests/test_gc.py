@@ -12,7 +12,7 @@ from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp
 
 
 class Marker:
-    """An object that the functions of a cycle reference."""
+    """An object that user functions of a reference cycle hold, to observe whether the cycle is collected."""
 
 
 def action(calc: Any, calc_diff: Any = None) -> Action:
@@ -74,7 +74,7 @@ def test_cycles_are_collected(name: str) -> None:
 
 
 def test_what_is_in_use_is_not_collected() -> None:
-    """A problem keeps the functions of its actions alive, and a solver keeps its problem alive."""
+    """Checks that a problem keeps the functions of its actions alive, and that a solver keeps its problem alive."""
 
     def make() -> tuple[Fddp, "weakref.ref[Marker]"]:
         marker = Marker()
@@ -95,7 +95,7 @@ def test_what_is_in_use_is_not_collected() -> None:
 
 
 def test_all_classes_that_hold_objects_are_seen() -> None:
-    """All classes that hold Python objects take part in garbage collection."""
+    """Checks that all classes that hold Python objects take part in garbage collection."""
     simulation = condyle.simulation.Simulation(condyle.robots.arm7())
     knot = action(step)
     for holder in (knot, constrained(step), problem(knot), Fddp(problem(knot)), simulation):

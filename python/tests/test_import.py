@@ -1,4 +1,4 @@
-"""The import of Condyle loads NumPy, but no other module that is slow to import."""
+"""Tests that the import of Condyle loads NumPy, but no other module that is slow to import."""
 
 import subprocess
 import sys

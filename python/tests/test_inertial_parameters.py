@@ -1,4 +1,4 @@
-"""Inertial parameters of bodies: conversions in both directions, physical values, and the Jacobian."""
+"""Tests of inertial parameters of bodies: conversions in both directions, physical values, and the Jacobian."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_there_and_back(robot: Robot) -> None:
 
 
 def test_pseudo_inertia() -> None:
-    """Compares with the pseudo-inertia of point masses m at x: Σ m (x, 1) (x, 1)ᵀ."""
+    """Compares the pseudo-inertia with a sum over point masses m at x: Σ m (x, 1) (x, 1)ᵀ."""
     rng = np.random.default_rng(0)
     points, masses = rng.standard_normal((5, 3)), rng.uniform(0.1, 1, 5)
     pi = np.zeros(10)

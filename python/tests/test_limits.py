@@ -162,7 +162,7 @@ def test_a_start_is_moved_into_the_bounds() -> None:
 def test_feet_do_not_slip() -> None:
     quadruped = condyle.robots.quadruped()
     q = condyle.neutral(quadruped)
-    q[8::3], q[9::3] = 0.7, -1.4  # bent knees
+    q[8::3], q[9::3] = 0.7, -1.4  # joint angles with bent knees
     x0 = np.r_[q, np.zeros(18)]
     feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
     contacts = {f: condyle.ContactConstraint(f, "point", reference="local_world_aligned", kd=20.0) for f in feet}
@@ -203,7 +203,9 @@ def test_what_does_not_fit_is_refused_by_name() -> None:
 
 
 def test_constraints_of_ones_own_are_limits() -> None:
-    """Limits of the arm that are written in Python: with and without derivatives, nested, and at the terminal knot."""
+    """Checks limits of the arm that are written in Python: with and without derivatives, nested, and at the terminal
+    knot.
+    """
     problem, xs, us = reach()
     expected = sharp(problem)
     solution = expected.solve(xs, us)

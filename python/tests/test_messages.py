@@ -22,7 +22,7 @@ Q, ZERO = np.full(7, 0.3), np.zeros(7)
 
 
 def told(call: Callable[[], object], error: type[Exception]) -> str:
-    """Returns the message of an error."""
+    """Returns the message of the error that a call raises."""
     with pytest.raises(error) as raised:
         call()
     return str(raised.value)
@@ -41,8 +41,8 @@ def test_columns_and_batches_in_another_layout() -> None:
 
 @pytest.mark.parametrize("shape", [(5, 6, 8), (5, 48, 1), (5, 8, 7)])
 def test_matrices_of_many_states_in_another_layout(shape: tuple[int, ...]) -> None:
-    """Matrices with a wrong shape are errors, even if they have enough numbers; otherwise the numbers would be read in
-    the wrong order.
+    """Checks that matrices with a wrong shape are errors, even if they have the right count of numbers. Otherwise the
+    numbers would be read in the wrong order.
     """
     states = np.tile(Q, (5, 1))
     message = told(lambda: condyle.rnea(ARM, DATA, states, ZERO, ZERO, np.zeros(shape)), ValueError)
@@ -150,8 +150,8 @@ def test_a_setting_of_another_type_is_named(name: str, value: object, text: str)
 
 
 def test_functions_are_functions() -> None:
-    """For user-defined actions, residuals and spaces, an argument that is not a function is an error at construction,
-    not in a solve.
+    """Checks that an argument of an action, a residual or a space that should be a function, but is not, is an error at
+    construction.
     """
     optimal, f = condyle.optimal, len
     for make, name in (

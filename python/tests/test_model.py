@@ -1,4 +1,4 @@
-"""Models: attributes, text, reading, copies and pickles."""
+"""Tests of models: attributes, text, reading, copies and pickles."""
 
 import copy
 import pickle
@@ -238,8 +238,8 @@ def test_strict(tmp_path: Path) -> None:
 
 
 def test_singular() -> None:
-    """If M is singular, functions that need M⁻¹ raise an error, and all other functions work. A rotor makes M
-    regular.
+    """Checks that functions that need M⁻¹ raise an error if M is singular, and that all other functions work. A rotor
+    makes M regular.
     """
     model = condyle.Model.from_urdf_str(PENDULUM)
     data, zero = condyle.Data(model), np.zeros(2)
@@ -290,7 +290,7 @@ def test_inertial_parameters() -> None:
 
 
 def test_other_inertias(robot: Robot) -> None:
-    """M is linear in the inertias."""
+    """Checks that M is linear in the inertias."""
     model, data, q, *_ = robot
     inertias = [condyle.Inertia.from_com(2 * i.mass, i.com, 2 * i.about_com) for i in model.inertias]
     heavier = model.with_inertias(inertias)
@@ -334,8 +334,8 @@ def test_words(quadruped: Robot) -> None:
 
 @pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
 def test_pickle(robot: Robot, protocol: int) -> None:
-    """All numbers of the copy are bit-identical, also infinite limits. The copy can use the scratch memory of the
-    original.
+    """Checks that all numbers of a pickled copy are bit-identical, also infinite limits. The copy can use the scratch
+    memory of the original.
     """
     model, data, q, v, a, *_ = robot
     model = model.with_gravity([0.1, 0.2, 0.3]).with_armature(np.full(model.nv, 1 / 3))

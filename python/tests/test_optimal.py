@@ -1,4 +1,4 @@
-"""Optimal control: user-defined actions, costs by name and by knot, errors."""
+"""Tests of optimal control: user-defined actions, costs by name and by knot, errors."""
 
 import pickle
 from typing import Any
@@ -29,7 +29,7 @@ ARM = condyle.robots.arm7()
 QUADRUPED = condyle.robots.quadruped()
 X0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
 STANDING = np.r_[condyle.neutral(QUADRUPED), np.zeros(18)]
-# Tolerance for the optimum of the same problem, found twice with a tolerance of 1e-9 of the cost.
+# Tolerance between two optima of the same problem, each found with a tolerance of 1e-9 of the cost.
 OPTIMUM = 1e-8
 
 
@@ -218,8 +218,8 @@ def test_what_no_file_can_hold() -> None:
 
 
 def test_costs_of_a_knot_move_with_it() -> None:
-    """A horizon that was shifted and got new targets at its end equals a horizon that has these targets from the
-    start.
+    """Checks that a horizon that was shifted and got new targets at its end equals a horizon that has these targets
+    from the start.
     """
     horizon = 12
 

@@ -18,7 +18,8 @@ from condyle.optimal import (
     thrusters,
 )
 
-# Exact derivatives agree with given derivatives up to rounding, central differences agree up to 1e-6 of their size.
+# Exact derivatives agree with given derivatives up to rounding. Central differences agree up to a relative error of
+# 1e-6.
 EXACT = 1e-12
 DIFFERENCES = 1e-5
 ARM = condyle.robots.arm7()
@@ -96,7 +97,9 @@ def test_functions_of_two(f: Any) -> None:
 
 
 def check(calc: Any) -> None:
-    """Compares the derivatives of calc at several knots, computed by one call of calc, with central differences."""
+    """Compares derivatives of calc with central differences. One call of calc computes the derivatives at several
+    knots.
+    """
 
     def counted(t: Any, x: Any, u: Any) -> Any:
         calls.append(x.dtype)

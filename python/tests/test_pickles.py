@@ -1,4 +1,6 @@
-"""Tests of pickles of all public classes: the pickle is an equal copy, or an error for a computation in progress."""
+"""Tests of pickles of all public classes: a pickle gives an equal copy, or raises an error for a computation in
+progress.
+"""
 
 import inspect
 import pickle
@@ -32,7 +34,7 @@ def cone() -> optimal.FrictionCone:
     return optimal.FrictionCone(0.6, facets=8, inner=True, least=1.0, rotation=[[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
-# An object of each class whose pickle is tested only here.
+# An object of each class whose pickle is tested only in this file.
 OBJECTS: dict[str, Any] = {
     "Simulation": simulation.Simulation(ARM, "runge_kutta_4", dt=0.002, passive=0.1),
     "Ground": simulation.Ground(["tool"], friction=0.3),
@@ -83,7 +85,7 @@ def test_a_copy_shows_the_same(name: str, protocol: int) -> None:
 
 @pytest.mark.parametrize(("name", "item"), [pair for pair in classes() if pair[0] not in OBJECTS])
 def test_all_others_pickle_or_are_under_way(name: str, item: type) -> None:
-    """Every other class defines its own pickle, is a tuple or an exception, or its pickle raises an error that names
+    """Checks every other class: it defines its own pickle, is a tuple or an exception, or raises an error that names
     the class.
     """
     own = any({"__reduce__", "__reduce_ex__", "__getstate__"} & vars(base).keys() for base in item.__mro__[:-1])
@@ -99,8 +101,8 @@ def swing(t: int, x: np.ndarray, u: np.ndarray) -> float:
 
 
 def test_residuals_of_ones_own_go_with_their_knots() -> None:
-    """A copied problem with user-defined residuals gives bit-identical solutions. The residuals are in costs, in costs
-    of single knots, and in limits.
+    """Checks that a copied problem with user-defined residuals gives bit-identical solutions. The residuals are in
+    costs, in costs of single knots, and in limits.
     """
     ends, rest = np.full(7, np.inf), Cost("rest", 0.1, Residual.state(np.zeros(14)))
     costs = [Cost("power", 1e-2, Residual.own(7, power)), rest, Cost("swing", 1.0, Residual.own_cost(swing))]

@@ -43,7 +43,7 @@ STANDING = np.r_[condyle.neutral(QUADRUPED), np.zeros(18)]
 STANDING[8:19] = np.tile([0.7, -1.4, 0.0], 4)[:11]
 FEET = ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
 KNOTS = 11
-# Tolerance for the same sums in another order.
+# Tolerance for equal sums that are computed in another order.
 ROUNDING = 1e-9
 
 
@@ -95,7 +95,7 @@ def test_an_action_for_each_knot_gives_the_bits_of_one_for_all() -> None:
     one, other = (Fddp(problem, max_iterations=6).solve(xs, us) for problem in (apart, shared))
     assert one.trace[0].accepted and [i.cost for i in one.trace] == [i.cost for i in other.trace]
     np.testing.assert_array_equal(one.xs, other.xs)
-    # costs that are set later affect only this knot
+    # costs that are set later by `set_costs` affect only one knot
     for problem in (apart, shared):
         problem.set_costs(4, costs(7))
         problem.set_weight("com", 5.0)
@@ -181,7 +181,7 @@ def test_accelerations_efforts_and_forces_of_a_solution() -> None:
     solver.shift(0)
     with pytest.raises(ProblemError, match="the horizon has moved on since this solution"):
         _ = late.forces
-    assert solution.forces[0].keys() == set(FEET)  # computed before the shift
+    assert solution.forces[0].keys() == set(FEET)  # the forces are computed before the shift
     jump = ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), [])
     falling = np.array(STANDING)
     falling[21] = -1.0
@@ -291,7 +291,7 @@ def test_a_sweep_is_the_solvers() -> None:
     solution = Fddp(problem, max_iterations=1, inverse_dynamics_form=False).solve(xs, us)
     for t in range(KNOTS):
         np.testing.assert_allclose(found.K[t], solution.K[t], rtol=0, atol=1e-6 * abs(solution.K[t]).max())
-    # for a linear-quadratic problem, the first step u + k + K dx gives the optimum; here it is computed by hand
+    # for a linear-quadratic problem, the first step u + k + K dx gives the optimum, which is computed by hand here
     dx, cost = np.zeros(14) + np.array(knots[0].f) * 0.0, 0.0
     for knot, K, k in zip(knots, found.K, found.k, strict=False):
         A, B, f, Q, S, R, q, r = (np.array(part) for part in knot[:8])

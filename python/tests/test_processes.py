@@ -86,8 +86,8 @@ CALLS = {
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("calls", CALLS.values(), ids=CALLS)
 def test_fork_after_threads(calls: str) -> None:
-    """If a process has computed with threads and then forks, its child, and also a child of this child, computes the
-    same results.
+    """Checks forks of a process that has computed with threads: its child, and a child of this child, compute the same
+    results.
     """
     check(
         calls
@@ -120,7 +120,7 @@ def test_fork_after_threads(calls: str) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_random_after_a_fork() -> None:
-    """Forked processes draw different positions."""
+    """Checks that forked processes draw different random positions."""
     check(
         """
         arm = condyle.robots.arm7()
@@ -139,7 +139,7 @@ def test_random_after_a_fork() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("name", ["batch", "fddp"])
 def test_multiprocessing_by_fork(name: str) -> None:
-    """A pool of forked processes computes the same results as their parent, and ends normally."""
+    """Checks that a pool of forked processes computes the same results as the parent process, and ends normally."""
     check(
         CALLS[name]
         + """
@@ -242,7 +242,9 @@ INTERRUPTED = """
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
 @pytest.mark.parametrize("call", LONG.values(), ids=LONG)
 def test_signals(call: str) -> None:
-    """A handler runs during a call, and its exception ends the call; results computed so far are kept."""
+    """Checks that a signal handler runs during a call, and that its exception ends the call. Results computed so far
+    are kept.
+    """
     check(
         call
         + INTERRUPTED
@@ -262,10 +264,10 @@ def test_signals(call: str) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 @pytest.mark.parametrize("name", ["solve", "augmented lagrangian", "simulation"])
 def test_control_c(name: str) -> None:
-    """Ctrl-C raises KeyboardInterrupt within the call, which ends the program."""
+    """Checks that Ctrl-C raises KeyboardInterrupt within a call, and that this exception ends the program."""
     program = PRELUDE + textwrap.dedent(LONG[name] + INTERRUPTED) + "print('begin', flush=True)\n"
     program += "interrupted(KeyboardInterrupt)\nprint('again', flush=True)\ncall()\n"
-    # restore the handler: a shell that runs the tests in the background may make them ignore Ctrl-C
+    # restore the handler: a shell that runs the tests in the background may make the tests ignore Ctrl-C
     program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n" + program
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -280,7 +282,7 @@ def test_control_c(name: str) -> None:
 
 
 def test_signals_on_another_thread() -> None:
-    """Only the main thread receives signals: a solve on another thread continues, and does not block the
+    """Checks that only the main thread receives signals: a solve on another thread continues, and does not block the
     interpreter.
     """
     check(
@@ -355,7 +357,9 @@ MEANWHILE = {
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
 @pytest.mark.parametrize("call", MEANWHILE.values(), ids=MEANWHILE)
 def test_handlers_run_meanwhile(call: str) -> None:
-    """Handlers run repeatedly during a long call, not once at its end; and their exception ends it."""
+    """Checks that signal handlers run repeatedly during a long call, not once at its end, and that a handler's
+    exception ends the call.
+    """
     check(
         call
         + """
@@ -383,7 +387,9 @@ def test_handlers_run_meanwhile(call: str) -> None:
 
 @pytest.mark.parametrize("value", ["", "avx3", "AVX2", "neon" if os.uname().machine == "x86_64" else "avx2"])
 def test_refused_level(value: str) -> None:
-    """If a SIMD level cannot be used, the import raises an error that names the available levels."""
+    """Checks that the import raises an error that names the available SIMD levels, if the chosen level cannot be
+    used.
+    """
     code, _, errors = run("", CONDYLE_LEVEL=value)
     assert code == 1
     last = errors.strip().splitlines()[-1]
@@ -392,7 +398,7 @@ def test_refused_level(value: str) -> None:
 
 
 def test_chosen_level() -> None:
-    """The import accepts a SIMD level that every processor has."""
+    """Checks that the import accepts a SIMD level that every processor has."""
     check(
         "arm = condyle.robots.arm7()\ncondyle.rnea(arm, condyle.Data(arm), *np.zeros((3, 7)))", CONDYLE_LEVEL="baseline"
     )

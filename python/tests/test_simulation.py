@@ -1,4 +1,4 @@
-"""Simulations: steps, control laws, and errors."""
+"""Tests of simulations: steps, control laws, and errors."""
 
 import copy
 import pickle
@@ -34,7 +34,7 @@ def test_a_step_of_euler(robot: Robot) -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_orders(integrator: Any) -> None:
-    """Halving the step reduces the error by the factor 2 to the power of the integrator's order."""
+    """Checks that half the step length reduces the error by a factor 2ⁿ, where n is the order of the integrator."""
     arm = condyle.robots.arm7()
     q, v = [0.3] * 7, [0.1] * 7
 
@@ -52,9 +52,7 @@ def test_orders(integrator: Any) -> None:
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_control_laws(quadruped: Robot, integrator: Any) -> None:
-    """Efforts and forces that a control law sets before each step have the same effect as the arguments of single
-    steps.
-    """
+    """Checks that efforts and forces that a control law sets have the same effect as arguments of single steps."""
     model, _, q, v, *_ = quadruped
     tau, f_ext = np.zeros(18), np.zeros((14, 6))
     by_law, by_hand = Simulation(model, integrator), Simulation(model, integrator)
@@ -171,7 +169,7 @@ def test_a_robot_lands_and_stands(quadruped: Robot) -> None:
 
 @pytest.mark.parametrize("mu", [0.2, 0.6])
 def test_a_box_slides_to_a_stop(mu: float) -> None:
-    """The sliding distance is v²/(2 μ g), minus half the distance of one step."""
+    """Checks that the sliding distance of a box is v²/(2 μ g), minus half the distance of one step."""
     model = condyle.Model.from_mjcf_str(BOX).with_frame("centre", "box")
     simulation = Simulation(model, ground=Ground([("centre", CORNERS)], friction=mu))
     q, v = condyle.neutral(model), np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])

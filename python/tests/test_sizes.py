@@ -62,7 +62,9 @@ def test_sizes_are_limited(name: str) -> None:
 
 
 def test_a_horizon_is_limited() -> None:
-    """The limit for the number of knots depends on their size, since a solver has matrices for each knot."""
+    """Checks that the maximum number of knots depends on the size of the knots, since a solver has matrices for each
+    knot.
+    """
     with pytest.raises(
         ProblemError, match="^numbers in the matrices of all knots: .* more than the limit of 268435456$"
     ):
@@ -71,7 +73,9 @@ def test_a_horizon_is_limited() -> None:
 
 
 def test_numbers_without_memory_are_free() -> None:
-    """Arguments that do not determine a size of memory, such as numbers of iterations, have no upper limit."""
+    """Checks that arguments that do not determine a size of memory, such as numbers of iterations, have no upper
+    limit.
+    """
     xs, us = np.zeros((4, 1)), np.zeros((3, 1))
     solution = Fddp(problem(), max_iterations=2**63, time_budget=1e18).solve(xs, us)
     assert solution.status == "converged"
@@ -81,7 +85,7 @@ def test_numbers_without_memory_are_free() -> None:
 
 
 def test_more_states_than_memory() -> None:
-    """NumPy raises the error for arguments and results that are too large for the memory."""
+    """Checks that NumPy raises an error for arguments and results that are too large for the memory."""
     q = np.broadcast_to(np.zeros(7), (10**13, 7))
     with pytest.raises(MemoryError):
         condyle.gravity(ARM, condyle.Data(ARM), q)
@@ -105,7 +109,9 @@ def test_nothing_to_simulate(integrator: Any) -> None:
 
 
 def test_nothing_to_control() -> None:
-    """A problem of a robot without coordinates is an error, but knots of such a robot can be created."""
+    """Checks that a problem of a robot without coordinates is an error, but that knots of such a robot can be
+    created.
+    """
     robot = condyle.Model.from_urdf_str(FIXED)
     knot = FreeDynamics(robot, 0.1, [])
     assert knot.quasi_static([]).shape == (0,)

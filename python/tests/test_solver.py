@@ -1,4 +1,4 @@
-"""Solvers from Python: shifted horizons, time budgets, bounds and methods."""
+"""Tests of solvers from Python: shifted horizons, time budgets, bounds and methods."""
 
 import numpy as np
 import pytest

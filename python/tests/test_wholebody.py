@@ -142,7 +142,7 @@ WANTED = 0.2
 @pytest.mark.parametrize("axes", ["world", "local", ("frame", "right_sole")])
 @pytest.mark.parametrize("kind", ["com", "pose", "position", "orientation", "velocity", "angular_momentum"])
 def test_tasks_of_every_kind(kind: str, axes: Any) -> None:
-    """A task of the first priority is fulfilled exactly: J q̈ + J̇ v = a*, along the axes of the task."""
+    """Checks that a task of the first priority is fulfilled exactly: J q̈ + J̇ v = a*, along the axes of the task."""
     q, v = moving(HUMANOID, upright(), 1)
     data = condyle.Data(HUMANOID)
     on_frame = kind not in ("com", "angular_momentum")
@@ -190,7 +190,9 @@ def test_a_task_of_force_and_one_of_posture() -> None:
 
 
 def test_settings_are_the_library_s() -> None:
-    """The default settings in Python equal the library's defaults, and the controller returns given settings."""
+    """Checks that the default settings in Python equal the library's defaults, and that the controller returns given
+    settings.
+    """
     assert WholeBodyController(QUADRUPED, [], []).settings == Settings()
     limits = JointLimits(0.1, 50.0, velocity=np.full(18, 3.0))
     given = Settings(1e-4, 1e-3, Gains(1.0, 2.0), 9.0, Pyramid(6, False), np.full(18, 40.0), limits, 3, 0.1, "clarabel")
@@ -206,7 +208,7 @@ def test_settings_are_the_library_s() -> None:
 
 
 def test_limits_of_effort() -> None:
-    """If motors are too weak to carry the robot, the command reports this, and is within the torque limits."""
+    """Checks that commands are within the torque limits if motors are too weak to carry the robot."""
     weak = np.full(18, 5.0)
     controller = WholeBodyController(QUADRUPED, points(), TASKS, Settings(effort=weak))
     command = controller.step(STANDING, np.zeros(18), controller.hold(STANDING))
@@ -316,7 +318,7 @@ def test_plans_from_arrays() -> None:
     x0, v = np.r_[STANDING, np.zeros(18)], np.zeros(18)
     x1 = x0.copy()
     x1[2] -= 0.04
-    x0[21] = x1[21] = -0.4  # m/s, in the direction of the trunk's z
+    x0[21] = x1[21] = -0.4  # velocity along the trunk's z axis (m/s)
     touches = np.array([[True] * 4, [False, True, True, True]])
     controls = np.arange(24.0).reshape(2, 12)
     gains = np.zeros((2, 12, 36))
@@ -350,7 +352,7 @@ def test_plans_from_arrays() -> None:
 
 
 def test_plans_of_solutions() -> None:
-    """Converts a solution with an impact: the knot of the impact has no controls, and the knots before and after it
+    """Checks the plan of a solution with an impact: the impact's knot has no controls, and the two knots of the impact
     have the same time.
     """
     feet = {foot: condyle.ContactConstraint(foot, "point", kd=20.0) for foot in FEET}
@@ -393,7 +395,7 @@ def test_values() -> None:
 
 
 def test_two_controllers_in_two_threads() -> None:
-    """Two controllers in two threads give the same results as each controller gives alone."""
+    """Checks that two controllers in two threads give the same results as each controller alone."""
 
     def run(seed: int, out: list[np.ndarray]) -> None:
         controller = WholeBodyController(QUADRUPED, points(), TASKS)
@@ -415,8 +417,8 @@ def test_two_controllers_in_two_threads() -> None:
 
 
 def test_one_controller_in_two_threads() -> None:
-    """Only one thread at a time can use a controller: the other thread gets an error, and no command mixes the data of
-    two threads.
+    """Checks that only one thread at a time can use a controller: the other thread gets an error, and no command mixes
+    the data of two threads.
     """
     controller = WholeBodyController(
         HUMANOID, CONTACTS["soles"], [Task.com(), Task.posture()], Settings(warm_start=False)

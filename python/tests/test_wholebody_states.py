@@ -52,15 +52,15 @@ def test_a_quaternion_has_length_1(factor: float) -> None:
         assert command.reason == controller.command.reason
         assert command.reason.startswith("joint `root_joint`: its rotation, q[3..7], has the length ")
         assert np.isfinite(command.tau).all()
-        np.testing.assert_allclose(command.tau, good.tau, atol=2.0)  # the robot stands
+        np.testing.assert_allclose(command.tau, good.tau, atol=2.0)  # the robot still stands
     with pytest.raises(ControllerError, match="joint `root_joint`"):
         command.solved()
     assert controller.step(STANDING, REST, references).status == "solved"
 
 
 def test_references_are_positions_and_poses() -> None:
-    """References that are set are checked at once; references that are changed in place are checked in the next
-    step.
+    """Checks that references that are set are checked at once, and that references changed in place are checked in the
+    next step.
     """
     controller = new()
     good = controller.hold(STANDING)
@@ -89,7 +89,7 @@ def test_references_are_positions_and_poses() -> None:
     turned = np.eye(4)
     turned[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
     good.frames[0].pose = turned
-    good.posture.q = scaled(-1.0)  # the same rotation
+    good.posture.q = scaled(-1.0)  # a negative quaternion describes the same rotation
     assert controller.step(STANDING, REST, good).status == "solved"
 
 
@@ -145,7 +145,9 @@ def test_normalize_needs_a_length() -> None:
 
 
 def ticks(controller: WholeBodyController, first: int, count: int) -> list[str]:
-    """Returns commands at states near the stance while contacts begin and end. One of the states is invalid."""
+    """Returns the commands of successive ticks, as text, at states near the stance while contacts begin and end. One of
+    the states is invalid.
+    """
     commands = []
     for k in range(first, first + count):
         rng = np.random.default_rng(k)

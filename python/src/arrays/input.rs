@@ -1,4 +1,4 @@
-//! Reads arrays that Python passes.
+//! Reads arrays that Python passes as arguments.
 
 use condyle::{Se3, Vec3, spatial::Mat3};
 use nalgebra::DMatrix;
@@ -16,7 +16,7 @@ use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::ops::Deref;
 
-/// The doubles of an argument, in C order. While this exists, other Rust code that uses NumPy cannot write to the
+/// The doubles of an argument, in C order. While an `Input` exists, other Rust code that uses NumPy cannot write to the
 /// array.
 pub(crate) struct Input<'py, D: Dimension>(PyReadonlyArray<'py, f64, D>);
 
@@ -28,20 +28,20 @@ impl<D: Dimension> Deref for Input<'_, D> {
 }
 
 impl Input<'_, Ix2> {
-    /// Copies the numbers to a matrix of nalgebra, which stores matrices by columns.
+    /// Copies the array's numbers to a matrix of nalgebra, in column-major order.
     pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
         let &[rows, columns] = self.0.shape() else { unreachable!("has two dimensions") };
         DMatrix::from_row_slice(rows, columns, self)
     }
 }
 
-/// The doubles of an argument, in C order, for calls that keep the interpreter's lock. NumPy is not told that the array
-/// is borrowed: this would take as long as the dynamics of a small robot.
+/// The doubles of an argument, in C order, for calls that keep the interpreter's lock. The borrow of the array is not
+/// registered with the crate `numpy`, because the registration takes as long as the dynamics of a small robot.
 pub(crate) enum InPlace<'py, D: Dimension> {
-    /// An array, kept alive by this reference.
+    /// An array of NumPy, kept alive by this reference.
     Array(Bound<'py, PyArray<f64, D>>),
-    /// The address and the count of an argument's numbers, for a call that runs no Python code before the numbers are
-    /// used.
+    /// The address and the number of an argument's doubles. The call must use the doubles before it runs any Python
+    /// code.
     AtOnce(*const f64, usize),
 }
 
@@ -117,7 +117,8 @@ fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[
     Ok(Input(as_it_lies_or_converted(argument, value, shape)?.try_readonly()?))
 }
 
-/// Returns the argument itself if it is an array of doubles in C order, else a new array with the same numbers.
+/// Returns the argument itself if the argument is an array of doubles in C order, else a new array with the same
+/// numbers.
 #[inline]
 fn as_it_lies_or_converted<'py, D: Dimension>(
     argument: &str,
@@ -161,11 +162,11 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
     array.call_method1("astype", (f64::get_dtype(py), "C"))
 }
 
-/// The shape that an argument must have, to be shown in messages.
+/// The expected shape of an argument, for error messages.
 pub(crate) enum Expected<'a> {
-    /// One shape.
+    /// The only accepted shape.
     Shape(&'a [usize]),
-    /// The shape for one state; an argument for many states has one more axis, the first.
+    /// The accepted shape for one state. For many states, the shape has an additional first axis.
     States(&'a [usize]),
 }
 
@@ -179,7 +180,7 @@ impl Display for Expected<'_> {
 }
 
 impl Expected<'_> {
-    /// Returns the error for an argument of another shape.
+    /// Returns the error for an argument whose shape `found` is not the expected shape.
     #[cold]
     pub(crate) fn error(&self, argument: &str, found: &[usize]) -> PyErr {
         let (Self::Shape(shape) | Self::States(shape)) = self;
@@ -198,7 +199,7 @@ pub(super) fn tuple(shape: &[usize]) -> String {
     if let [n] = shape { format!("({n},)") } else { format!("({})", list(shape)) }
 }
 
-/// Formats the numbers of a shape.
+/// Formats the sizes of a shape, separated by commas.
 fn list(shape: &[usize]) -> String {
     shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
 }
@@ -208,7 +209,7 @@ pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string())
 }
 
-/// Returns the name of an unexpected argument's type with its article: an int, a float.
+/// Returns the name of a value's type with an article, such as `an int`, for error messages.
 pub(crate) fn found_type(value: &Bound<'_, PyAny>) -> String {
     let name = type_name(value);
     let article = if name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O']) { "an" } else { "a" };
@@ -246,7 +247,8 @@ pub(crate) fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<
     Ok(vector(argument, value, length)?.to_vec())
 }
 
-/// Reads lower and upper bounds. If only one is given, the other is infinite; if neither is given, returns `None`.
+/// Reads lower and upper bounds. If only one bound is given, the other bound is infinite. If no bound is given, returns
+/// `None`.
 pub(crate) fn bounds(
     length: usize,
     lower: Option<&Bound<'_, PyAny>>,

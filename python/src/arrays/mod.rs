@@ -1,9 +1,9 @@
 //! NumPy arrays as arguments and results.
 //!
 //! Arguments (`input`): a float64 C-contiguous array is read without a copy; other dtypes and strides are converted; a
-//! wrong shape is a `ValueError`. Results (`output`): they are written to a new array, or to the caller's `out`.
-//! Matrices are column-major in nalgebra and row-major in NumPy. Arrays of hyper-dual numbers are arrays of objects,
-//! see `hyper_dual.rs`. Arrays that show a model's numbers are read-only, see `read_only`.
+//! wrong shape is a `ValueError`. Results (`output`) are written to a new array, or to the caller's `out`. Matrices are
+//! column-major in nalgebra and row-major in NumPy. Arrays of hyper-dual numbers are arrays of objects, see
+//! `hyper_dual.rs`. The attributes of a model are read-only arrays, see `read_only`.
 
 mod input;
 mod output;
@@ -25,7 +25,7 @@ use numpy::ndarray::Dimension;
 use pyo3::prelude::*;
 use std::ops::Deref;
 
-/// A type of number that functions of the library accept.
+/// A scalar type that the library's functions accept.
 pub(crate) trait Number: Scalar {
     /// The numbers of an argument, in C order, for a call that keeps the interpreter's lock.
     type Input<'py, D: Dimension>: Deref<Target = [Self]>;
@@ -38,16 +38,16 @@ pub(crate) trait Number: Scalar {
     ) -> PyResult<Self::Input<'py, D>>;
     /// Returns the number without its derivatives.
     fn real(&self) -> f64;
-    /// Reads a number.
+    /// Reads an argument that is a single number.
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
-    /// Fills an array in C order, the caller's or a new one, and returns it; `fill` sets all of its numbers.
+    /// Fills the caller's array `out`, or a new array in C order, and returns the array. `fill` must set all numbers.
     fn output<'py>(
         py: Python<'py>,
         out: Option<&Bound<'py, PyAny>>,
         shape: &[usize],
         fill: impl FnOnce(&mut [Self]),
     ) -> PyResult<Bound<'py, PyAny>>;
-    /// Returns a new vector of these numbers, for types with a faster method than `output`; otherwise `None`.
+    /// Returns a new vector of these numbers if this type has a faster method than `output`; otherwise `None`.
     fn new_vector<'py>(_: Python<'py>, _: &[Self]) -> Option<Bound<'py, PyAny>> {
         None
     }

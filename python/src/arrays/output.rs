@@ -14,7 +14,7 @@ use pyo3::types::{PyFloat, PyTuple, PyType};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-/// Fills an array in C order, the caller's or a new one of zeros, and returns it.
+/// Fills the caller's array `out`, or a new array of zeros in C order, and returns the array.
 pub(crate) fn output<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -31,7 +31,7 @@ pub(crate) fn output<'py>(
     }
 }
 
-/// Fills an array in C order, the caller's or a new one, and returns it; `fill` sets all of its numbers.
+/// Fills the caller's array `out`, or a new array in C order, and returns the array. `fill` must set all numbers.
 pub(super) fn set<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -48,7 +48,7 @@ pub(super) fn set<'py>(
     Ok(filled(array, fill))
 }
 
-/// Fills a new array in C order, and returns it.
+/// Fills a new array in C order, and returns the array.
 fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])) -> Bound<'py, PyAny> {
     // SAFETY: no other code has a reference to the array yet, and its `len` numbers are contiguous.
     #[allow(unsafe_code)]
@@ -57,16 +57,17 @@ fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])
     array.into_any()
 }
 
-/// Number of elements from which an array is large: NumPy allocates it in a call that can report an error.
+/// Minimum number of elements of a large array. A large array is allocated by a call of NumPy that can raise
+/// `MemoryError`.
 const LARGE: usize = 1 << 24;
 
-/// Returns whether an array of this shape has fewer than `LARGE` elements, so that its allocation is assumed to
-/// succeed.
+/// Returns whether an array of this shape has fewer than `LARGE` elements, so that the allocation of the array is
+/// assumed to succeed.
 fn is_small(shape: &[usize]) -> bool {
     shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE)
 }
 
-/// Returns an array in C order to be filled: the caller's array, whose shape is checked, or a new one.
+/// Returns an array in C order for a result: the caller's array, whose shape is checked, or a new array.
 pub(crate) fn place<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -104,13 +105,13 @@ pub(crate) fn writable<'py>(array: &Bound<'py, PyArrayDyn<f64>>) -> PyResult<PyR
 
 /// An array that is returned to Python.
 pub(crate) trait Array {
-    /// Type of its numbers.
+    /// Type of the array's numbers.
     type Number: Number;
-    /// Returns its shape.
+    /// Returns the array's shape.
     fn shape(&self) -> impl AsRef<[usize]>;
-    /// Writes its numbers in C order.
+    /// Writes the array's numbers to `x` in C order.
     fn write(&self, x: &mut [Self::Number]);
-    /// Returns its numbers without a copy, if it is a vector.
+    /// Returns the array's numbers without a copy if the array is a vector; otherwise `None`.
     fn vector(&self) -> Option<&[Self::Number]> {
         None
     }
@@ -151,7 +152,8 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     }
 }
 
-/// A symmetric matrix: its columns are written as rows, which is correct up to rounding.
+/// A symmetric matrix. The columns of the matrix are written as rows of the result. The two differ only by rounding
+/// errors.
 pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::spatial::Matrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {
@@ -164,20 +166,20 @@ impl<N: Number> Array for Symmetric<'_, N> {
     }
 }
 
-/// Returns the four numbers that begin at index `at`.
+/// Returns the four numbers of `from` that begin at index `at`.
 #[inline(always)]
 fn four<N: Copy>(from: &[N], at: usize) -> [N; 4] {
     *from[at..].first_chunk().expect("a matrix has as many")
 }
 
-/// Sets the four numbers that begin at index `at`.
+/// Sets the four numbers of `to` that begin at index `at`.
 #[inline(always)]
 fn set_four<N>(to: &mut [N], at: usize, numbers: [N; 4]) {
     *to[at..].first_chunk_mut().expect("a row has as many") = numbers;
 }
 
-/// Transposes a matrix: it is stored by columns, and written row by row, in tiles of 4 × 4. A tile is read and written
-/// with a few instructions. If numbers were written one by one, each write would touch another cache line.
+/// Transposes a matrix that is stored by columns, and writes the result row by row, in tiles of 4 × 4. A tile is read
+/// and written with a few instructions. If numbers were written one by one, each write would touch another cache line.
 fn transpose<N: Number>(from: &[N], rows: usize, columns: usize, to: &mut [N]) {
     assert!(from.len() == rows * columns && to.len() == rows * columns, "as many numbers as a matrix has");
     let mut r = 0;
@@ -211,7 +213,7 @@ fn transpose<N: Number>(from: &[N], rows: usize, columns: usize, to: &mut [N]) {
     }
 }
 
-/// A homogeneous matrix.
+/// A pose, written as a homogeneous matrix.
 impl<S: Number> Array for Se3<S> {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -229,7 +231,7 @@ impl<S: Number> Array for Se3<S> {
     }
 }
 
-/// Rows of equal length.
+/// A matrix, given as rows of equal length.
 impl<S: Number, const N: usize> Array for [[S; N]] {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -252,7 +254,7 @@ impl<S: Number> Array for Mat3<S> {
     }
 }
 
-/// Homogeneous matrices, one for each body.
+/// The poses of bodies, written as one homogeneous matrix for each body.
 impl<S: Number> Array for [Se3<S>] {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -275,12 +277,12 @@ impl<S: Number> Array for Inertia<S> {
         x.fill(S::zero());
         for (k, column) in self.rotational.full().columns().into_iter().enumerate() {
             x[7 * k] = self.mass;
-            x[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&column.to_array()); // symmetric: a column is a row
+            x[6 * (3 + k) + 3..6 * (4 + k)].copy_from_slice(&column.to_array()); // symmetric matrix
         }
     }
 }
 
-/// Implements `Array` for types that are one row of numbers.
+/// Implements `Array` for types that consist of N numbers and become vectors.
 macro_rules! rows {
     ($($type:ident: $n:literal),*) => {$(
         impl<S: Number> Array for $type<S> {
@@ -332,7 +334,7 @@ impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Give for Computed<S, F, AXES
         if out.is_none() {
             return S::output(py, None, &self.shape, &self.fill);
         }
-        // computed in other memory first, because `out` may be an input of the computation
+        // the numbers are computed in other memory first, because `out` may be an input of the computation
         let mut numbers = vec![S::zero(); self.shape.iter().product()];
         (self.fill)(&mut numbers);
         S::output(py, out, &self.shape, |x| x.copy_from_slice(&numbers))
@@ -345,7 +347,7 @@ impl Give for f64 {
     }
 }
 
-/// Derivatives of an acceleration with respect to q and v.
+/// The derivatives of an acceleration with respect to q and v, returned as a tuple of two arrays.
 impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let mut out = members(out, &["da_dq", "da_dv"])?.into_iter();
@@ -354,7 +356,7 @@ impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
     }
 }
 
-/// Looks up a class of `condyle._types`, or of another module, once.
+/// Looks up a class of `condyle._types`, or of another module, on the first call, and stores the class.
 macro_rules! class {
     ($py:expr, $name:expr) => {
         $crate::arrays::class!($py, "condyle._types", $name)
@@ -366,7 +368,8 @@ macro_rules! class {
 }
 pub(crate) use class;
 
-/// Creates a named tuple of a class without a call of the class's `__new__`, which is slower because it is Python code.
+/// Creates a named tuple of a class. The class's `__new__` is not called, because it is Python code and therefore
+/// slower.
 pub(crate) fn named<'py>(class: &Bound<'py, PyType>, members: Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>> {
     static NEW: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = class.py();
@@ -385,8 +388,8 @@ macro_rules! give_named {
 }
 pub(crate) use give_named;
 
-/// Implements `Give` for structs of the library: each becomes the named tuple of the same name. The tuple has the
-/// members listed here; some have another name than in Rust.
+/// Implements `Give` for structs of the library: each struct becomes the named tuple of the same name. The arguments of
+/// the macro list the members; some members have another name than in Rust.
 macro_rules! named_tuples {
     (@name $member:ident) => { stringify!($member) };
     (@name $member:ident as $name:ident) => { stringify!($name) };

@@ -1,5 +1,5 @@
-//! A function as CasADi calls it: the sparsity of its results and derivatives, and the numbers of their entries.
-//! Derivatives with respect to tangent coordinates are converted to CasADi's coordinates.
+//! A function in the form in which CasADi calls it: the sparsity of results and derivatives, and the values of their
+//! entries. Derivatives with respect to tangent coordinates are converted to CasADi's coordinates.
 
 use super::chart::{Chart, Position};
 use super::computation::{Calls, Computation};
@@ -9,13 +9,13 @@ use nalgebra::DMatrix;
 use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 
-/// Indices of the four functions of a slot.
+/// Indices of a slot's four functions: the value, the Jacobian J, the product Jᵀλ, and the Jacobian of this product.
 pub(super) const VALUE: usize = 0;
 pub(super) const JACOBIAN: usize = 1;
 pub(super) const REVERSE: usize = 2;
 pub(super) const HESSIAN: usize = 3;
 
-/// An argument or a result of a function, as CasADi describes it.
+/// CasADi's description of an argument or a result of a function.
 pub(super) struct Port {
     pub(super) name: CString,
     /// CasADi's description of a sparse matrix: number of rows, number of columns, index of the first entry of each
@@ -81,11 +81,11 @@ enum Source {
 pub(super) struct Output {
     pub(super) port: Port,
     source: Source,
-    /// For each entry of one state's result, the index of its number in the source.
+    /// For each entry of one state's result, the index of the entry's number in the source.
     from: Vec<usize>,
 }
 
-/// One of the functions of a slot.
+/// The description of one of a slot's functions for CasADi.
 #[derive(Default)]
 pub(super) struct Description {
     pub(super) inputs: Vec<Port>,
@@ -112,23 +112,24 @@ pub(super) struct Bound {
     /// Size of each argument for one state; `ny` is the total size of the results for one state.
     sizes: Vec<usize>,
     ny: usize,
-    /// For each result, the index of its first number among the numbers of all results, and the indices of its entries
-    /// relative to this number.
+    /// For each result, the index of the result's first number among the numbers of all results. Further, the indices
+    /// of the result's entries relative to this number.
     results: Vec<(usize, Vec<usize>)>,
     pub(super) descriptions: [Description; 4],
-    /// Unused work spaces. Each call takes one and puts it back, so their number is the largest number of simultaneous
-    /// calls.
+    /// Work spaces that no call uses at present. Each call takes a work space and returns it at the end. So the list
+    /// grows to the largest number of simultaneous calls.
     free: Mutex<Vec<Work>>,
 }
 
-/// Work space of a call. It has one position, one J and one H for each state that is computed at the same time.
+/// Work space of a call, with one position, one J and one H for each state that is computed at the same time.
 struct Work {
     calls: Box<dyn Calls>,
     positions: Vec<Position>,
     x: Vec<Vec<f64>>,
     lambda: Vec<f64>,
     y: Vec<f64>,
-    /// `J`, `g` and `H` are derivatives with respect to tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
+    /// `J`, `g` and `H` are derivatives of the function f with respect to tangent coordinates: J, Jᵀλ and the Hessian
+    /// of λᵀf, with multipliers λ.
     J: Vec<DMatrix<f64>>,
     g: Vec<f64>,
     H: Vec<DMatrix<f64>>,
@@ -292,10 +293,11 @@ impl Bound {
         Ok(())
     }
 
-    /// Evaluates a function for the states in the range `some`, which one call of the computation can do.
+    /// Evaluates a function for the states in the range `some`, in one call of the computation. The range may not
+    /// contain more states than such a call allows.
     ///
     /// # Safety
-    /// As for `evaluate`.
+    /// `arg` and `res` must satisfy the conditions of `evaluate`.
     #[allow(unsafe_code)]
     unsafe fn evaluate_some(
         &self,

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, SMatrix};
 /// The matrix T of one joint, in the leading rows and columns.
 type Block = SMatrix<f64, 6, 7>;
 
-/// The coordinates of a joint: their ranges in q and v.
+/// The coordinates of a joint: the ranges of indices in q and in v.
 #[derive(Clone, Debug)]
 struct Group {
     joint: Joint,
@@ -47,11 +47,11 @@ pub(super) struct Chart {
 /// A position, and the matrix T at this position.
 #[derive(Clone, Debug)]
 pub(super) struct Position {
-    /// q̂, nq numbers.
+    /// The normalised position q̂, nq numbers.
     pub(super) q: Vec<f64>,
-    /// The matrix T of each group; only set for groups with a quaternion or a point of a circle.
+    /// The matrix T of each group. T is set only for groups with a quaternion or a point of a circle.
     T: Vec<Block>,
-    /// For each group, the length by which its quaternion or point of a circle was divided.
+    /// For each group, the length by which the group's quaternion or point of a circle was divided.
     lengths: Vec<f64>,
 }
 
@@ -80,7 +80,8 @@ impl Chart {
         Position { q: vec![0.0; self.nq], T: vec![Block::zeros(); groups], lengths: vec![1.0; groups] }
     }
 
-    /// Returns the tangent coordinates that change with coordinate `q`, an index in q or in the numbers after q.
+    /// Returns the indices of the tangent coordinates that depend on the coordinate with index `q`. The index counts
+    /// the numbers of the position, then the numbers that follow the position.
     pub(super) fn moved_by(&self, q: usize) -> Range<usize> {
         if q >= self.nq {
             let own = q - self.nq + self.nv;
@@ -93,7 +94,7 @@ impl Chart {
         }
     }
 
-    /// Computes q̂ and T at q.
+    /// Computes the normalised position q̂ and the matrix T at q.
     pub(super) fn update(&self, q: &[f64], at: &mut Position) {
         at.q.copy_from_slice(q);
         for (k, group) in self.groups.iter().enumerate() {
@@ -126,7 +127,8 @@ impl Chart {
         }
     }
 
-    /// Adds Σ_k g_k C_k to the nq rows and columns of H that begin at index `first`.
+    /// Adds Σ_k g_k C_k to the nq rows and columns of H that begin at index `first`. g is a gradient with respect to
+    /// tangent coordinates. C_k is the matrix of second derivatives of tangent coordinate k with respect to q.
     pub(super) fn add_curvature(&self, at: &Position, g: &[f64], H: &mut DMatrix<f64>, first: usize) {
         for (k, group) in self.groups.iter().enumerate() {
             let Some(unit) = group.unit() else { continue };
@@ -210,8 +212,8 @@ impl Chart {
 }
 
 impl Group {
-    /// Returns Eᵀ at a normalised position, from T E = 1. In T, the block of a translation is a rotation matrix, the
-    /// row of a circle has length 1, and the rows of a quaternion have length 2.
+    /// Returns Eᵀ at a normalised position, with E = ∂(q ⊕ δ)/∂δ. E follows from T E = 1. In T, the block of a
+    /// translation is a rotation matrix, the row of a circle has length 1, and the rows of a quaternion have length 2.
     fn retraction(&self, q: &[f64]) -> Block {
         let mut E = tangent_map(self.joint, &q[self.q.clone()], 1.0);
         let turns = self.unit().expect("a group that is none of numbers");
@@ -279,13 +281,13 @@ fn tangent_map(joint: Joint, q: &[f64], length: f64) -> Block {
     T
 }
 
-/// Writes the row of T with δθ = (c ds − s dc) / length.
+/// Writes the row of T for a point (c, s) of a circle: δθ = (c ds − s dc) / length.
 fn circle(T: &mut Block, (i, j): (usize, usize), c: f64, s: f64, length: f64) {
     T[(i, j)] = -s / length;
     T[(i, j + 1)] = c / length;
 }
 
-/// Writes the rows of T with δω = 2 vec(q̂* dq) / length.
+/// Writes the three rows of T for a quaternion: δω = 2 vec(q̂* dq) / length.
 fn quaternion(T: &mut Block, (i, j): (usize, usize), q: &[f64], length: f64) {
     let [x, y, z, w] = [q[0], q[1], q[2], q[3]].map(|x| 2.0 * x / length);
     let rows = [[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]];

@@ -5,7 +5,7 @@ use super::chart::Chart;
 use condyle::ModelError as Error;
 use nalgebra::DMatrix;
 
-/// A result, which is a matrix.
+/// Name and shape of a result; every result is a matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Output {
     pub(super) name: &'static str,
@@ -31,8 +31,8 @@ pub(super) trait Computation: Send + Sync {
         true
     }
 
-    /// Returns whether a first derivative may differ from zero: the derivative of number `row` of all results with
-    /// respect to tangent coordinate j.
+    /// Returns whether a first derivative may differ from zero: the derivative of the number with index `row` among the
+    /// numbers of all results, with respect to tangent coordinate j.
     fn depends(&self, row: usize, j: usize) -> bool;
 
     /// Returns whether the second derivative of λᵀf with respect to tangent coordinates i and j may differ from zero.
@@ -51,7 +51,7 @@ pub(super) trait Calls: Send {
         1
     }
 
-    /// Computes all results. They are written to `y` one after the other, each by columns.
+    /// Computes all results. Writes the results to `y` one after the other, each result column by column.
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]);
 
     /// Computes the first derivatives of all results with respect to all tangent coordinates.

@@ -9,16 +9,16 @@ use condyle::{
 };
 use nalgebra::DMatrix;
 
-/// The quantity that is computed.
+/// The quantity that a function computes.
 #[derive(Clone, Debug)]
 pub(crate) enum Kind {
-    /// τ = rnea(q, v, a).
+    /// Inverse dynamics: τ = rnea(q, v, a).
     Rnea,
-    /// a = aba(q, v, τ).
+    /// Forward dynamics: a = aba(q, v, τ).
     Aba,
-    /// M = crba(q).
+    /// The inertia matrix: M = crba(q).
     Crba,
-    /// Position and rotation of a frame.
+    /// The position and the rotation of a frame.
     FramePlacement { frame: usize },
     /// The velocity of a frame.
     FrameVelocity { frame: usize, reference: ReferenceFrame },
@@ -33,11 +33,11 @@ pub(crate) enum Kind {
 /// The second derivatives that may differ from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pattern {
-    /// No second derivatives.
+    /// All second derivatives are zero.
     Zero,
-    /// Second derivatives with respect to pairs of coordinates that move at least one common body.
+    /// A second derivative may differ from zero only if its two coordinates move a common body.
     Related,
-    /// All second derivatives.
+    /// Any second derivative may differ from zero.
     Full,
 }
 
@@ -51,7 +51,7 @@ pub(super) struct Scratch<S> {
     zeros: Vec<S>,
 }
 
-/// Writes a block of derivatives to J: its rows begin at `row`, its columns are those for one argument.
+/// Writes a block of derivatives to J. The block begins at row `row`, and its columns belong to one argument.
 fn place<S: Scalar>(J: &mut DMatrix<S>, row: usize, argument: usize, block: &DenseMatrix<S, impl Dense<S>>) {
     J.view_mut((row, argument * block.ncols()), block.shape()).copy_from(block);
 }
@@ -82,8 +82,9 @@ impl Kind {
         }
     }
 
-    /// Returns whether a first derivative may differ from zero: the derivative of number `row` of all results with
-    /// respect to tangent coordinate j. `related` returns whether two coordinates move a common body.
+    /// Returns whether a first derivative may differ from zero: the derivative of the number with index `row` among the
+    /// numbers of all results, with respect to tangent coordinate j. `related` returns whether two coordinates move a
+    /// common body.
     pub(super) fn depends(&self, row: usize, j: usize, nv: usize, related: impl Fn(usize, usize) -> bool) -> bool {
         match self {
             Self::Rnea => related(row, j),
@@ -98,7 +99,7 @@ impl Kind {
             (Self::Rnea, 0, _) | (Self::Rnea, 1, 1) | (Self::Crba, ..) => Pattern::Related,
             (Self::Rnea, ..) => Pattern::Zero,
             (Self::Aba | Self::ConstrainedDynamics { .. }, 1 | 2, 2) => Pattern::Zero, // the result is affine in τ
-            // these results are linear in v
+            // the velocity of a frame and the centroidal momentum are linear in v
             (Self::FrameVelocity { .. } | Self::CentroidalMomentum, 1, 1) => Pattern::Zero,
             _ => Pattern::Full,
         }
@@ -115,7 +116,7 @@ impl Kind {
         Ok(Scratch { data, constraints, tensors, J: DMatrix::from_element(6, nv, zero), zeros: vec![zero; nv] })
     }
 
-    /// Computes all results. They are written to `y` one after the other, each by columns.
+    /// Computes all results. Writes the results to `y` one after the other, each result column by column.
     pub(super) fn value(&self, model: &Model, s: &mut Scratch<f64>, x: &[Vec<f64>], y: &mut [f64]) {
         let data = &mut s.data;
         match self {
@@ -220,7 +221,7 @@ impl Kind {
     }
 
     /// Computes the Hessian of λᵀf with respect to all tangent coordinates, and the Jacobian if J is given, if the
-    /// library has closed formulas for them. Returns whether it has.
+    /// library has closed formulas for these derivatives. Returns whether the library has such formulas.
     pub(super) fn closed_hessian(
         &self,
         model: &Model,

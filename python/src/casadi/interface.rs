@@ -22,21 +22,21 @@ use std::time::{Duration, Instant};
 /// Maximum number of functions that exist at the same time.
 pub(super) const SLOTS: usize = 64;
 
-/// Maximum time between the creation of a function in CasADi and its query of the inputs. After this time the function
-/// counts as loaded from a file.
+/// Maximum time between the creation of a function in CasADi and CasADi's query of the function's inputs. After this
+/// time the function counts as loaded from a file.
 const DESCRIPTION_TIME: Duration = Duration::from_millis(50);
 
-/// A slot: the function bound to it, and the number of its users.
+/// A slot: the bound function, and the number of the slot's users.
 struct Slot {
     bound: AtomicPtr<Bound>,
     users: Mutex<Users>,
-    /// For each function of the slot, the number of CasADi's objects that have not asked for their description. CasADi
-    /// loaded these objects from a file.
+    /// For each function of the slot, the number of CasADi's objects that have not queried the function's description.
+    /// CasADi loaded these objects from a file.
     loaded: [AtomicUsize; 4],
 }
 
-/// Users of a slot: for each of its functions, the number of CasADi's objects that use it, and the number of holds by
-/// Python objects.
+/// Users of a slot: for each of the slot's functions, the number of CasADi's objects that use the function; and the
+/// number of holds by Python objects.
 #[derive(Clone, Copy)]
 struct Users {
     functions: [usize; 4],
@@ -68,14 +68,14 @@ impl Slot {
         self.users.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts one more object of CasADi. A newly created object asks for its inputs next; an object loaded from a file
+    /// Counts one more object of CasADi. A newly created object queries its inputs next; an object loaded from a file
     /// does not.
     fn enter(&self, function: usize) {
         self.users().functions[function] += 1;
         self.loaded[function].fetch_add(1, Ordering::AcqRel);
     }
 
-    /// Notes that an object of CasADi asked for its description, so it was not loaded from a file.
+    /// Records that an object of CasADi queried its description. Such an object was not loaded from a file.
     fn describe(&self, function: usize) {
         let less = |n: usize| n.checked_sub(1);
         let _ = self.loaded[function].fetch_update(Ordering::AcqRel, Ordering::Acquire, less);
@@ -103,8 +103,8 @@ impl Slot {
         }
     }
 
-    /// Returns whether an object of CasADi may have been loaded from a file: then the slot may now belong to another
-    /// robot. Waits for objects that another thread is creating.
+    /// Returns whether an object of CasADi may have been loaded from a file. In this case the slot may now belong to
+    /// another robot. Waits for objects that another thread is creating.
     fn was_loaded(&self, function: usize) -> bool {
         let begin = Instant::now();
         while self.loaded[function].load(Ordering::Acquire) > 0 {
@@ -117,8 +117,8 @@ impl Slot {
     }
 }
 
-/// Holds a slot that computes the function with this key, for this number of states at a time. If no slot computes it
-/// yet, binds the result of `make` to a free slot. Returns `None` if all slots are taken.
+/// Holds a slot that computes the function with this key, for this number of states at a time. If no slot computes this
+/// function yet, binds the result of `make` to a free slot. Returns `None` if all slots are taken.
 pub(super) fn hold(
     key: Vec<u8>,
     states: usize,
@@ -180,12 +180,12 @@ fn sparsity_of(port: Option<&Port>) -> *const i64 {
 /// Evaluates a function; returns 0 on success.
 ///
 /// # Safety
-/// As for `Bound::evaluate`.
+/// `arg` and `res` must satisfy the conditions of `Bound::evaluate`.
 unsafe fn evaluate(slot: usize, function: usize, arg: *const *const f64, res: *const *mut f64) -> c_int {
     let bound = match SLOT[slot].get() {
         Some(bound) if !SLOT[slot].was_loaded(function) => bound,
         _ => {
-            // printed, because CasADi's interface cannot pass an error message
+            // the error is printed, because CasADi's interface cannot pass an error message
             eprintln!(
                 "condyle_{slot}: a function of condyle.casadi cannot be loaded or unpickled: make it anew, without the copy"
             );
@@ -209,7 +209,7 @@ macro_rules! symbols_of {
                 _: *mut f64,
                 _: c_int,
             ) -> c_int {
-                // SAFETY: CasADi passes arrays with the sparsities that it asked for.
+                // SAFETY: CasADi passes arrays with the sparsities that it queried.
                 unsafe { evaluate($slot, $function, arg, res) }
             }
             #[unsafe(export_name = concat!($name, "_incref"))]

@@ -30,7 +30,7 @@ pub(super) struct KnotFunction {
     chart: Chart,
     nx: usize,
     nu: usize,
-    /// Whether the knot is the terminal one, which has no next state.
+    /// Whether the knot is the terminal knot, which has no next state.
     end: bool,
     /// For each tangent coordinate and each of the nx numbers of the next state, whether the derivative may differ from
     /// zero.
@@ -122,7 +122,7 @@ struct KnotCalls {
     t: Option<usize>,
     end: bool,
     next: Vec<f64>,
-    /// μ = Eᵀ λ.
+    /// The vector μ = Eᵀ λ: the multipliers λ of the next state, mapped to its tangent space.
     mu: Vec<f64>,
     knot: LqKnot,
     hessian: Hessian,
@@ -154,7 +154,7 @@ fn slope(knot: &LqKnot, j: usize) -> &[f64] {
 }
 
 impl KnotCalls {
-    /// Computes the next state, and its derivatives in the knot.
+    /// Computes the next state, and stores its derivatives in `knot`.
     fn differentiate(&mut self, x: &[Vec<f64>]) {
         let (t, x, u) = self.read(x);
         if !self.end {
@@ -232,7 +232,7 @@ impl Calls for KnotCalls {
     }
 }
 
-/// Adds factor [xx xu; xuᵀ uu] to H.
+/// Adds the block matrix [xx xu; xuᵀ uu], multiplied by `factor`, to H.
 fn add(H: &mut DMatrix<f64>, factor: f64, [xx, xu, uu]: [&DMatrix<f64>; 3]) {
     let (n, all) = (xx.nrows(), xx.nrows() + uu.nrows());
     for j in 0..all {

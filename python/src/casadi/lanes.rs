@@ -4,13 +4,13 @@ use super::function::Kind;
 use condyle::{Batch, Model, batch::Matrices};
 use nalgebra::DMatrix;
 
-/// Maximum number of states of a call: a few registers of lanes, with matrices that fit in the cache.
+/// Maximum number of states of a call. These states fill a few SIMD registers, and their matrices fit in the cache.
 const MOST: usize = 32;
 
 /// Work space for several states.
 pub(super) struct Lanes {
     batch: Batch,
-    /// Whether the function is forward dynamics; otherwise it is inverse dynamics.
+    /// Whether the function is forward dynamics. Otherwise the function is inverse dynamics.
     forward: bool,
 }
 
@@ -88,7 +88,7 @@ impl Lanes {
             let h = self.batch.rnea_hessian(model, q, v, third, &[], lambda);
             [h.dqdq, h.dvdq, h.dvdv, h.dadq]
         };
-        // the blocks that are not written here are zero
+        // all blocks that are not written below are zero
         place(H, 0, 0, dqdq);
         place(H, n, 0, dvdq);
         place_transposed(H, 0, n, dvdq);

@@ -111,7 +111,7 @@ fn named(slot: Option<String>) -> PyResult<String> {
     })
 }
 
-/// Ends a hold of a slot; the slot stays in use as long as CasADi has objects for its functions.
+/// Ends a hold of a slot; the slot stays in use as long as CasADi has objects for the slot's functions.
 #[pyfunction]
 #[pyo3(name = "_casadi_release")]
 pub(crate) fn casadi_release(name: &str) {

@@ -8,16 +8,16 @@ use condyle::{ConstraintSet, Model, ModelError as Error};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// A function of a robot.
+/// A function of a robot as the computation of a slot.
 pub(super) struct RobotFunction {
     of: Arc<(Model, Kind)>,
     /// Number of rows of the constraints. `results` is the total number of entries of the results.
     rows: usize,
     results: usize,
-    /// For each pair of coordinates, whether they move a common body; nv × nv.
+    /// For each pair of coordinates, whether the two coordinates move a common body; nv × nv.
     relation: Vec<bool>,
-    /// For each of the nv coordinates, whether it moves a whole tree. M and the Coriolis forces do not depend on such a
-    /// coordinate.
+    /// For each of the nv coordinates, whether the coordinate moves a whole tree. M and the Coriolis forces do not
+    /// depend on such a coordinate.
     moves_a_tree: Vec<bool>,
 }
 
@@ -105,7 +105,7 @@ struct RobotCalls {
     results: usize,
     scratch: Scratch<f64>,
     dual: Option<Box<DualScratch>>,
-    /// Work space for several states at a time, if the function has one.
+    /// Work space for several states at a time; `None` if the function computes one state at a time.
     lanes: Option<Lanes>,
 }
 

@@ -100,7 +100,7 @@ impl Model {
     ///
     /// path: a path, as text or `os.PathLike`.
     /// mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2; its `polycoef` must then be linear.
-    ///     Otherwise it is one of the `constraints`, which the tree does not include.
+    ///     Otherwise the coupling is one of the `constraints`, which are not part of the tree.
     /// strict: whether a warning (`warnings`) is an error.
     /// weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
     ///     `warnings`. Otherwise it is an error.
@@ -151,7 +151,7 @@ impl Model {
     ///
     /// path: a path, as text or `os.PathLike`.
     /// root_joint: as for `from_urdf`.
-    /// mimic: whether an axis with a `<mimic>` follows another axis. Otherwise it moves freely.
+    /// mimic: whether an axis with a `<mimic>` follows another axis. Otherwise the axis moves freely.
     /// strict: whether a warning (`warnings`) is an error.
     /// packages, allow: as for `from_urdf`; `packages` are also searched for `model://` addresses.
     /// model: the name of the one model to read; None reads all models of the file.
@@ -196,12 +196,13 @@ impl Model {
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
+    /// Converts a `mujoco.MjModel`, which is a robot compiled by MuJoCo. The numbers stay the same.
     ///
-    /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. The results of
-    /// MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`. If numbers were
-    /// changed after compilation, the changed numbers are used. Contents that a model cannot represent are reported in
-    /// `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not imported.
+    /// The names, q and v are the same as with `from_mjcf`. Named `<frame>`s are missing, because MuJoCo does not keep
+    /// them. The results of MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`.
+    /// If numbers were changed after compilation, the changed numbers are used. Contents that a model cannot represent
+    /// are reported in `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not
+    /// imported.
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///
@@ -238,14 +239,14 @@ impl Model {
     /// nq numbers each.
     ///
     /// Joints that a state does not mention stay as in `neutral`. For a joint that turns without limits, the state may
-    /// give the angle. If states of several groups have the same name, they form one position. All other contents of
-    /// the file are ignored.
+    /// give the angle. States of several groups with the same name form one position. All other contents of the file
+    /// are ignored.
     ///
     /// path: a path, as text or `os.PathLike`.
-    /// strict: whether a joint that the robot does not have is an error. Without `strict` it is ignored, since robots
-    /// with fewer joints often share an SRDF.
+    /// strict: whether a joint that the robot does not have is an error. Without `strict` such a joint is ignored,
+    /// since robots with fewer joints often share an SRDF.
     ///
-    /// Raises `ParseError`, with file, line and element.
+    /// Raises `ParseError` for an invalid file; the error contains file, line and element.
     #[pyo3(signature = (path, strict=false))]
     fn reference_configurations<'py>(
         &self,

@@ -21,7 +21,7 @@ impl Model {
         self.cached.value(py, attribute, || read_only(py, &numbers()[..], instead))
     }
 
-    /// Returns one vector of each keyframe (such as its velocity), in a new dictionary by name.
+    /// Returns one vector of each keyframe, such as the velocity, in a new dictionary by name.
     fn keyframe_parts<'py>(
         &self,
         py: Python<'py>,
@@ -43,8 +43,8 @@ impl Model {
         self.cached.value(py, Attribute::JointPlacements, || read_only(py, &self.of_bodies(|b| b.placement)[..], ""))
     }
 
-    /// The inertia of each body in the body's frame, as `Inertia`. It includes the links that fixed joints attach to
-    /// the body.
+    /// The inertia of each body in the body's frame, as `Inertia`. The inertia includes the links that fixed joints
+    /// attach to the body.
     #[getter]
     fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Inertias, || {
@@ -76,15 +76,15 @@ impl Model {
     }
 
     /// The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
-    /// with d₀ in `damping`. It is used by the same functions as `damping`.
+    /// with d₀ in `damping`. The functions that use `damping` also use these coefficients.
     #[getter]
     fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let polynomial = || read_only(py, self.inner.damping_polynomial(), "with_damping");
         self.cached.value(py, Attribute::DampingPolynomial, polynomial)
     }
 
-    /// The springs of joints, as `Spring(joint, stiffness, rest)`. They act only in `passive_torque` and in a
-    /// `Simulation` that includes them.
+    /// The springs of joints, as `Spring(joint, stiffness, rest)`. Springs act only in `passive_torque` and in a
+    /// `Simulation` with passive torques.
     #[getter]
     fn springs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Springs, || {
@@ -98,7 +98,8 @@ impl Model {
     }
 
     /// The supported fractions of the weights of bodies, as `GravityCompensation(body, mass, mass_com, ratio)`:
-    /// MuJoCo's `gravcomp`. They act only in `passive_torque` and in a `Simulation` that includes them.
+    /// MuJoCo's `gravcomp`. The supporting forces act only in `passive_torque` and in a `Simulation` with passive
+    /// torques.
     #[getter]
     fn gravity_compensation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::GravityCompensation, || {
@@ -157,21 +158,21 @@ impl Model {
         self.keyframe_parts(py, |keyframe| &keyframe.control)
     }
 
-    /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
-    /// and in a `Simulation` that includes it.
+    /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). Damping acts only in
+    /// `passive_torque` and in a `Simulation` with passive torques.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, Attribute::Damping, "with_damping", || self.inner.damping().to_vec())
     }
 
-    /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and in a
-    /// `Simulation` that includes it.
+    /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). Friction acts only in `passive_torque` and
+    /// in a `Simulation` with passive torques.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, Attribute::Friction, "with_friction", || self.inner.friction().to_vec())
     }
 
-    /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm.
+    /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg). Every algorithm adds the armature to M.
     #[getter]
     fn armature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, Attribute::Armature, "with_armature", || self.inner.armature().to_vec())

@@ -119,7 +119,7 @@ impl Model {
         Ok(self.inner.with_inertias(|body, _| inertias[body]).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
+    /// Returns the same robot with one more frame of kind 'user', which is the last of `frames`. All other contents are
     /// unchanged.
     ///
     /// name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the
@@ -156,12 +156,13 @@ impl Model {
 
     /// Returns the same robot with some joints locked at their positions in q.
     ///
-    /// Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
-    /// joint that it follows. A locked joint still contributes to the length of a tendon. If a linear coupling connects
-    /// it to another joint, that joint is held, too. Warnings about the file are kept.
+    /// The bodies of locked joints are merged into their parent bodies and remain as frames. A mimic joint is locked
+    /// together with the joint that it follows. A locked joint still contributes to the length of a tendon. If a linear
+    /// coupling connects a locked joint to another joint, the other joint is locked, too. Warnings about the file are
+    /// kept.
     ///
     /// joints: a list of names or indices of bodies.
-    /// q: nq numbers.
+    /// q: position, nq numbers.
     ///
     /// >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
     /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
@@ -178,7 +179,7 @@ impl Model {
         Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
     }
 
-    /// Returns this robot with another one attached to one of its frames, as a new model.
+    /// Returns a new model: this robot with another robot attached to one of its frames.
     ///
     /// The new bodies are numbered as by Pinocchio's `appendModel`: after all existing descendants of the body to which
     /// they are attached. The result has the name and the gravity of this robot.
@@ -212,8 +213,9 @@ impl Model {
         Ok(self.inner.append(body, bXf * fXw, &model.get().inner, prefix).map_err(exception)?.into())
     }
 
-    /// Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's
-    /// position. It has no coordinate in q. The limits of the leader's coordinate then apply to both joints.
+    /// Returns the same robot with one more mimic joint: the follower's position is ratio q + offset, where q is the
+    /// leader's position. The follower has no coordinate in q. The limits of the leader's coordinate then apply to both
+    /// joints.
     ///
     /// follower, leader: the joints' names, or the indices of their bodies.
     ///

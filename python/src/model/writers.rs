@@ -13,8 +13,8 @@ impl Model {
     ///
     /// Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
     /// new file gives this model again, up to rounding. `original` and `path` may be the same file. If fixed joints
-    /// merge several links into one body, changes of its inertia are written to the link that the moving joint carries.
-    /// An armature becomes the rotor inertia of a `<transmission>`.
+    /// merge several links into one body, changes of the body's inertia are written to the link that the moving joint
+    /// carries. An armature becomes the rotor inertia of a `<transmission>`.
     ///
     /// path: the new file. original: the file from which the robot was read.
     ///
@@ -39,7 +39,7 @@ impl Model {
     /// Returns the model as JSON, with all digits; `from_json` returns an equal model. An infinite limit is written as
     /// `null`.
     ///
-    /// The text may be edited; its contents are checked when it is read.
+    /// The text may be edited; `from_json` checks its contents.
     ///
     /// >>> arm = condyle.robots.arm7()
     /// >>> condyle.Model.from_json(arm.to_json()).to_json() == arm.to_json()
@@ -50,7 +50,7 @@ impl Model {
 
     /// Reads a model from the JSON that `to_json` returns.
     ///
-    /// Raises `ParseError`, with line and column.
+    /// Raises `ParseError` for an invalid text; the error contains line and column.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let model: condyle::Model =
@@ -68,7 +68,7 @@ impl Model {
         module.call_method1("to_pinocchio", (slf,))
     }
 
-    /// Returns the parts of a pickle.
+    /// Returns the function and the bytes from which `pickle` makes an equal model.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         let py = slf.py();
         let bytes = postcard::to_extend(&*slf.get().inner, MAGIC.as_bytes().to_vec())
@@ -81,7 +81,7 @@ impl Model {
 /// First bytes of a pickled model, with the library's version: the format may change between versions.
 const MAGIC: &str = concat!("condyle ", env!("CARGO_PKG_VERSION"), "\n");
 
-/// Reads the model in a pickle.
+/// Creates the model from the bytes of a pickle.
 #[pyfunction]
 #[pyo3(name = "_model_from_bytes")]
 pub(crate) fn model_from_bytes(data: &[u8]) -> PyResult<Model> {

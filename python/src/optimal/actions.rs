@@ -34,7 +34,7 @@ pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> V
     costs.iter().map(|cost| cost.of(model)).collect()
 }
 
-/// Costs or limits that belong to single knots, by index of the knot.
+/// Costs or limits that apply at single knots, by the index of the knot.
 pub(super) type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 
 /// Limits that apply at all knots; `None` if there are no limits.
@@ -143,7 +143,8 @@ methods! {
     }
 }
 
-/// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as for `FreeDynamics`.
+/// A knot of a robot in contact, with contact forces λ: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as
+/// for `FreeDynamics`.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name, which may be empty. Residuals refer to a contact by this name.
@@ -200,7 +201,7 @@ methods! {
 /// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
 /// w a(r), as for `FreeDynamics` without Δt.
 ///
-/// There are no controls.
+/// An impact has no controls.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name.

@@ -118,7 +118,7 @@ fn pair<'py>(
     Ok((lower.give(py, None)?, upper.give(py, None)?))
 }
 
-/// Reads the axes of a surface in a contact's axes; the identity if they are not given.
+/// Reads the axes of a surface in a contact's axes; returns the identity if no axes are given.
 pub(super) fn surface(rotation: Option<&Bound<'_, PyAny>>) -> PyResult<Mat3<f64>> {
     rotation.map_or_else(|| Ok(Mat3::identity()), |given| arrays::rotation("rotation", given))
 }

@@ -83,7 +83,7 @@ impl Activation {
 
 /// A term of a cost: weight times an activation of a residual.
 ///
-/// name: used by `Problem.set_weight` and in errors.
+/// name: the name of the term for `Problem.set_weight` and in error messages.
 /// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
 /// activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone or a centre of pressure,
@@ -149,9 +149,9 @@ impl Cost {
 
 /// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// Limits apply at the beginning of a knot. `Fddp` alone treats them as costs of values outside the bounds.
+/// Limits apply at the beginning of a knot. `Fddp` alone treats limits as costs of values outside the bounds.
 ///
-/// name: used in errors.
+/// name: the name of the limit in error messages.
 /// residual: a `Residual`.
 /// lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
 ///     centre of pressure has its own bounds, and every other r must be 0. An entry with equal lower and upper bounds

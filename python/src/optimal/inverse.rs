@@ -16,7 +16,7 @@ use pyo3::types::PyDict;
 ///
 /// model: the robot.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
+/// costs: a list of `Cost`. In these costs, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
 ///     efforts without actuators.
 /// integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 ///
@@ -55,17 +55,17 @@ methods! {
 /// = (q̈, λ), and τ = M q̈ + h − Jᵀλ. Integrator and cost are as for `FreeDynamics`.
 ///
 /// By default the knot has two kinds of `Limit`, which keep a residual at zero. The limit named `undriven efforts`
-/// keeps Nᵀτ = 0, where Nᵀ S = 0; for a floating base these are the first 6 efforts. A limit named `contact` and the
-/// contact's name keeps J q̈ + γ = 0. `AugmentedLagrangian` enforces both; `Fddp` alone treats them as costs. No matrix
-/// is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
+/// keeps Nᵀτ = 0, where Nᵀ S = 0; for a floating base, Nᵀτ are the first 6 efforts. A limit named `contact` and the
+/// contact's name keeps J q̈ + γ = 0. `AugmentedLagrangian` enforces both limits; `Fddp` alone treats them as costs. No
+/// matrix is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
 /// `DifferentialActionModelContactInvDynamics`, and without contacts as in `DifferentialActionModelFreeInvDynamics`.
 ///
 /// model: the robot.
-/// contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. May be empty.
+/// contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. The dict may be empty.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.contact_force` on λ.
+/// costs: a list of `Cost`. In these costs, `Residual.joint_effort` depends on τ, and `Residual.contact_force` on λ.
 /// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`. The actuation
-///     defines which efforts have actuators. Bounds apply to all controls: nv accelerations and the rows of λ.
+/// defines which efforts have actuators. Bounds apply to all controls: nv accelerations and the rows of λ.
 ///
 /// Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot.
 ///

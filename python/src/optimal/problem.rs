@@ -26,12 +26,14 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
     value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
 }
 
-/// An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
+/// An optimal control problem: a sequence of knots that begins at the state x0, and a terminal knot. Each knot has one
+/// of the models.
 ///
 /// x0: the initial state, nx numbers.
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
 ///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-/// knot_models: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed
+/// knot_models: for each knot, the index of the knot's model; None if knot t has model t. Consecutive knots are
+/// computed
 ///     as a group if they have the same model, or if their models belong to one robot and differ only in their
 ///     costs and limits.
 /// terminal: the model of the terminal knot, without controls.
@@ -141,7 +143,8 @@ impl Problem {
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
-    /// Returns the parts of a pickle: knots of robots as JSON, other knots as the objects that the user passed.
+    /// Returns the function and the arguments from which `pickle` makes an equal problem. Knots of robots are stored as
+    /// JSON, other knots as the objects that the user passed.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
         let described = lock("problem", &this.described)?;
@@ -187,7 +190,7 @@ impl Problem {
         Self::make(x0, all, knot_models, (objects, kept), fault)
     }
 
-    /// The number of knots before the terminal one, N.
+    /// The number N of knots before the terminal knot.
     #[getter]
     fn horizon(&self) -> PyResult<usize> {
         Ok(lock("problem", &self.inner)?.horizon())
@@ -221,7 +224,7 @@ impl Problem {
         problem.set_x0(&x0).map_err(problem_error)
     }
 
-    /// Changes the weight of all cost terms with this name, in all knots including the terminal one. Call this method
+    /// Changes the weight of all cost terms with this name, in all knots including the terminal knot. Call this method
     /// between solves.
     ///
     /// Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
@@ -240,7 +243,7 @@ impl Problem {
     /// Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs
     /// move with the knot. Call this method between solves.
     ///
-    /// knot: its index, 0 to N; N is the terminal knot.
+    /// knot: the index of the knot, 0 to N; N is the terminal knot.
     /// costs: a list of `Cost`.
     ///
     /// Raises `ProblemError` if a term does not fit the robot, or if the knot's action does not belong to a robot.
@@ -275,7 +278,7 @@ impl Problem {
     /// Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
     /// between solves. The solver's next iterations do not allocate.
     ///
-    /// knot: its index, 0 to N − 1.
+    /// knot: the index of the knot, 0 to N − 1.
     /// model: the new model, with as many states and controls as the old one. Costs that the model has for single
     ///     knots belong to the knots of this problem with the same index.
     ///
@@ -289,7 +292,7 @@ impl Problem {
     /// Sets the duration of a single knot; the knot's model keeps its duration at all other knots. Call this method
     /// between solves. The solver's next iterations do not allocate.
     ///
-    /// knot: its index, 0 to N − 1.
+    /// knot: the index of the knot, 0 to N − 1.
     /// dt: the duration (s).
     ///
     /// Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
@@ -306,8 +309,8 @@ impl Problem {
     }
 
     /// Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
-    /// (N, nu), or a list of N arrays if knots differ in nu. For robots they are computed by statics, for other actions
-    /// by Newton's method.
+    /// (N, nu), or a list of N arrays if knots differ in nu. The controls of robots are computed by statics, the
+    /// controls of other actions by Newton's method.
     ///
     /// xs: states, (N + 1, nx).
     fn quasi_static<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -318,9 +321,10 @@ impl Problem {
         by_knot(py, &problem, &[], |t, out| out.copy_from_slice(&us[problem.control_range(t)]))
     }
 
-    /// Computes the cost of given states and controls, and the results of the dynamics for them, as an `Evaluation`.
+    /// Computes the cost of given states and controls, and the results of the dynamics for these states and controls,
+    /// as an `Evaluation`.
     ///
-    /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+    /// xs: states, (N + 1, nx), which need not satisfy the dynamics.
     /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
     fn evaluate<'py>(
         &self,
@@ -370,7 +374,7 @@ impl Problem {
         problem.calc(&xs, &us, &mut next, &mut costs);
         problem.calc_diff(&xs, &us, &mut lq_knots);
         self.raise()?;
-        // an LQ knot stores the gap at the state after it
+        // an LQ knot stores the gap at the next state
         for (knot, gap) in lq_knots.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
             knot.f.copy_from_slice(gap);
         }
@@ -389,7 +393,7 @@ impl Problem {
 
     /// Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
     ///
-    /// us: (N, nu), or a list of N arrays if knots differ in nu.
+    /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
     ///
     /// Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
     /// between knots.
@@ -446,7 +450,7 @@ impl Problem {
         let (k, mut described) = (problem.knot_models()[knot], lock("problem", &self.described)?);
         let mut objects = lock("problem", &self.objects)?;
         if k == described.len() - 1 {
-            described.insert(k, None); // before the terminal model
+            described.insert(k, None); // inserted before the terminal model
             objects.insert(k, None);
         }
         if let Some(new) = &new {
@@ -456,7 +460,7 @@ impl Problem {
         let old = std::mem::replace(&mut objects[k], object);
         drop((problem, described, objects));
         if let Some(old) = old {
-            old.drop_ref(py); // may run Python code
+            old.drop_ref(py); // the object's destructor may run Python code
         }
         lock("problem", &self.written)?.extend(written);
         Ok(())
@@ -477,7 +481,7 @@ impl Problem {
         self.moved.load(Ordering::Relaxed)
     }
 
-    /// Calls a function with each variable in which an error is stored, until the function returns a value.
+    /// Calls a function with each variable that stores errors of Python functions, until the function returns a value.
     fn each_fault<T>(&self, mut f: impl FnMut(&mut Option<PyErr>) -> Option<T>) -> Option<T> {
         let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
         let mut found = None;
@@ -493,7 +497,7 @@ impl Problem {
         self.each_fault(Option::take).map_or(Ok(()), Err)
     }
 
-    /// Returns whether an error of one of the problem's Python functions is stored.
+    /// Returns whether a Python function of the problem has raised an error, which is then stored.
     pub(super) fn has_failed(&self) -> bool {
         self.each_fault(|error| error.is_some().then_some(())).is_some()
     }

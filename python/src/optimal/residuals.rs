@@ -1,4 +1,4 @@
-//! Residuals.
+//! Residuals of robots, which costs minimise or limits bound.
 
 use super::cones::{FrictionCone, WrenchCone, surface};
 use super::own::{Fault, Functions, MOST_SIZE, OwnFunction, Space, Way};
@@ -19,8 +19,8 @@ use std::sync::Arc;
 ///
 /// A frame is given by its name or index in a model. A contact is given by its name in `ContactDynamics`,
 /// `ContactInverseDynamics` or `ImpulseDynamics`. A residual stores the name of its frame. In a problem of another
-/// robot it uses the frame with the same name; if this robot has no such frame, it is an error. A target that is not
-/// given is zero; a target rotation is the identity.
+/// robot, the residual uses the frame with the same name. A robot without such a frame is an error. A target that is
+/// not given is zero; a target rotation is the identity.
 ///
 /// >>> from condyle.optimal import Residual
 /// >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -81,14 +81,14 @@ impl Residual {
     }
 
     /// Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base,
-    /// 6 numbers: the force on the base. They are 0 in a feasible motion.
+    /// 6 numbers: the force on the base. These efforts are 0 in a feasible motion.
     #[staticmethod]
     fn undriven_effort() -> Self {
         Self::from(robot::Residual::UndrivenEffort)
     }
 
     /// Returns the acceleration of a contact, r = J q̈ + γ, for actions whose controls include the accelerations: 1, 2,
-    /// 3 or 6 numbers along the axes of the contact's rows. It is 0 while the contact holds.
+    /// 3 or 6 numbers along the axes of the contact's rows. The acceleration is 0 while the contact holds.
     #[staticmethod]
     fn contact_acceleration(contact: String) -> Self {
         Self::from(robot::Residual::ContactAcceleration { contact })
@@ -322,8 +322,8 @@ fn residuals_mut(knot: &mut robot::Knot) -> impl Iterator<Item = &mut robot::Res
     costs.map(|robot::Cost { residual, .. }| residual).chain(limits.map(|robot::Limit { residual, .. }| residual))
 }
 
-/// Takes the residuals that are written in Python out of a knot, and returns them with their indices. Then the knot can
-/// be written as JSON.
+/// Takes the residuals that are written in Python out of a knot, and returns these residuals with their indices. Then
+/// the knot can be written as JSON.
 pub(super) fn take_written(knot: &mut robot::Knot) -> Vec<(usize, Residual)> {
     let take = |(place, residual): (usize, &mut robot::Residual)| {
         let robot::Residual::Own(own) = residual else { return None };
@@ -356,7 +356,7 @@ fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<ro
     Ok((&model.frames()[frame_index(model, frame)?]).into())
 }
 
-/// Reads six numbers, linear first; zeros if they are not given.
+/// Reads six numbers, linear first; returns zeros if no numbers are given.
 fn six(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
     target.map_or(Ok([0.0; 6]), |given| array("target", given))
 }

@@ -20,13 +20,13 @@ pub(super) struct Described {
     pub knot: Knot,
 }
 
-/// A robot's action and its description. Neither has scratch memory for computations: a problem creates the memory once
-/// for all actions that differ only in their costs.
+/// A robot's action and its description, without scratch memory for computations. A problem creates the scratch memory
+/// once for all actions that differ only in their costs.
 pub(super) struct RobotAction<A> {
     action: A,
     pub(super) described: Arc<Described>,
     model: Py<Model>,
-    /// Residuals that are written in Python; they are reported to Python's garbage collector.
+    /// Residuals that are written in Python. These objects are reported to Python's garbage collector.
     kept: Vec<Py<PyAny>>,
 }
 
@@ -90,13 +90,14 @@ impl<A: ActionModel + Clone> RobotAction<A> {
         format!("<condyle.optimal.{class} of '{robot}', {duration}, nu {}{contacts}{costs}{limits}>", self.action.nu())
     }
 
-    /// Returns the parts of a pickle: the robot, the knot as JSON, and its residuals that are written in Python.
+    /// Returns the function and the arguments from which `pickle` makes an equal action. The arguments are the robot,
+    /// the knot as JSON, and the knot's residuals that are written in Python.
     pub(super) fn reduce<'py>(&self, object: &Bound<'py, PyAny>) -> PyResult<Reduced<'py>> {
         let (text, written) = self.described.knot_parts(object.py())?;
         Ok((object.get_type().getattr("_from_parts")?, (self.model.clone_ref(object.py()), text, written)))
     }
 
-    /// Creates the action from the parts of a pickle.
+    /// Creates the action from the arguments that `reduce` returns.
     pub(super) fn from_parts(model: &Bound<'_, Model>, text: &str, written: &WrittenAt<'_>) -> PyResult<Self> {
         let kept = written.iter().map(|(_, residual)| residual.clone().into_any().unbind()).collect();
         Self::new(model, kept, |robot| knot_of(robot, text, written))
@@ -109,7 +110,7 @@ pub(super) type Reduced<'py> = (Bound<'py, PyAny>, (Py<Model>, String, WrittenAt
 /// Residuals of a knot that are written in Python, with their indices.
 pub(super) type WrittenAt<'py> = Vec<(usize, Bound<'py, Residual>)>;
 
-/// Creates a knot from the parts of a pickle.
+/// Creates a knot from the arguments that a pickle contains.
 pub(super) fn knot_of(robot: &Arc<condyle::Model>, text: &str, written: &WrittenAt<'_>) -> PyResult<Knot> {
     let wrong = |error| ProblemError::new_err(format!("no knot: {error}"));
     let mut knot = serde_json::from_str(text).map_err(wrong)?;
@@ -118,7 +119,7 @@ pub(super) fn knot_of(robot: &Arc<condyle::Model>, text: &str, written: &Written
 }
 
 impl Described {
-    /// Returns the parts of the knot for a pickle: JSON, and the residuals that are written in Python.
+    /// Returns the data of the knot for a pickle: JSON, and the residuals that are written in Python.
     pub(super) fn knot_parts<'py>(&self, py: Python<'py>) -> PyResult<(String, WrittenAt<'py>)> {
         let mut knot = self.knot.clone();
         let written = take_written(&mut knot);
@@ -151,13 +152,13 @@ impl Described {
         moved(&mut self.knot.limits_at);
     }
 
-    /// Returns whether a shift changes anything.
+    /// Returns whether a shift changes the action, because some costs or limits apply at single knots.
     pub(super) fn moves(&self) -> bool {
         !(self.knot.costs_at.is_empty() && self.knot.limits_at.is_empty())
     }
 }
 
-/// An action for a problem, with its description if it can be written to a file.
+/// An action for a problem, with its description if the action can be written to a file.
 pub(super) struct Boxed {
     pub action: Box<dyn ActionModel>,
     pub described: Option<Arc<Described>>,

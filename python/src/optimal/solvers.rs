@@ -109,7 +109,7 @@ impl Observer<'_> {
     }
 }
 
-/// Runs a solve, from the warm start (xs, us) if it is given. Other Python threads can run meanwhile.
+/// Runs a solve, from the warm start (xs, us) if a warm start is given. Other Python threads can run meanwhile.
 fn run<'py, S: Send>(
     py: Python<'py>,
     problem: &Py<Problem>,
@@ -147,8 +147,8 @@ fn run<'py, S: Send>(
     give(py, problem, inner, result.map_err(problem_error)?)
 }
 
-/// Defines a solver class. Both classes get the same methods, besides a constructor and methods that only one class
-/// has.
+/// Defines a solver class. The macro writes the methods that all solvers have. The constructor and the methods of only
+/// one class are arguments of the macro.
 macro_rules! solver {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -156,7 +156,7 @@ macro_rules! solver {
         pub(crate) struct $class {
             problem: Py<Problem>,
             solver: Mutex<rust::$class>,
-            /// Settings as the user passed them; `inner` are the settings of the inner solver.
+            /// The settings that the user passed; `inner` are the settings of the inner solver.
             settings: Py<PyDict>,
             inner: Option<Py<PyDict>>,
         }
@@ -171,10 +171,10 @@ macro_rules! solver {
             /// an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
             /// Then `solution` is the best iterate, from which `resume` continues.
             ///
-            /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
+            /// xs: states, (N + 1, nx), which need not satisfy the dynamics.
             /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
-            /// callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            ///     solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
+            /// callback: a function that is called with the `Iteration` after each iteration. If the function returns
+            ///     False, the solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
             /// verbose: whether to print a line for each iteration.
             /// progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
             ///
@@ -219,8 +219,8 @@ macro_rules! solver {
                 })
             }
 
-            /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
-            /// None before the first solve.
+            /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
+            /// ("interrupted"); None before the first solve.
             #[getter]
             fn solution<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
                 let problem = lock("problem", &self.problem.get().inner)?;
@@ -240,7 +240,8 @@ macro_rules! solver {
                 Ok(text + ">")
             }
 
-            /// Returns the parts of a pickle: the problem and the settings, without a solution.
+            /// Returns the class and the arguments from which `pickle` makes an equal solver: the problem and the
+            /// settings. The solution is not included.
             fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
                 let (py, Self { problem, settings, inner, .. }) = (slf.py(), slf.get());
                 let inner = inner.as_ref().map(|inner| inner.clone_ref(py));
@@ -267,9 +268,9 @@ macro_rules! solver {
             ///
             /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
             /// limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-            /// model has for all knots. The last control is repeated, and the last state follows from it. At a second
-            /// shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
-            /// controls would diverge.
+            /// model has for all knots. The last control is repeated, and the last state follows from this control. At
+            /// a second shift without a solver step in between, the last state is repeated, too, because a rollout with
+            /// repeated controls would diverge.
             ///
             /// last: the index of the new last knot's model.
             ///
@@ -290,25 +291,26 @@ solver! {
 /// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or plain, with the equations and
 /// constants of Crocoddyl.
 ///
-/// If controls are bounded, the solver has the equations of Crocoddyl's box solvers.
+/// If controls are bounded, the solver uses the equations of Crocoddyl's box solvers.
 ///
-/// problem: the problem to solve; all memory is allocated for its shape, once.
-/// settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or
-///     "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics
-///     if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse
-///     dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
+/// problem: the problem to solve. All memory is allocated once, for the size of this problem.
+/// settings: any of the following settings, by name. `method`: "fddp" (default), whose trial steps keep a fraction of
+///     the gaps, or "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of
+///     the dynamics if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations
+///     of inverse dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
 ///     `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
 ///     yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
-///     has used it up returns its current result, with the status "time_limit". The first iteration always runs, unless
-///     the budget is 0. A later phase of an iteration runs only if the median of its last five durations fits into the
-///     budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the number of
-///     segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep uses as many
-///     threads as are available. The number of segments changes the results by rounding errors; the number of threads
-///     does not change them. `threads`: the number of threads that share an iteration on a robot (derivatives and
-///     gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical. `max_iterations`,
-///     `tolerance`, `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
-///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
-///     `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
+///     has used up the budget returns its current result, with the status "time_limit". The first iteration always
+///     runs, unless the budget is 0. A later phase of an iteration runs only if the median of its last five durations
+///     fits into the budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the
+///     number of segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep
+///     uses as many threads as are available. The number of segments changes the results by rounding errors; the number
+///     of threads does not change them. `threads`: the number of threads that share an iteration on a robot
+///     (derivatives and gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical for
+///     any number of these threads. `max_iterations`, `tolerance`, `tolerance_bounded` (if controls are bounded),
+///     `step_lengths`, `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`,
+///     `regularisation_max`, `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`:
+///     the thresholds of the method.
 Fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]
@@ -356,15 +358,16 @@ solver! {
 /// The solution's trace and gains are from the last inner solve, its timings from the whole solve. Controls of a warm
 /// start are moved into their bounds.
 ///
-/// problem: the problem to solve; all memory is allocated for its shape, once.
+/// problem: the problem to solve. All memory is allocated once, for the size of this problem.
 /// inner: a dict of settings of `Fddp` for the inner solves. The tolerances of inner solves are chosen automatically;
 ///     `time_budget` applies to the whole solve.
-/// settings: any of these, by name. `tolerance`: the largest accepted distance of a limit from its bounds.
-///     `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the maximum number
-///     of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its maximum,
-///     and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem with limits or
-///     bounds once (default: yes). The second solve starts from the initial state, held still at all knots. A solve
-///     fails if it is not finite, or violates limits at the largest penalty. The better result is returned.
+/// settings: any of the following settings, by name. `tolerance`: the largest accepted distance of a limit from its
+///     bounds. `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the
+///     maximum number of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve,
+///     its maximum, and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem
+///     with limits or bounds once (default: yes). The second solve starts from the initial state, held still at all
+///     knots. A solve fails if it is not finite, or violates limits at the largest penalty. The better result is
+///     returned.
 ///
 /// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()

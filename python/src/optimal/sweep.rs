@@ -14,11 +14,11 @@ const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 /// The backward Riccati sweep over a horizon of linear-quadratic knots: an iteration of `Fddp` without derivatives and
 /// line search.
 ///
-/// knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
+/// knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal knot, without
 /// controls.
 ///
-/// Raises `ProblemError` if the shapes of the knots do not fit together. `run` raises it for a knot with constraint
-/// rows, which the sweep does not treat.
+/// Raises `ProblemError` if the shapes of the knots do not fit together. `run` raises `ProblemError` for a knot with
+/// constraint rows, because the sweep does not support them.
 ///
 /// >>> from condyle.optimal import Lqr, Problem, Sweep
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
@@ -116,7 +116,7 @@ fn read_rows(to: &mut LqKnot, given: &Bound<'_, PyAny>) -> PyResult<()> {
     Ok(())
 }
 
-/// Converts the constraint rows of a knot to a `ConstraintRows`, or to None if it has none.
+/// Converts the constraint rows of a knot to a `ConstraintRows`, or to None if the knot has no constraint rows.
 #[allow(non_snake_case)]
 fn give_rows<'py>(py: Python<'py>, knot: &LqKnot) -> PyResult<Option<Bound<'py, PyAny>>> {
     let (rows, ndx, nu) = (&knot.rows, knot.ndx(), knot.nu());

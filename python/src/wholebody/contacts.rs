@@ -11,8 +11,8 @@ use rust::{Normal, Shape, SurfaceForces};
 /// A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
 /// ‖f_t‖ ≤ μ f_n.
 ///
-/// `ContactTarget.activation` defines at each tick whether the contact touches, and how far it is loaded. The
-/// constructor of `WholeBodyController` checks the numbers.
+/// `ContactTarget.activation` defines at each tick whether the contact touches, and which fraction of the full load the
+/// contact carries. The constructor of `WholeBodyController` checks the numbers.
 ///
 /// Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
 /// max_force: bounds on the normal force of the whole contact (N).
@@ -39,10 +39,11 @@ fn upwards(normal: Option<&Bound<'_, PyAny>>) -> PyResult<Vec3<f64>> {
 
 #[pymethods]
 impl FrictionContact {
-    /// Returns a point contact: the frame's origin is held, the frame may turn about it.
+    /// Returns a point contact: the frame's origin is held, and the frame may turn about its origin.
     ///
-    /// normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is z, level ground.
-    /// axes: the axes of the normal: 'world' for a constant normal, or 'frame' for a normal that turns with the frame.
+    /// normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is the z axis, for
+    /// level ground. axes: the axes of the normal: 'world' for a constant normal, or 'frame' for a normal that turns
+    /// with the frame.
     #[staticmethod]
     #[pyo3(signature = (frame, friction, normal=None, axes="world", min_force=0.0, max_force=f64::INFINITY))]
     fn point(
@@ -71,10 +72,9 @@ impl FrictionContact {
     /// forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
     ///     about the normal; or 'corners', a force with a friction cone at each corner.
     /// normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
-    ///     None is z.
-    /// yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔ μ r, where r is the
-    ///     radius of the largest circle in the polygon about the mean of the corners; for an edge of length 2 l it is ½
-    ///     μ l.
+    ///     None is the z axis. yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔
+    /// μ r, where r is the radius of the largest circle in the polygon about the mean of the corners; for an edge of
+    /// length 2 l it is ½ μ l.
     #[staticmethod]
     #[pyo3(signature = (
         frame, friction, corners, forces="wrench", normal=None, yaw_friction=None, min_force=0.0, max_force=f64::INFINITY
@@ -177,7 +177,7 @@ impl FrictionContact {
         self.0.max_force
     }
 
-    /// Returns the parts of a pickle: a constructor and its arguments.
+    /// Returns the constructor and the arguments from which `pickle` makes an equal contact.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let rust::FrictionContact { frame, friction, yaw_friction, min_force, max_force, .. } = &this.0;

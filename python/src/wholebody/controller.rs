@@ -1,4 +1,4 @@
-//! The controller.
+//! The whole-body controller as a Python class.
 
 use super::contacts::FrictionContact;
 use super::plan::Plan;
@@ -16,8 +16,8 @@ use pyo3::types::PyTuple;
 use rust::{CommandSource, Status};
 use std::sync::Mutex;
 
-/// A whole-body controller. At each tick it solves a cone program for the accelerations, contact forces and joint
-/// efforts that fulfil the tasks best.
+/// A whole-body controller. At each tick the controller solves a cone program for the accelerations, contact forces and
+/// joint efforts that fulfil the tasks best.
 ///
 ///     x = (q̈, f)
 ///     minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
@@ -105,7 +105,7 @@ impl WholeBodyController {
     /// Returns the `References` that keep the robot at rest at a position: all tasks keep their current values, all
     /// contacts touch and are held, and the contacts share the weight equally.
     ///
-    /// q: nq numbers.
+    /// q: position, nq numbers.
     ///
     /// Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) whose length is
     /// not 1.
@@ -116,11 +116,11 @@ impl WholeBodyController {
     }
 
     /// Sets references to the state of a plan at a time: the joints, and the resulting centre of mass, momentum and
-    /// frames. Contacts get the plan's activation, and are held at the poses that the plan gives them. The contacts
-    /// share the force that the plan's acceleration c̈ of the centre of mass requires.
+    /// frames. Contacts get the plan's activation, and are held at the poses of the plan. The contacts share the force
+    /// that the plan's acceleration c̈ of the centre of mass requires.
     ///
     /// plan: a `Plan` of the same robot with the same number of contacts.
-    /// t: the time (s); before the first knot and after the last one, the plan rests at that knot.
+    /// t: the time (s); before the first knot, the plan rests at the first knot; after the last knot, at the last knot.
     /// references: `References` of this controller, which are changed.
     fn track(&self, plan: &Bound<'_, Plan>, t: f64, references: &Bound<'_, PyAny>) -> PyResult<()> {
         let plan = plan.get();
@@ -136,12 +136,12 @@ impl WholeBodyController {
         references::write(numbers, references)
     }
 
-    /// Computes the `Command` at a state. It always returns a command: without a solution, a safe command whose status
-    /// shows the cause. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an
-    /// invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the joint or the frame.
-    /// Other Python threads can run meanwhile.
+    /// Computes the `Command` at a state. The method always returns a command. If no solution is found, this is a safe
+    /// command whose status shows the cause. The status is 'not_finite' for a number that is not finite. The status is
+    /// 'invalid_state' for an invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the
+    /// joint or the frame. Other Python threads can run meanwhile.
     ///
-    /// q: nq numbers; v: nv.
+    /// q: position, nq numbers; v: velocity, nv numbers.
     /// references: `References` of this controller.
     fn step<'py>(
         &self,
@@ -162,9 +162,9 @@ impl WholeBodyController {
 
     /// Returns the distance of the last step from the optimum of its first-priority program, as `KktResiduals`: the
     /// errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the state and references
-    /// of the last step again. Use this method in tests: it assembles the program anew.
+    /// of the last step again. Use this method only in tests, because the method assembles the program anew.
     ///
-    /// q: nq numbers; v: nv.
+    /// q: position, nq numbers; v: velocity, nv numbers.
     /// references: `References` of this controller.
     fn kkt_residuals<'py>(
         &self,
@@ -190,8 +190,8 @@ impl WholeBodyController {
         give(py, &lock("controller", &self.inner)?.controller)
     }
 
-    /// Returns the parts of a pickle: the constructor's arguments, and the numbers that the controller keeps from one
-    /// tick to the next.
+    /// Returns the function and the arguments from which `pickle` makes an equal controller. The arguments include the
+    /// numbers that the controller keeps from one tick to the next.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let contacts: Vec<_> = self.contacts.iter().cloned().map(FrictionContact).collect();
         let tasks: Vec<_> = self.tasks.iter().cloned().map(Task).collect();

@@ -12,21 +12,21 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::PlanData;
 
-/// A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
-/// touch in each interval.
+/// A planned motion with N + 1 knots: states at given times, efforts and gains between these times, and the contacts
+/// that touch in each interval.
 ///
-/// `WholeBodyController.track` converts it to references. Between knots, q is interpolated with constant velocity (as
-/// by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at this
-/// time (an impact).
+/// `WholeBodyController.track` converts a plan to references. Between knots, q is interpolated with constant velocity
+/// (as by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at
+/// this time (an impact).
 ///
 /// model: the robot.
-/// times: N + 1 times in ascending order (s); two may be equal.
+/// times: N + 1 times in ascending order (s); two consecutive times may be equal.
 /// states: (q, v) of the knots, (N + 1, nq + nv).
 /// touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
 /// controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
 ///     free-flyer's), (N, nu); None for no controls.
 /// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
-/// fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it ends to touch.
+/// fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it stops touching.
 ///
 /// Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
 /// or pairs (cos, sin) do not have length 1.
@@ -42,7 +42,7 @@ pub(crate) struct Plan {
     pub(super) inner: rust::Plan,
     pub(super) made_for: MadeFor,
     pub(super) contacts: usize,
-    /// The number of controls.
+    /// The number of controls in each interval.
     nu: usize,
     model: Py<Model>,
 }
@@ -102,8 +102,8 @@ impl Plan {
         (begin, end)
     }
 
-    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after it begins and
-    /// before it ends to touch, else 1. contact: the index of the contact.
+    /// Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after the contact
+    /// begins and before it ends, else 1. contact: the index of the contact.
     fn activation(&self, contact: usize, t: f64) -> PyResult<f64> {
         if contact >= self.contacts {
             return Err(PyIndexError::new_err(format!(
@@ -114,10 +114,10 @@ impl Plan {
         Ok(self.inner.activation(contact, t))
     }
 
-    /// Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers; they are 0 for
-    /// a free-flyer.
+    /// Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers. The efforts of
+    /// a free-flyer are 0.
     ///
-    /// t: the time (s); q: nq numbers; v: nv.
+    /// t: the time (s); q: position, nq numbers; v: velocity, nv numbers.
     ///
     /// Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose
     /// quaternions or pairs (cos, sin) do not have length 1.
@@ -140,7 +140,8 @@ impl Plan {
         output(py, out, &[robot.nv()], |tau| tau.copy_from_slice(&efforts))
     }
 
-    /// Returns the parts of a pickle: the arrays from which the plan was made.
+    /// Returns the class and the arguments from which `pickle` makes an equal plan: the arrays from which the plan was
+    /// made.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let PlanData { times, states, controls, gains, touches, fade } = this.inner.data();

@@ -26,7 +26,7 @@ fn count((nq, nv, frames, contacts): Sizes) -> usize {
     15 + nq + 2 * nv + 28 * frames + 23 * contacts
 }
 
-/// Reads numbers from the front of a slice.
+/// A reader that takes numbers from the front of a slice.
 struct Reader<'a>(&'a [f64]);
 
 impl Reader<'_> {
@@ -53,7 +53,7 @@ impl Reader<'_> {
     }
 }
 
-/// Writes numbers to the front of a slice.
+/// A writer that puts numbers at the front of a slice.
 struct Writer<'a>(&'a mut [f64]);
 
 impl<'a> Writer<'a> {
@@ -111,7 +111,7 @@ fn write_numbers(references: &References, numbers: &mut [f64]) {
     }
 }
 
-/// Returns the array of `References`, after a check that they were made for these sizes.
+/// Returns the array of `References`, after a check that the references were made for these sizes.
 fn its_numbers<'py>(given: &Bound<'py, PyAny>, expected: Sizes) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let py = given.py();
     if !given.is_exact_instance(class!(py, "condyle._wholebody", "References")?) {
@@ -168,8 +168,8 @@ pub(crate) fn check_pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
     Err(PyValueError::new_err(message))
 }
 
-/// Raises `ValueError` if a quaternion or a pair (cos, sin) in a position does not have length 1. Each of them is given
-/// by its joint and its range in q.
+/// Raises `ValueError` if a quaternion or a pair (cos, sin) in a position does not have length 1. The caller gives the
+/// joint of each quaternion or pair, and its range in q.
 #[pyfunction]
 #[pyo3(name = "_check_rotations")]
 pub(crate) fn check_rotations(

@@ -15,9 +15,9 @@ use rust::{Axes, TaskKind};
 /// constructor of `WholeBodyController` checks the numbers.
 ///
 /// Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
-/// is `Gains.critical(100.0)`. mask: for each number of the task, whether it is controlled; None controls all numbers.
-/// axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame, of the
-/// world); or ('frame', name), the axes of another frame.
+/// is `Gains.critical(100.0)`. mask: for each number of the task, whether the number is controlled; None controls all
+/// numbers. axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame,
+/// of the world); or ('frame', name), the axes of another frame.
 /// priority: 0 is the first priority; at most 2.
 ///
 /// >>> from condyle.wholebody import Task
@@ -55,7 +55,7 @@ impl Task {
         Ok(Self(task))
     }
 
-    /// Returns the name of the frame that the task moves, or of the frame whose contact force it controls.
+    /// Returns the name of the frame that the task moves, or of the frame whose contact force the task controls.
     fn its_frame(&self) -> Option<&str> {
         match &self.0.kind {
             TaskKind::Pose(f)
@@ -128,11 +128,11 @@ pose(frame): 6;
 position(frame): 3;
 /// Returns a task for a frame's rotation, ω̇: 3 numbers; weight 10.
 orientation(frame): 3;
-/// Returns a task for the velocity of a frame's origin and rotation: 6 numbers, linear first; weight 10. The pose does
-/// not matter: only the gain d acts.
+/// Returns a task for the velocity of a frame's origin and rotation: 6 numbers, linear first; weight 10. The pose has
+/// no effect: only the gain d is used.
 velocity(frame): 6;
 /// Returns a task for the rate of the angular momentum about the centre of mass: 3 numbers; weight 0.1. Only the gain d
-/// acts.
+/// is used.
 angular_momentum(): 3;
 {
     /// Returns a task for the actuated joints, q̈; weight 0.1.
@@ -150,9 +150,9 @@ angular_momentum(): 3;
         Self::with(rust::Task { joints, ..rust::Task::posture() }, 0, weight, gains, None, None, priority)
     }
 
-    /// Returns a task for the force of this frame's contact; weight 1e-3. It has 6 numbers: force and moment at the
-    /// contact's centre, along the contact's axes (t₁, t₂, n); for a point contact, the first 3 of them. The task has
-    /// no gains, and does not act while the contact is off.
+    /// Returns a task for the force of this frame's contact; weight 1e-3. The task has 6 numbers: force and moment at
+    /// the contact's centre, along the contact's axes (t₁, t₂, n); for a point contact, only the 3 numbers of the
+    /// force. The task has no gains, and does not act while the contact is off.
     #[staticmethod]
     #[pyo3(signature = (frame, weight=None, mask=None, priority=0))]
     fn contact_force(frame: &str, weight: Option<f64>, mask: Option<Vec<bool>>, priority: usize) -> PyResult<Self> {
@@ -181,19 +181,19 @@ angular_momentum(): 3;
         self.its_frame()
     }
 
-    /// The weight w.
+    /// The weight w of the task.
     #[getter]
     fn weight(&self) -> f64 {
         self.0.weight
     }
 
-    /// The gains k and d, `Gains`.
+    /// The gains k and d of the task, as `Gains`.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_gains(py, self.0.gains)
     }
 
-    /// The mask: for each number of the task, whether it is controlled.
+    /// The mask: for each number of the task, whether the number is controlled.
     #[getter]
     fn mask(&self) -> Vec<bool> {
         self.0.mask[..self.size()].to_vec()
@@ -221,7 +221,7 @@ angular_momentum(): 3;
         self.0.joints.give(py, None)
     }
 
-    /// Returns the parts of a pickle: a constructor and its arguments.
+    /// Returns the constructor and the arguments from which `pickle` makes an equal task.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let rust::Task { weight, priority, joints, .. } = &this.0;

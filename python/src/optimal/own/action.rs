@@ -283,7 +283,7 @@ impl ActionModel for Own {
 }
 
 impl GroupModel for Own {
-    /// Returns whether `other` is a copy of the same action, so that their knots form one group.
+    /// Returns whether `other` is a copy of the same action. Knots with copies of one action form one group.
     fn is_same(&self, other: &dyn ActionModel) -> bool {
         let other: &dyn Any = other;
         let same = |other: &Self| {

@@ -15,12 +15,13 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Methods of differentiation, from the best to the last one. Number 2, without a name, is hyper-dual numbers.
+/// Methods of differentiation, numbered in the order in which they are tried. Method 2, hyper-dual numbers, has no
+/// constant.
 const TOGETHER: u8 = 0;
 const ALONE: u8 = 1;
 const DIFFERENCES: u8 = 3;
 
-/// The best method that has not yet failed for a function.
+/// The first method of differentiation that has not yet failed for a function.
 #[derive(Clone, Default)]
 pub(in crate::optimal) struct Way(Arc<AtomicU8>);
 
@@ -36,7 +37,8 @@ pub(super) struct Differentiated<'a> {
 }
 
 impl Way {
-    /// Calls `each` with one method after the other until one works; returns `Ok(false)` if only differences are left.
+    /// Calls `each` with the methods in their order until a method works. Returns `Ok(false)` if only differences are
+    /// left.
     fn descend(&self, py: Python<'_>, mut each: impl FnMut(u8) -> PyResult<()>) -> PyResult<bool> {
         loop {
             let way = self.0.load(Ordering::Relaxed);
@@ -182,8 +184,8 @@ impl Differentiated<'_> {
     }
 
     /// Writes the derivatives of the accelerations a at a knot, as `dynamics` does, and the second derivatives of μᵀ a.
-    /// The second derivatives are stored in the knot instead of the Hessian of a cost. Returns false if no method
-    /// works.
+    /// The second derivatives are stored in the fields of `knot` that otherwise contain the Hessian of a cost. Returns
+    /// false if no method works.
     pub(super) fn curvature(
         &self,
         py: Python<'_>,

@@ -1,4 +1,4 @@
-//! Dynamics in continuous time that are written in Python; the library integrates them.
+//! Dynamics in continuous time that are written in Python and integrated by the library.
 
 use super::MOST_SIZE;
 use super::action::named;
@@ -19,7 +19,8 @@ use rust::robot::{ContinuousModel, ControlPolynomial, Derivatives, Integrated, I
 use rust::{ActionModel, Hessian, LqKnot};
 use std::ops::Range;
 
-/// An action whose accelerations and cost per second are written in Python; it advances by a time step.
+/// An action whose accelerations and cost per second are written in Python. An integrator advances the state by a time
+/// step.
 ///
 /// The state is x = (q, v). With semi-implicit Euler, v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt ℓ,
 /// where ℓ is the cost per second.
@@ -375,7 +376,8 @@ impl ContinuousModel for OwnDynamics {
     }
 }
 
-/// Presents the accelerations as the first numbers of a next state, so that they can be differentiated by differences.
+/// An action that returns the accelerations as the first numbers of its next state. The library's differences of
+/// actions then differentiate the accelerations.
 struct Probe(OwnDynamics);
 
 impl ActionModel for Probe {

@@ -1,5 +1,5 @@
-//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. With them, one
-//! call of a Python function computes its derivatives at all knots of a horizon.
+//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. With such
+//! numbers, one call of a Python function computes the function's derivatives at all knots of a horizon.
 //!
 //! ```text
 //! f(x):      g = f′ gₓ,                 H = f′ Hₓ + f″ gₓ gₓᵀ
@@ -19,8 +19,8 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// Returns how many numbers are stored for each knot: the value, the gradient, and the Hessian's lower triangle,
-    /// row by row.
+    /// Returns the count of numbers that are stored for each knot: the value, the gradient, and the Hessian's lower
+    /// triangle, row by row.
     pub(super) fn stride(self) -> usize {
         1 + self.n + if self.second { self.n * (self.n + 1) / 2 } else { 0 }
     }
@@ -37,7 +37,7 @@ impl Directions {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Expansion {
     directions: Directions,
-    /// Value and derivatives, knot by knot.
+    /// The value and the derivatives, knot by knot.
     numbers: Vec<f64>,
 }
 
@@ -68,7 +68,7 @@ impl SeveralKnots {
     }
 }
 
-/// The other operand of an operation.
+/// The operand of an operation that is not `self`: a real number, or a number with derivatives.
 enum Other<'py> {
     Real(f64),
     Expansion(Bound<'py, Expansion>),
@@ -92,7 +92,8 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// Creates a variable whose change is one of the directions; `values` are its values at the knots.
+    /// Creates a variable whose derivative is 1 in one direction and 0 in the others; `values` are its values at the
+    /// knots.
     pub(super) fn variable(directions: Directions, direction: usize, values: impl Iterator<Item = f64>) -> Self {
         let mut numbers = Vec::new();
         for value in values {
@@ -186,7 +187,7 @@ impl Expansion {
         Ok(Self { directions: d, numbers })
     }
 
-    /// Returns whether a comparison of two numbers is true. It is an error if the comparison differs between knots.
+    /// Returns whether a comparison of two numbers is true. Returns an error if the comparison differs between knots.
     fn compare(&self, other: &Other<'_>, by: CompareOp) -> PyResult<bool> {
         let stride = self.directions.stride();
         let theirs = |k: usize| match other {
@@ -233,7 +234,7 @@ fn angle(y: f64, x: f64) -> [f64; 6] {
     [y.atan2(x), x * s, -y * s, -xy, (y * y - x * x) * s * s, xy]
 }
 
-/// Defines the methods of a class: elementary functions, each given with two derivatives, and other methods.
+/// Defines the methods of a class: elementary functions, each with its first two derivatives, and other methods.
 macro_rules! methods {
     ($class:ident { $($name:ident: $x:ident => $f:expr;)* } { $($others:tt)* }) => {
         #[pymethods]

@@ -17,7 +17,7 @@ pub(in crate::optimal) type Fault = Arc<Mutex<Option<PyErr>>>;
 #[derive(Clone)]
 pub(in crate::optimal) struct Functions(Arc<Mutex<[Option<Py<PyAny>>; 2]>>);
 
-/// Two pairs are equal if they share the same functions.
+/// Compares two pairs of functions. Pairs are equal if they share the same Python functions.
 impl PartialEq for Functions {
     fn eq(&self, other: &Self) -> bool {
         self.are(other)
@@ -63,7 +63,7 @@ impl Functions {
         self.both()[k].is_some()
     }
 
-    /// Calls function k.
+    /// Calls function k of the pair with the given arguments.
     pub(super) fn call<'py>(
         &self,
         py: Python<'py>,
@@ -75,7 +75,7 @@ impl Functions {
         function.ok_or_else(gone)?.bind(py).call1(arguments)
     }
 
-    /// Calls function k at (t, x, u).
+    /// Calls function k of the pair with the arguments (t, x, u).
     pub(super) fn at<'py>(
         &self,
         py: Python<'py>,
@@ -97,8 +97,8 @@ impl Functions {
     }
 }
 
-/// Returns the result of a Python function, or `None` after an error, which is stored. After the first error of the
-/// problem the function is not called.
+/// Returns the result of a Python function. If the function raises an error, stores the error and returns `None`. After
+/// the first error of the problem, no function is called.
 pub(super) fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
     let kept = || fault.lock().unwrap_or_else(PoisonError::into_inner);
     if kept().is_some() {

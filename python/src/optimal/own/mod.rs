@@ -20,5 +20,6 @@ pub(crate) use lqr::{Lqr, Unicycle};
 pub(super) use residual::{OwnFunction, faults};
 pub(super) use space::Space;
 
-/// Maximum size of a state, a control or a constraint; their matrices are stored once for each knot.
+/// Maximum size of a state, a control or a constraint. The size is limited because matrices of these sizes are stored
+/// for each knot.
 pub(super) const MOST_SIZE: usize = condyle::optimal::LqKnot::MOST_SIZE;

@@ -191,8 +191,9 @@ fn robot_difference<S: Scalar>(model: &condyle::Model, x0: &[S], x1: &[S], out: 
     (0..nv).for_each(|k| out[nv + k] = x1[nq + k] - x0[nq + k]);
 }
 
-/// Appends q ⊕ δq, v + δv of one knot, computed by hyper-dual numbers. Only two directions of the same joint are
-/// coupled, but all pairs are computed, since this function does not know the joints.
+/// Appends q ⊕ δq and v + δv of one knot, with derivatives, computed by hyper-dual numbers. A second derivative is
+/// nonzero only in two directions of the same joint. All pairs are computed, since this function does not know the
+/// joints.
 fn expand_robot(model: &condyle::Model, d: Directions, x: &[f64], numbers: &mut [Vec<f64>]) {
     let (ndx, nv) = (2 * model.nv(), model.nv());
     let start = numbers[0].len();
