@@ -1,4 +1,4 @@
-//! Allocator that counts the allocations of each thread.
+//! Allocator that counts the allocations of each thread, for tests that a call does not allocate.
 #![allow(unsafe_code)] // an allocator requires unsafe code
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -22,7 +22,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
+        // SAFETY: the caller got `pointer` from this allocator, and so from `System.alloc`, with the same `layout`.
         unsafe { System.dealloc(pointer, layout) }
     }
 }

@@ -18,8 +18,8 @@ thread_local! {
     static SEEN: RefCell<Option<Panic>> = const { RefCell::new(None) };
 }
 
-/// Calls a function and returns the panic of the function; `None` if it does not panic. Other threads may panic at the
-/// same time.
+/// Calls a function and returns its panic, or `None` if the function does not panic. Panics of other threads at the
+/// same time have no effect on the result.
 pub(crate) fn panic_of(call: impl FnOnce()) -> Option<Panic> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -1,10 +1,10 @@
-"""Compares every robot file below some folders with the libraries that also read it. Prints a table of what is equal
-and what differs.
+"""Compares every robot file below some folders: Condyle's model with the models of other libraries that read the file.
+Prints a table of equal and different models.
 
     python tests/peers/robots.py FOLDER… [--only PATTERN] [--list] [--table FILE] [--jobs N]
 
 URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, and SDFs with Drake. Any of these libraries may
-be missing. Each file is read in its own process with a time limit, so that a crash of a library is only a row of the
+be missing. Each file is read in its own process with a time limit, so a crash of a library is reported as a row of the
 table.
 
 A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or next to FOLDER, gives the
