@@ -13,7 +13,7 @@ from typing import Any
 from latex2mathml.converter import convert
 
 SPECIAL = str.maketrans({"*": "&#42;", "_": "&#95;", "|": "&#124;"})
-"""Characters with a meaning in Markdown, and their escapes."""
+"""Map from characters with a meaning in Markdown to their HTML escapes."""
 PARTS = re.compile(r"(?P<code>^```.*?^```$|`[^`\n]*`)|\$\$(?P<display>[^$]+)\$\$|\$(?P<inline>[^$\n]+)\$", re.M | re.S)
 
 

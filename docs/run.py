@@ -34,7 +34,7 @@ class Block(NamedTuple):
     expected: str | None
     """Expected output; None if the page contains no output of the block."""
     where: tuple[int, int]
-    """Range of the expected output in the text of the page."""
+    """Start and end offset of the expected output in the text of the page."""
 
 
 def blocks(text: str) -> list[Block]:

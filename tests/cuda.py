@@ -67,7 +67,8 @@ def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
 
 
 def used(said: str, kernel: str) -> tuple[int, int, int]:
-    """Returns the registers of a thread, the bytes of its stack, and the bytes of its spills."""
+    """Returns, for a thread of a kernel, the number of registers, the bytes of its stack, and the bytes that it moves
+    between registers and memory because registers are missing."""
     found = {entry: (int(registers), int(stack or 0)) for entry, registers, stack in USED.findall(said)}
     if kernel not in found:
         sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")

@@ -39,7 +39,7 @@ def without_comments(text: str) -> str:
 
 
 def paths(tree: str, prefix: Module = ()) -> list[Module]:
-    """Returns the paths that a `use` tree names."""
+    """Returns the module paths that a `use` declaration of Rust names."""
     parts, depth, start = [], 0, 0
     for i, c in enumerate(tree):
         depth += (c == "{") - (c == "}")
@@ -63,7 +63,7 @@ def modules(source: Path) -> dict[Module, Path]:
 
 
 def arrows(source: Path) -> dict[Module, set[Module]]:
-    """Returns, for each module, the modules that it uses."""
+    """Returns a map from each module of a crate to the modules that it uses."""
     files = modules(source)
     texts = {module: without_comments(path.read_text(encoding="utf-8")) for module, path in files.items()}
     shown = {}  # map from the names that the crate's root re-exports to their modules

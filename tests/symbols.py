@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 
 OUTLINED = re.compile(r"core_arch::(?:x86::(?:avx|fma)\w*|(?:aarch64|arm_shared)::neon)::(?:\w+::)*(\w+)")
 FILLING = re.compile(r"_set1_|^vdupq_n_")
-"""Instructions that fill a new `Data` with zeros."""
+"""Pattern of instructions that fill a new `Data` with constants, such as zeros."""
 FOREIGN = re.compile(r"^_mm256_movemask_epi8$")
 """Vector instruction with integers of eight bits, which a dependency uses to search in text. Condyle does not use such
 integers."""

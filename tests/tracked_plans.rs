@@ -30,7 +30,7 @@ const CONE: f64 = 1e-6;
 /// plan are at least 10 ms apart, and feet land earlier or later than planned.
 const ASTRAY: f64 = 0.03;
 
-/// Returns whether the force lies in the friction cone about the normal n.
+/// Returns whether a contact force lies in the friction cone about the normal n.
 fn in_cone(f: &Force<f64>, n: Vec3<f64>) -> bool {
     let f_n = f.linear.dot(n);
     (f.linear - n.scale(f_n)).norm_squared().sqrt() <= FRICTION * f_n + CONE

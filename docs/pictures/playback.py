@@ -3,7 +3,8 @@
 
 .venv/pinocchio/bin/python docs/pictures/playback.py
 
-Needs Node.js and the browser that tests/page/run.sh installs. Without a GPU it takes a few minutes.
+The program needs Node.js and the browser that tests/page/run.sh installs. Without a GPU the program takes a few
+minutes.
 """
 
 import subprocess

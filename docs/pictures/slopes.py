@@ -65,7 +65,8 @@ def calls_of(model: condyle.Model) -> dict[str, Callable[[], object]]:
 
 
 def growth(seconds: float) -> dict[str, dict[str, Any]]:
-    """Returns the time per state of a batch at each size (µs), and the log-log slope over the upper half of sizes."""
+    """Returns the time per state of a batch at each size (µs), and the slope of log time over log size for the upper
+    half of the sizes."""
     times: dict[str, list[float]] = {}
     for n in SIZES:
         for name, call in calls_of(chain(n)).items():

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/spy.png: the entries of M of real robots, and the entries that are zero because of the tree.
+"""Makes docs/pictures/spy.png: the nonzero entries of the inertia matrix M of real robots, and the entries that are
+zero because of the tree.
 
 .venv/pinocchio/bin/python docs/pictures/spy.py
 """

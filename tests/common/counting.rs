@@ -30,7 +30,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Returns the number of allocations of this thread so far.
+/// Returns the number of allocations that this thread has made so far.
 #[allow(dead_code)] // only some tests use it
 pub(crate) fn allocated() -> usize {
     COUNT.get()

@@ -14,7 +14,7 @@ pub(crate) struct Panic {
 }
 
 thread_local! {
-    /// Last panic of this thread; recorded only while the thread waits for a panic.
+    /// Last panic of this thread. It is recorded only while `panic_of` runs.
     static SEEN: RefCell<Option<Panic>> = const { RefCell::new(None) };
 }
 

@@ -46,7 +46,7 @@ pub fn reach(arm: &Arc<Model>, x0: &[f64], target: Vec3<f64>, above: Option<f64>
     Ok(Problem::new(x0.to_vec(), vec![Box::new(knot)], vec![0; 30], Box::new(end))?)
 }
 
-/// Solves a problem; the initial guess is the arm at rest.
+/// Solves a problem. In the initial guess, the arm is at rest at all knots.
 pub fn solve(problem: &mut Problem) -> Result<Solution, Error> {
     let xs = problem.x0().repeat(problem.horizon() + 1);
     let us = problem.quasi_static(&xs)?;

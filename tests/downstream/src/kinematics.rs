@@ -9,7 +9,7 @@ pub fn with_pen(arm: &Model) -> Result<Model, Error> {
     Ok(arm.with_frame("pen", "tool", tip)?)
 }
 
-/// Returns the Jacobian of the pen's tip, and two values of the tip's velocity: by the Jacobian and by the recursion.
+/// Returns the Jacobian of the pen's tip, and the tip's velocity, computed by the Jacobian and by forward kinematics.
 pub fn velocity_of_the_tip(arm: &Model, q: &[f64], v: &[f64]) -> Result<(DMatrix<f64>, [Vector3<f64>; 2]), Error> {
     let (pen, mut data, mut jacobian) = (arm.frame("pen")?, Data::new(arm), DMatrix::zeros(3, arm.nv()));
     let motion = forward_velocities(arm, &mut data, q, v);

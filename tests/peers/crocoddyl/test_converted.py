@@ -56,7 +56,7 @@ def test_same_trace_of_a_file(name, solver):
 
 
 class OnOurs(Theirs):
-    """Crocoddyl's problem with Condyle's dynamics in Crocoddyl's Euler steps."""
+    """Problem of Crocoddyl in which Crocoddyl's Euler steps call Condyle's dynamics."""
 
     def stage(self, stage):
         step = super().stage(stage)
@@ -218,7 +218,7 @@ def test_lqr():
     converted = condyle.crocoddyl.problem(theirs, strict=True)
     found = Fddp(converted, project_warm_start=False).solve(np.ones((11, 4)), np.zeros((10, 2)))
     assert found.cost == pytest.approx(solver.cost, rel=1e-9)
-    # Crocoddyl's feedback has the opposite sign.
+    # Crocoddyl defines feedback gains with the opposite sign.
     np.testing.assert_allclose(found.K, -np.array([np.array(K) for K in solver.K]), atol=1e-8)
 
 
@@ -301,7 +301,7 @@ def test_a_robot_with_a_joint_that_is_not_here():
 
 
 class Circle(crocoddyl.StateAbstract):
-    """State space of a point on a circle, (cos, sin), and its rate."""
+    """State space of a point on a circle: position (cos, sin) and angular rate."""
 
     def __init__(self):
         crocoddyl.StateAbstract.__init__(self, 3, 2)

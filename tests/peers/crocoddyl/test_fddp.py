@@ -98,7 +98,7 @@ def warm_start(kind):
     xs, us = np.tile(X0, (SPEC["knots"] + 1, 1)), np.tile(hold, (SPEC["knots"], 1))
     if kind == "gaps":  # no controls can produce these states
         xs[1:, 1] += np.linspace(0.0, 0.3, SPEC["knots"])
-    if kind == "gap at the start":  # there is also a gap at the initial state
+    if kind == "gap at the start":  # the guess of the first state differs from x0
         xs[:, 3] += 0.1
     return xs, us
 

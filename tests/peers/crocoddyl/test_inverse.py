@@ -20,7 +20,7 @@ from condyle.optimal import (
     Residual,
 )
 
-# Tolerance of sums of several hundred products in another order, relative to the largest number.
+# Tolerance of sums of several hundred products that are added in another order, relative to the largest number.
 ROUNDING = 1e-11
 # Tolerance of the optima of two solvers with different stopping tolerances.
 OPTIMUM = 1e-5
@@ -108,7 +108,7 @@ class Robot:
         return theirs, lambda costs=costs: ContactInverseDynamics(self.ours, contacts, DT, costs)
 
     def node(self, action):
-        """Returns the derivatives of a knot with this action, and the evaluation of the problem."""
+        """Returns the derivatives at a knot with the given action, and the evaluation of the problem."""
         problem = Problem(self.x, [action], [0], FreeDynamics(self.ours, None, []))
         xs, us = np.array([self.x, self.x]), self.u[None]
         return problem.derivatives(xs, us)[0], problem.evaluate(xs, us)

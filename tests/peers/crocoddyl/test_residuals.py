@@ -347,7 +347,7 @@ def test_contacts_along_axes(robot, kind, axes, term):
     dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, theirs, total, 0.0, True)
     knot = ContactDynamics(r.ours, ours, DT, mine)
     same_iterates(r, knot, crocoddyl.IntegratedActionModelEuler(dynamics, DT))
-    # These controls hold the robot at rest.
+    # The controls u hold the robot at rest.
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(knot.quasi_static(x), dynamics.quasiStatic(dynamics.createData(), x), atol=1e-7)
 
@@ -396,5 +396,5 @@ def test_control_polynomial(robot, integrator, controls):
     np.testing.assert_allclose(at.costs[0], data.cost, rtol=1e-11)
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(ours.quasi_static(x), theirs.quasiStatic(theirs.createData(), x), atol=1e-7)
-    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are inaccurate, see test_runge_kutta
+    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are inaccurate
         same_iterates(r, ours, theirs)

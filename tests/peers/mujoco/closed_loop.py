@@ -92,8 +92,8 @@ def disturbances() -> str:
 
 
 def largest(survives: Callable[[float], bool]) -> float:
-    """Returns the largest push (N s) that the robot survives, if it also survives all weaker pushes that were
-    tested."""
+    """Searches for the largest push (N s) that the robot survives. All weaker pushes that were tested are survived,
+    too."""
     low = high = FIRST
     if survives(FIRST):
         while survives(high := low + STRIDE):

@@ -1,4 +1,5 @@
-"""Random robots in MJCF, with actuators, springs, tendons, loops, gravity compensation and default classes."""
+"""Generates random robots in MJCF, with actuators, springs, tendons, loops, gravity compensation and default
+classes."""
 
 import random
 from collections.abc import Callable
@@ -31,7 +32,7 @@ class DrivenMjcf:
         )
 
     def number(self, lower: float = -1.0, upper: float = 1.0) -> float:
-        """Returns a random number with three digits."""
+        """Returns the text of a random number with three digits."""
         return round(self.random.uniform(lower, upper), 3)
 
     def numbers(self, count: int) -> str:

@@ -28,7 +28,7 @@ def save(figure: plt.Figure, name: str) -> None:
 
 
 def push() -> None:
-    """Plots TALOS under forward pushes of several sizes."""
+    """Plots the motion of TALOS after forward pushes of several sizes."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", sharey=True)
     for axes, title in ((left, "whole-body control, cones"), (right, "PD hold of the joints")):
         for size in PUSHES:
@@ -63,7 +63,7 @@ def pushes() -> None:
 
 
 def lift() -> None:
-    """Plots TALOS lifting a foot."""
+    """Plots the motion of TALOS that lifts a foot."""
     humanoid = Humanoid()
     record = humanoid.run(humanoid.control(humanoid.lift), 7.0)
     figure, (above, below) = plt.subplots(2, 1, figsize=(7.5, 4.6), layout="constrained", sharex=True)
@@ -79,7 +79,7 @@ def lift() -> None:
 
 
 def trot() -> None:
-    """Plots ANYmal trotting for 20 s."""
+    """Plots the motion of ANYmal that trots for 20 s."""
     quadruped = Quadruped(urdf("anymal"), FEET, anymal())
     record = quadruped.run(20.0)
     figure, (above, below) = plt.subplots(2, 1, figsize=(7.5, 4.6), layout="constrained")

@@ -41,7 +41,7 @@ BALL = 0.03
 """Radius of ANYmal's feet (m)."""
 FRICTION = 0.7
 PUSH_TIME = 0.1
-"""Duration of a push (s)."""
+"""Duration of a push (s), with constant force."""
 FALLEN = 0.75
 """Limits that define a fall: a fraction of the trunk's initial height, and an angle (rad). The robot has fallen if the
 trunk is below this height or leans by more than this angle."""
@@ -107,7 +107,7 @@ def run(
         if tick % every == 0:
             c = condyle.com(world.model, data, q)
             rows.append((t, q, c, world.loads()[:, 2], wanted() if wanted else c))
-        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis, in the world
+        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis in world coordinates
         if not (q[2] - world.ground > FALLEN * height and upright > np.cos(FALLEN)):
             stands = False
             break
@@ -122,7 +122,7 @@ def ramp(t: float, begin: float, end: float) -> Array:
 
 
 class Humanoid:
-    """TALOS, which stands on two soles."""
+    """Robot TALOS in MuJoCo, standing on two soles."""
 
     def __init__(
         self,
@@ -218,7 +218,7 @@ class Humanoid:
 
 
 class Quadruped:
-    """A quadruped that trots along a plan made by FDDP."""
+    """Robot ANYmal in MuJoCo, which trots along a plan made by FDDP."""
 
     def __init__(
         self,
@@ -241,14 +241,14 @@ class Quadruped:
         self.world.set_state(self.references.posture.q.copy(), np.zeros(self.world.model.nv))
 
     def law(self, t: float, q: Array, v: Array) -> Array:
-        """Returns the efforts that track the plan."""
+        """Returns the efforts with which the controller tracks the plan."""
         self.controller.track(self.plan, t, self.references)
         command = self.controller.step(q, v, self.references)
         self.unsolved += command.status != "solved"
         return command.tau
 
     def run(self, seconds: float) -> Record:
-        """Runs the first seconds of the plan."""
+        """Simulates the first seconds of the plan."""
         return run(self.world, self.law, seconds, None, self.disturbance, lambda: self.references.com.position.copy())
 
 

@@ -23,7 +23,7 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 @pytest.fixture(params=["quadruped", "talos"])
 def world(request: pytest.FixtureRequest) -> World:
-    """Creates one robot in both libraries, without damping or friction."""
+    """Creates one robot in Condyle and in MuJoCo, without damping or friction."""
     robots: dict[str, tuple[str, Sequence[str], tuple[float, float] | float]] = {
         "quadruped": (condyle.robots.QUADRUPED, FEET, BALL),
         "talos": (urdf("talos"), SOLES, SOLE),

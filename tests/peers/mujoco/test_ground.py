@@ -53,7 +53,7 @@ def test_a_quadruped_stands(lean: float) -> None:
         tau[6:] = -STIFF * (q[7:] - aim[7:]) - DAMPED * v[6:]
         return tau
 
-    # The contact points are the lowest points of the balls that surround the feet.
+    # The contact points are the lowest points of the balls around the feet.
     below = [condyle.frame_placement(model, data, q0, foot)[:3, :3].T @ [0.0, 0.0, -BALL] for foot in FEET]
     points = [(foot, [point]) for foot, point in zip(FEET, below, strict=True)]
     simulation = Simulation(model, ground=Ground(points, height=-BALL, friction=FRICTION))

@@ -12,7 +12,7 @@ import condyle
 
 Array = np.ndarray
 SAME = 1e-8
-"""Tolerance relative to each number. Some of the numbers are computed with M⁻¹."""
+"""Tolerance relative to each compared number. Some numbers are computed with M⁻¹ and have larger rounding errors."""
 BOTH = (-1.0, 1.0)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 """Smallest code of MuJoCo's joint types with one degree of freedom."""
@@ -52,7 +52,7 @@ class Robot:
 
 
 def robots() -> list[Robot]:
-    """Returns the first random robots that MuJoCo accepts."""
+    """Generates random robots and returns those that MuJoCo accepts."""
     found: list[Robot] = []
     seed = 0
     while len(found) < 150:

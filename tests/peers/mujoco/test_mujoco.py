@@ -45,7 +45,7 @@ def test_one_robot_in_both(text: str, feet: Sequence[str], size: tuple[float, fl
     world.set_state(q, v)
     for found, given in zip(world.state(), (q, v), strict=True):
         np.testing.assert_allclose(found, given, atol=1e-12)
-    # in Condyle, damping and friction act only if requested
+    # a simulation in Condyle includes damping and friction only if requested
     world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0
     world.data.qfrc_applied[:] = world.generalized(tau)
     mujoco.mj_forward(world.mj, world.data)

@@ -212,7 +212,7 @@ def test_robots_of_packages() -> None:
         ours = condyle.Model.from_mujoco(theirs)
         try:
             other = condyle.Model.from_mjcf(file)
-        except condyle.Error:  # a mesh has an unsupported format
+        except condyle.Error:  # Condyle rejects the file: a mesh has an unsupported format
             other = None
         if other is not None:
             same_robot(ours, other, MESHES)

@@ -46,8 +46,8 @@ def bare(urdf: str) -> ET.Element:
 
 
 class World:
-    """A robot on level ground in MuJoCo. Soles are boxes below the frames of the feet; point feet are balls around
-    their frames."""
+    """Robot on level ground in MuJoCo. Soles are boxes below the frames of the feet; point feet are balls around their
+    frames."""
 
     def __init__(
         self,

@@ -12,8 +12,8 @@ METHODS = (None, "aba", "dense", "sparse")
 GRAINS = (1, 4)
 """Tested numbers of bodies that divide and conquer does not divide further. 1 gives the largest number of cuts."""
 CUTS = 10.0
-"""Factor on the tolerance of divide and conquer. The pieces of a robot have larger condition numbers than the whole
-robot."""
+"""Factor by which the tolerance of divide and conquer is larger, because the pieces of a robot have larger condition
+numbers than the whole robot."""
 FRAMES = {
     "local": pin.ReferenceFrame.LOCAL,
     "world": pin.ReferenceFrame.WORLD,
@@ -33,7 +33,7 @@ KINDS = {
 
 
 def check_model(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias, losses, limits and frames."""
+    """Compares sizes, names, order, placements, inertias, damping, friction, limits and frames of the models."""
     check_bodies(pair)
     check_losses(pair)
     check_limits(pair)
@@ -41,7 +41,7 @@ def check_model(pair: Pair) -> None:
 
 
 def check_bodies(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias and armature."""
+    """Compares sizes, names, order, placements, inertias and armature of the models' bodies and joints."""
     ours, theirs = pair.ours, pair.theirs
     assert ours.name == theirs.name
     assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
@@ -311,7 +311,7 @@ def check_motion_derivatives(state: State) -> None:
 
 
 def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
-    """Returns the columns of ∂a/∂q that are correct in Pinocchio.
+    """Returns the indices of the columns of ∂a/∂q that are correct in Pinocchio.
 
     Along the world's axes, Pinocchio's ∂a/∂q contradicts finite differences of Pinocchio's own accelerations. Condyle's
     ∂a/∂q agrees with these differences. The wrong columns belong to joints with several degrees of freedom on a moving
@@ -403,12 +403,12 @@ def check_inverse_dynamics(state: State) -> None:
 
 
 def check_crba(state: State) -> None:
-    """Compares both triangles of M."""
+    """Compares all entries of the inertia matrix M, in both triangles."""
     state.pair.expect("crba", ours_of(state)(condyle.crba, state.q), theirs_of(state)(pin.crba, state.q))
 
 
 def check_gravity(state: State) -> None:
-    """Compares the efforts of gravity."""
+    """Compares the joint efforts that gravity causes."""
     ours, theirs = ours_of(state), theirs_of(state)
     state.pair.expect("gravity", ours(condyle.gravity, state.q), theirs(pin.computeGeneralizedGravity, state.q))
 

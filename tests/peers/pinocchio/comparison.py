@@ -142,7 +142,7 @@ def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False)
 
 
 class State:
-    """Position, velocity, acceleration, efforts and external forces."""
+    """State for a comparison: position, velocity, acceleration, efforts and external forces."""
 
     def __init__(self, pair: Pair, seed: int) -> None:
         model, rng = pair.theirs, np.random.default_rng(seed)

@@ -32,7 +32,7 @@ UNALIGNED = {
     "prismatic": pin.JointModelPrismaticUnaligned,
     "helical": pin.JointModelHelicalUnaligned,
 }
-"""Continuous joints about any axis. In Pinocchio, only the URDF parser creates such joints."""
+"""Kind of continuous joints about any axis. In Pinocchio, only the URDF parser creates such joints."""
 FREE = {
     "spherical": (pin.JointModelSpherical, Joint.spherical),
     "planar": (pin.JointModelPlanar, Joint.planar),
@@ -72,7 +72,7 @@ class RandomRobot:
         return axis / np.linalg.norm(axis)
 
     def part(self, kind: str) -> Part:
-        """Returns a joint that has one axis or no axis."""
+        """Creates a simple joint, which has one axis or no axis."""
         X = pin.SE3.Random()
         if kind in FREE:
             theirs, ours = FREE[kind]

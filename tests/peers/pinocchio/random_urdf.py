@@ -4,10 +4,10 @@ joints between moving joints."""
 import numpy as np
 
 AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 -1", "-1 0 0", "0 0 2", "1e-9 0 1", "0 3 4")
-"""Axes of joints: aligned, negative, not normalised, and nearly aligned. The robots also have random axes, and joints
-without an axis."""
+"""Axes of joints: along x, y or z, negative, not normalised, and almost along x, y or z. The robots also have random
+axes, and joints without an axis."""
 NAMES = ("J3", "_0", "j1", "j10", "j2", "J", "hip.left", "hip-left", "Über", "a b")
-"""Names of joints. Their order by bytes is neither alphabetical nor numerical."""
+"""Names of joints. If the names are sorted by bytes, the order is neither alphabetical nor numerical."""
 KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 ONE = ("revolute", "continuous", "prismatic")

@@ -1,4 +1,4 @@
-"""Compares `condyle.conventions` with poses, forces and motions in Pinocchio."""
+"""Compares the conversions of `condyle.conventions` with poses, forces and motions that Pinocchio computes."""
 
 import numpy as np
 import pinocchio as pin

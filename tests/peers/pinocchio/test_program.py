@@ -1,7 +1,7 @@
 """Tests the program `condyle` for all robots of example-robot-data: `inspect` compared with Pinocchio, `check`,
 `budget`, and meshes of `plan`.
 
-The tests use the program that cargo builds (as `cargo test` does), or the program that CONDYLE_PROGRAM names.
+The tests run the program that cargo builds, or the program that the environment variable CONDYLE_PROGRAM names.
 """
 
 import base64
@@ -175,7 +175,7 @@ def on_terminal(*line: str) -> str:
         while True:
             try:
                 part = os.read(leader, 4096)
-            except OSError:  # on Linux, this error means that all writers have closed the terminal
+            except OSError:  # on Linux, this error means that the program has closed the terminal
                 part = b""
             if not part:
                 break

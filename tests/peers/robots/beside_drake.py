@@ -132,7 +132,7 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
     try:
         parser.AddModels(str(copy if copy.exists() else path))
         plant.Finalize()
-    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # a failed assertion of Drake is a SystemExit
+    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # a failed assertion is a SystemExit
         raise RefusedError(str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__) from None
     if plant.num_bodies() < 2:
         raise RefusedError("no bodies")
@@ -194,7 +194,7 @@ class Names:
     def find(self, name: str) -> list[Any]:
         """Returns the objects for a name in Condyle's model, which may lack the names of the outermost models."""
         ends = [full for full in self.all if f"::{full}".endswith(f"::{name}")]
-        if not ends:  # in Drake, a joint between nested models belongs to another model
+        if not ends:  # Drake assigns a joint between nested models to another model
             ends = [full for full in self.all if full.split("::")[-1] == name.split("::")[-1]]
             ends = ends if len(ends) == 1 else []
         return self.all[min(ends, key=len)] if ends else []

@@ -1,4 +1,5 @@
-"""Compares robots with MuJoCo. MJCFs have coordinates in the same order; for URDFs, joints are matched by name."""
+"""Compares robots with MuJoCo. For MJCFs, Condyle and MuJoCo order coordinates equally; for URDFs, joints are matched
+by name."""
 
 from pathlib import Path
 from xml.etree import ElementTree

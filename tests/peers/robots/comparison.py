@@ -129,7 +129,7 @@ def there(library: str, model: condyle.Model, joints: list[Joint], q: Array, v: 
 
 
 class Quantities:
-    """Differences between Condyle and one peer for one robot."""
+    """Differences between Condyle and one peer library for one robot."""
 
     def __init__(self, model: condyle.Model, tolerance: float) -> None:
         self.model, self.tolerance = model, tolerance
@@ -195,7 +195,7 @@ class Quantities:
         return f"coordinate {i}"
 
     def inertia(self, q: Array, v: Array, state: There, M: Array, h: Array) -> None:
-        """Compares M and the bias with the peer's M and h."""
+        """Compares M and the bias efforts h with the peer library's M and h."""
         model, T = self.model, state.T
         self.expect("M", condyle.crba(model, self.data, q), T.T @ M @ T, self.coordinate)
         bias = T.T @ (h + M @ state.drift)

@@ -66,8 +66,8 @@ def fragment(text: str, kind: str) -> str:
 
 
 def collection(folder: Path, path: Path) -> str:
-    """Returns the name of the repository for a path `…/owner+repository/…`, otherwise the first folders below the
-    root."""
+    """Returns the name of the repository if a folder of the path is `owner+repository`, otherwise the first folders
+    below the root."""
     parts = path.relative_to(folder).parts
     for part in (*folder.parts[-2:], *parts):
         if "+" in part and not part.endswith(tuple(SUFFIXES)):

@@ -21,7 +21,7 @@ except ImportError:  # `./test` does not install Drake
 
 @cache
 def packages(folder: Path) -> list[Path]:
-    """Returns the folders below a folder that contain packages or models."""
+    """Returns the subfolders of a folder that contain packages or models."""
     marks = (mark for name in ("package.xml", "model.config") for mark in folder.rglob(name))
     return sorted({mark.parent.parent for mark in marks})
 

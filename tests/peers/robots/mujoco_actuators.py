@@ -116,7 +116,7 @@ def moments(mj: mujoco.MjModel, i: int) -> list[tuple[int, float]]:
             return [(column, gear[0])]
         if kind == TRN_JOINTINPARENT:
             return []
-        # The force on a free joint is along the world's axes, and the moment is along the body's axes.
+        # For a free joint, the force is along the world's axes and the moment is along the body's axes.
         axes = range(3) if joint == JNT_BALL else range(3, 6)
         return [(column + k, gear[k]) for k in axes if gear[k]]
     if kind == TRN_TENDON:

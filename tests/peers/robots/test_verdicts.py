@@ -116,7 +116,7 @@ def test_efforts() -> None:
         <motor joint="x" ctrlrange="-1 2" gear="-10"/><position joint="x" kp="5" forcerange="-3 4" gear="2"/>
         <motor joint="y" ctrlrange="-1 2" forcerange="-9 1"/><velocity joint="z"/></actuator></mujoco>"""
     found = efforts(MjModel.from_xml_string(text))
-    # Joint x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], clipped to [−30, 8].
+    # Effort range of joint x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], clipped to [−30, 8].
     assert found.tolist() == [[-26.0, 8.0], [-1.0, 1.0], [-float("inf"), float("inf")]]
 
 
