@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Converts the formulas of the book, LaTeX between dollar signs, to MathML, which browsers show without scripts.
 
-This is a preprocessor of mdBook, which passes the book on standard input (`[preprocessor.mathml]` in book.toml).
-Needs the package latex2mathml (`pip install latex2mathml`).
+This program is a preprocessor of mdBook: mdBook passes the text of the book on standard input (`[preprocessor.mathml]`
+in book.toml). Needs the package latex2mathml (`pip install latex2mathml`).
 """
 
 import json
@@ -13,18 +13,18 @@ from typing import Any
 from latex2mathml.converter import convert
 
 SPECIAL = str.maketrans({"*": "&#42;", "_": "&#95;", "|": "&#124;"})
-"""Characters with a meaning in Markdown, and their escapes."""
+"""Map from characters with a meaning in Markdown to their HTML escapes."""
 PARTS = re.compile(r"(?P<code>^```.*?^```$|`[^`\n]*`)|\$\$(?P<display>[^$]+)\$\$|\$(?P<inline>[^$\n]+)\$", re.M | re.S)
 
 
 def with_mathml(text: str) -> str:
-    """Converts the formulas of a page; code does not change."""
+    """Converts the formulas of a page to MathML. Code in the page does not change."""
 
     def replace(part: re.Match[str]) -> str:
         if part["code"] is not None:
             return part[0]
         if part["display"] is not None:
-            formula = part["display"].strip().replace("{aligned}", "{split}")  # the converter knows only `split`
+            formula = part["display"].strip().replace("{aligned}", "{split}")  # the converter supports only `split`
             return convert(formula, display="block").translate(SPECIAL)
         return convert(part["inline"]).translate(SPECIAL)
 

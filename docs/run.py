@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Runs the Python blocks of the book, and checks its structure.
+"""Runs the Python blocks of the book, and checks the book's table of contents and links.
 
     python docs/run.py                   # all pages
     python docs/run.py rnea.md           # one page, with its predecessors
     python docs/run.py --write aba.md    # one page; writes its output
 
-Each chapter is one program. It may continue other chapters: `<!-- goes on from: trees.md -->` in its first lines. A
+The Python blocks of a chapter are one program. A line `<!-- goes on from: trees.md -->` at the top of a chapter states
+that the program continues another chapter's program. A
 block ```text directly after a block ```python holds the output of that block. Rust blocks are doctests of the crate
 `condyle`.
 """
@@ -25,15 +26,15 @@ MATHS = re.compile(r"\$[^$\n]*\$|`[^`\n]*`")
 
 
 class Block(NamedTuple):
-    """A block of Python."""
+    """Python block of a page, with its expected output."""
 
     line: int
-    """Line number of its first line."""
+    """Line number of the block's first line in the page."""
     code: str
     expected: str | None
-    """Expected output; None if the page has none."""
+    """Expected output; None if the page contains no output of the block."""
     where: tuple[int, int]
-    """Range of the expected output in the text of the page."""
+    """Start and end offset of the expected output in the text of the page."""
 
 
 def blocks(text: str) -> list[Block]:
@@ -52,13 +53,14 @@ def blocks(text: str) -> list[Block]:
 
 
 def before(text: str) -> list[str]:
-    """Returns the chapters that a chapter continues."""
+    """Returns the chapters whose programs a chapter continues."""
     said = re.search(r"<!-- goes on from: (.*?) -->", text)
     return said[1].split(", ") if said else []
 
 
 def run(chapter: str, write: bool = False, namespace: dict[str, Any] | None = None) -> dict[str, Any]:
-    """Runs the blocks of a chapter and returns its names. Raises AssertionError if their output is not the page's."""
+    """Runs the blocks of a chapter and returns the names that they define. Raises AssertionError if the output of a
+    block differs from the output in the page."""
     path = BOOK / chapter
     text = path.read_text(encoding="utf-8")
     names: dict[str, Any] = {"__name__": chapter} if namespace is None else namespace
@@ -89,7 +91,7 @@ def run(chapter: str, write: bool = False, namespace: dict[str, Any] | None = No
 
 
 def chapters(part: str | None = None) -> list[str]:
-    """Returns the pages of the book, or of one of its parts, in the order of the table of contents."""
+    """Returns the pages of the book or of one part of the book, in the order of the table of contents."""
     contents = (BOOK / "SUMMARY.md").read_text(encoding="utf-8")
     if part is not None:
         contents = contents.partition(f"\n# {part}\n")[2].partition("\n# ")[0]
@@ -104,7 +106,7 @@ def anchors(path: Path) -> set[str]:
 
 
 def faults() -> list[str]:
-    """Returns the errors: pages that SUMMARY.md does not list, broken links, blocks without a language."""
+    """Returns messages for pages that SUMMARY.md does not list, broken links, and blocks without a language."""
     listed = chapters()
     wrong = [
         f"{page.name}: not in SUMMARY.md" for page in BOOK.glob("*.md") if page.name not in [*listed, "SUMMARY.md"]

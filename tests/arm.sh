@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Runs the tests of vectors on a 64-bit Arm that qemu emulates. It needs a compiler for Arm, aarch64-linux-gnu-gcc to link with
-# the C library, and qemu-aarch64-static or qemu-aarch64 (`tests/targets.sh install arm`). Without them it prints NOT RUN.
+# Runs the tests of SIMD code on a 64-bit Arm processor that qemu emulates. The script needs a compiler for Arm,
+# aarch64-linux-gnu-gcc to link with the C library, and qemu-aarch64-static or qemu-aarch64
+# (`tests/targets.sh install arm`). Without these tools it prints NOT RUN.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tests/targets.sh
@@ -29,22 +30,23 @@ export CONDYLE_EMULATED=1 # fewer cases in tests that take minutes
 
 packages=(spatial linalg dynamics ${CONDYLE_FULL:+optimal})
 
-# Builds all programs at once, so that shared code is compiled once. $1, …: the programs to run, then `--` and names of tests.
+# Builds all test programs with one command, so shared code is compiled once. $1, …: the programs to run, then `--` and
+# test names.
 run() {
     "${cargo[@]}" test --locked --target $target "${packages[@]/#/--package=condyle-}" "$@"
 }
 
-# Tests registers and packers, dense kernels, batches, branches in lanes, and products of all results. `./test full` also tests
-# sweeps. The test of memory use is left out.
+# Tests SIMD registers, dense kernels, batches, branches in lanes, and products of all results. `./test full` also tests
+# the solver's sweeps. The test of memory use is left out.
 run --test vectors --test products --test sin_cos --test kernels --test tree ${CONDYLE_FULL:+--test lqr} -- --skip memory_by_state
 checked=vectors
 if [ -n "${CONDYLE_FULL:-}" ]; then
-    # Tests knots side by side, except derivatives by differences, which take thousands of calls.
+    # Tests solver knots in lanes, except derivatives by differences, which take thousands of calls.
     run --test contacts -- --skip derivatives_
     checked=contacts
 fi
 
-# Checks one program only: every program with kernels would show vector instructions that were not inlined.
+# Checks only one program: vector instructions that were not inlined would be in every program with kernels.
 programs=$(run --test $checked --no-run --message-format=json | sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
 for program in ${programs:?}; do
     "${PYTHON:-python3}" tests/symbols.py "$program"

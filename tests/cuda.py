@@ -3,14 +3,15 @@
 
     python tests/cuda.py [--install] [--partitions [ROBOT ...]]
 
-The program needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler;
---install installs these wheels into this Python. Without them the program prints NOT RUN. It fails if a kernel does not
-compile, or if an expected kernel is missing.
+The program needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler. The
+option --install installs these wheels into the Python that runs the program. Without the wheels the program prints NOT
+RUN. It fails if a kernel does not compile, or if an expected kernel is missing.
 
 With --partitions the program prints the table of docs/generated.md instead, for robots of example-robot-data. For
-kernels that are split among several threads, the table shows the instructions per state in the machine code, and the
-bytes that are spilled to and from a thread's memory. NVIDIA's disassembler shows both. The machine code has no
-branches, except for large angles and for quotients of tiny numbers; these branches are counted once.
+kernels whose work is divided among several threads, the table lists the instructions per state. It also lists the bytes
+that a thread moves between registers and its local memory. The program counts both in the output of NVIDIA's
+disassembler. The machine code has branches only for large angles and for quotients of tiny numbers; the instructions of
+these branches are counted once.
 """
 
 import argparse
@@ -44,7 +45,7 @@ INSTRUCTION = re.compile(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?\w+\s+)?([A-Z][A-Z0-9_
 
 
 def wheel(pattern: str) -> Path | None:
-    """Returns the path of a file in NVIDIA's wheels, or None."""
+    """Returns the path of a file in NVIDIA's wheels; None if no wheel contains the file."""
     found = importlib.util.find_spec("nvidia")
     for folder in (found.submodule_search_locations or []) if found else []:
         for path in sorted(Path(folder).glob(pattern)):
@@ -66,7 +67,8 @@ def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
 
 
 def used(said: str, kernel: str) -> tuple[int, int, int]:
-    """Returns the registers of a thread, the bytes of its stack, and the bytes of its spills."""
+    """Returns, for a thread of a kernel, the number of registers, the bytes of its stack, and the bytes that it moves
+    between registers and memory because registers are missing."""
     found = {entry: (int(registers), int(stack or 0)) for entry, registers, stack in USED.findall(said)}
     if kernel not in found:
         sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")
@@ -74,8 +76,8 @@ def used(said: str, kernel: str) -> tuple[int, int, int]:
 
 
 def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
-    """Returns the instructions of each partition, and the bytes that the share moves to and from the thread's
-    memory."""
+    """Returns, for each partition of a kernel, the number of instructions, and the bytes that it moves between
+    registers and the thread's local memory."""
     with NamedTemporaryFile(suffix=".cubin") as file:
         file.write(cubin)
         file.flush()
@@ -93,7 +95,7 @@ def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
             sums[0] += 1
             sums[1] += width if operation.startswith(("LDL", "STL")) else 0
     if len(counts) > 1:
-        counts.pop("", None)  # the code that calls the partitions is not counted
+        counts.pop("", None)  # the kernel code that calls the partitions is not counted
     instructions, moved = zip(*counts.values(), strict=True)
     return list(instructions), list(moved)
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Checks the rendered documentation of the façade, after `cargo doc --workspace --no-deps`.
+"""Checks the rendered documentation of the crate `condyle`, after `cargo doc --workspace --no-deps`.
 
     python3 tests/documentation.py
 
-The program fails if the first page lists more names than a reader can grasp, or if a page shows names that are meant
-only for Condyle's own crates.
+The program fails if the first page lists more than 70 names, or if a page shows internal names, which only Condyle's
+own crates use.
 """
 
 import html
@@ -15,15 +15,16 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST = 70
-"""Maximum number of names on the first page: modules, types, traits, functions and constants together."""
+"""Maximum number of names on the first page of the crate `condyle`: modules, types, traits, functions and constants
+together."""
 INTERNAL = re.compile(r"\b(SameLayout|FusedF64|LaneDual|Lanes|Rename|NotALane|SimdToken)\b")
 CRATES = ["condyle", "condyle_dynamics", "condyle_model", "condyle_optimal", "condyle_spatial", "condyle_wholebody"]
 REEXPORTED = {"nalgebra", "num_dual", "rand"}
-"""Names of re-exported modules of other crates."""
+"""Names of other projects' crates that Condyle re-exports as modules."""
 
 
 def text(page: str) -> str:
-    """Returns the words of a page without the tags."""
+    """Returns the text of an HTML page without the tags."""
     return html.unescape(re.sub(r"<[^>]*>", " ", page))
 
 

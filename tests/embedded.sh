@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Checks that the code for use without an operating system compiles for two processors, and runs its example on a Cortex-M4 that
-# qemu emulates. The script needs compilers for both processors, and qemu-system-arm (`tests/targets.sh install embedded`).
-# Without these it prints NOT RUN.
+# Checks that the crates without the standard library compile for two processors, and runs their example on a Cortex-M4
+# that qemu emulates. The script needs compilers for both processors, and qemu-system-arm
+# (`tests/targets.sh install embedded`). Without these it prints NOT RUN.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tests/targets.sh

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs the Rust examples, which assert what they claim. Without `full`, it runs only examples that take seconds. The examples
-# write their files into a temporary folder.
+# Runs the Rust examples, which check their results with assertions. Without `full`, only examples that take seconds
+# run. The examples write their files into a temporary folder.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

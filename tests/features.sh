@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Checks that each crate compiles without features, with each single feature, and with all features except one. Then it runs the
-# unit tests of crates that support it without the standard library (tests/embedded.sh does this for dynamics). Finally it runs
-# CUDA kernels with a driver that has no GPU.
+# Checks that each crate compiles without features, with each single feature, and with all features except one. Then it
+# runs the unit tests of crates that support it without the standard library (tests/embedded.sh does this for dynamics).
+# Finally it runs CUDA kernels with a simulated driver without a GPU.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

@@ -1,5 +1,5 @@
-//! A mutated input gives an error or a usable result, never a panic. This test runs the fuzz targets in `fuzz/` for a
-//! fixed number of reproducible inputs.
+//! Tests that readers return an error or a usable result for a mutated (randomly changed) input, and never panic. The
+//! tests run the fuzz targets in `fuzz/` for a fixed number of reproducible inputs.
 
 #[path = "../fuzz/src/hostile/mod.rs"]
 #[allow(unreachable_pub)] // the fuzz targets use this module as a module of a library
@@ -9,7 +9,7 @@ use hostile::{Kind, mutated};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// Input that is printed if a panic occurs.
+/// Holder of the current input, which it prints if a panic occurs.
 struct Case<'a>(Kind, u64, &'a [u8]);
 
 impl Drop for Case<'_> {
@@ -20,8 +20,8 @@ impl Drop for Case<'_> {
     }
 }
 
-/// Checks `count` mutated inputs, or four times as many in `./test full`. All seeds are valid; mutated inputs may be
-/// valid or invalid.
+/// Checks `count` mutated inputs, or four times as many in `./test full`. All original inputs (seeds) are valid;
+/// mutated inputs may be valid or invalid.
 fn run(kind: Kind, count: u64) {
     let count = if std::env::var_os("CONDYLE_FULL").is_some() { 4 * count } else { count };
     let seeds = kind.seeds();

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Packs every published crate, in the order of their dependencies, and checks the packages.
+"""Packs every published crate, each after the crates that it depends on, and checks the packages.
 
     python3 tests/packages.py [--verify]
 
@@ -22,7 +22,8 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = ["spatial", "linalg", "meshes", "model", "dynamics", "optimal", "wholebody", "", "codegen", "cli"]
-"""Folders of the crates; each crate is after its dependencies. The empty name is the crate `condyle`."""
+"""Folders of the published crates below `crates/`. Each crate comes after its dependencies. The empty name means the
+crate `condyle`."""
 LARGEST = 10 * 1024 * 1024
 """Maximum size of a package on crates.io, in bytes."""
 REQUIRED = {"Cargo.toml", "Cargo.lock", "LICENSE-MIT", "LICENSE-APACHE", "README.md"}
@@ -42,7 +43,7 @@ def manifests() -> dict[str, dict[str, Any]]:
 
 
 def faults(package: Path, manifest: dict[str, Any], before: set[str]) -> list[str]:
-    """Returns the faults of one package. `before` are the names of the crates that are published earlier."""
+    """Returns the faults of one package. `before` contains the names of the crates that are published earlier."""
     found = []
     if package.stat().st_size > LARGEST:
         found.append(f"{package.stat().st_size} bytes, at most {LARGEST} are allowed")

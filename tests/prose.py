@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Finds comments and paragraphs that are hard to read. It searches for patterns that are seldom right.
+"""Finds comments and paragraphs that are hard to read, by searching for patterns that good sentences seldom contain.
 
     python3 tests/prose.py [PATH…]       check the files below these paths (all files of the repository, if none)
     python3 tests/prose.py --sample      print 100 comments and 50 paragraphs, chosen at random with a fixed seed
@@ -48,9 +48,9 @@ PATTERNS = [
     (r"\bit is no\b|\bthere is no one\b", "write `does not …`"),
     (r"[.:] (?:Of|What|Who)\b(?![^.]*\?)", "begin with the noun or the verb"),
 ]
-"""Patterns of the worst sentences, each with advice on what to write instead."""
+"""Patterns of unclear sentences, each with advice on what to write instead."""
 DOC_START = re.compile(r"(?:What|Of|Who|Whose|How)\b")
-"""First words that a doc comment may not have: it must begin with a noun or a verb."""
+"""Words with which a doc comment may not begin, because it must begin with a noun or a verb."""
 
 
 class Passage(NamedTuple):
@@ -99,8 +99,8 @@ def python(path: str, text: str) -> Iterator[Passage]:
 
 
 def without_literals(lines: list[str]) -> list[str]:
-    """Makes the lines of literal blocks empty, such as commands and formulas. These lines are indented and follow an
-    empty line."""
+    """Replaces the lines of literal blocks, such as commands and formulas, by empty lines. A literal block is indented
+    and follows an empty line."""
     found: list[str] = []
     literal = False
     for line in lines:
@@ -124,7 +124,8 @@ def markdown(path: str, text: str) -> Iterator[Passage]:
 
 
 def paragraphs(lines: list[str]) -> Iterator[tuple[int, str]]:
-    """Joins lines into paragraphs, each with the index of its first line; `\\0` and list markers begin one."""
+    """Joins lines into paragraphs and yields each paragraph with the index of its first line. A line that begins with
+    `\\0` or a list marker begins a new paragraph."""
     start, held = 0, ""
     for at, line in enumerate([*lines, ""]):
         begins = line.startswith(("\0", "- ", "* ", "# ")) or line == ""

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Compares the output of two programs. Words must be equal, and numbers must be equal up to rounding.
+"""Compares the outputs of two programs. Words in the outputs must be equal, and numbers must be equal up to rounding.
 
     python3 tests/same_numbers.py ONE OTHER [--rounding 1e-12] [--only WORD]
 
-Each number may differ by the rounding times the largest number in its line. With --rounding 0, numbers must be equal.
---only selects the lines that begin with a word.
+A number may differ by the value of --rounding times the largest number in the same line. With --rounding 0, numbers
+must be equal. With --only WORD, the program compares only lines that begin with this word.
 """
 
 import argparse

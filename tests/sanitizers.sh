@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs the Rust tests under AddressSanitizer, which reports accesses outside allocated memory, and the tests of threads under
-# ThreadSanitizer, which reports data races. ThreadSanitizer requires compiling Rust's library, and therefore its sources (rustup
-# component add rust-src).
+# Runs the Rust tests under AddressSanitizer, which reports accesses outside allocated memory, and the tests of threads
+# under ThreadSanitizer, which reports data races. ThreadSanitizer needs a standard library compiled with it, and
+# therefore the library's sources (rustup component add rust-src).
 #
 # `tests/sanitizers.sh products` only runs one small program: products of all matrices that calls and batches return, under
 # AddressSanitizer, at every SIMD level of this machine.
@@ -30,7 +30,7 @@ if [ "${1:-}" = products ]; then
         aarch64-*) levels=(baseline neon) ;;
         *) levels=(baseline) ;;
     esac
-    # Few features and no debug information make the build short. Each SIMD level has its own process.
+    # Few features and no debug information make the build short. Each SIMD level is tested in its own process.
     export CARGO_PROFILE_DEV_DEBUG=false
     for level in "${levels[@]}"; do
         CONDYLE_LEVEL=$level sanitized address asan --package condyle-dynamics --no-default-features --features std \

@@ -5,8 +5,9 @@
 
 The check fails if a cycle has more than three modules, if a line of Rust is wider than 120 characters, or if
 PROMISES.md names a file or test that does not exist. With --sizes, it also fails if the program has more than 5.7 MB of
-code, or if one of its functions has more than 64 KB. A module and its child count as one module if the child uses only
-its parent. --sizes builds the program from scratch in a separate folder (several minutes), and needs `nm` and `size`.
+code, or if one of its functions has more than 64 KB. A module and its child module count as one module if the child
+uses no other module than its parent. --sizes compiles the program and all its dependencies in a new folder (several
+minutes), and needs `nm` and `size`.
 """
 
 import argparse
@@ -27,7 +28,7 @@ LARGEST_FUNCTION = 64 * 1024
 LARGEST_PROGRAM = 5_700_000
 WIDEST = 120
 LITERALS = re.compile(r"//[^\n]*|\br(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^\\'])'", re.DOTALL)
-"""Pattern of comments, strings and characters in Rust."""
+"""Pattern of comments, string literals and character literals in Rust."""
 
 Module = tuple[str, ...]
 
@@ -38,7 +39,7 @@ def without_comments(text: str) -> str:
 
 
 def paths(tree: str, prefix: Module = ()) -> list[Module]:
-    """Returns the paths that a `use` tree names."""
+    """Returns the module paths that a `use` declaration of Rust names."""
     parts, depth, start = [], 0, 0
     for i, c in enumerate(tree):
         depth += (c == "{") - (c == "}")
@@ -62,10 +63,10 @@ def modules(source: Path) -> dict[Module, Path]:
 
 
 def arrows(source: Path) -> dict[Module, set[Module]]:
-    """Returns, for each module, the modules that it uses."""
+    """Returns a map from each module of a crate to the modules that it uses."""
     files = modules(source)
     texts = {module: without_comments(path.read_text(encoding="utf-8")) for module, path in files.items()}
-    shown = {}  # names that the crate's root re-exports, each with its module
+    shown = {}  # map from the names that the crate's root re-exports to their modules
     for tree in re.findall(r"\bpub(?:\(crate\))? use ([^;]+);", texts.get((), "")):
         shown.update({path[-1]: path for path in paths(tree)})
     uses: dict[Module, set[Module]] = {}
@@ -91,7 +92,8 @@ def arrows(source: Path) -> dict[Module, set[Module]]:
 
 
 def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
-    """Returns the sets of modules in which each module reaches all other modules (Tarjan)."""
+    """Returns the cycles: sets of modules in which each module uses all others, directly or through other modules
+    (Tarjan's algorithm)."""
     order: dict[Module, int] = {}
     low: dict[Module, int] = {}
     stack: list[Module] = []
@@ -125,8 +127,8 @@ def tracked(*patterns: str) -> list[str]:
 
 
 def wide_lines() -> Iterator[str]:
-    """Yields lines of Rust that are too wide even without their strings, which rustfmt does not break. (ruff checks
-    Python.)"""
+    """Yields the lines of Rust code that are too wide. String literals do not count, because rustfmt does not break
+    them. (ruff checks the width of Python code.)"""
     for path in tracked("*.rs"):
         if path.startswith(TO_DO):
             continue
@@ -156,8 +158,8 @@ def broken_promises() -> Iterator[str]:
 
 
 def sizes() -> bool:
-    """Prints build time, code size and the largest functions of the program. Returns whether all sizes are small
-    enough."""
+    """Prints build time, code size and the largest functions of the program. Returns whether all sizes are within their
+    limits."""
     with TemporaryDirectory() as target:
         begin = time.monotonic()
         subprocess.run(

@@ -2,9 +2,9 @@
 
     python3 tests/symbols.py LIBRARY
 
-If the compiler does not inline a closure or helper into the code of a SIMD level, each vector instruction in it becomes
-a call. The results are then correct, but they take several times as long, and nothing else would show this mistake.
-Instructions that only fill memory once are allowed.
+If the compiler does not inline a closure or helper function into the code of a SIMD level, each vector instruction of
+the function becomes a call. The results are then correct, but they take several times as long, and no other test
+detects this mistake. Instructions that only initialise memory are allowed to be calls.
 """
 
 import re
@@ -17,13 +17,14 @@ from tempfile import TemporaryDirectory
 
 OUTLINED = re.compile(r"core_arch::(?:x86::(?:avx|fma)\w*|(?:aarch64|arm_shared)::neon)::(?:\w+::)*(\w+)")
 FILLING = re.compile(r"_set1_|^vdupq_n_")
-"""Instructions that fill a new `Data` with zeros."""
+"""Pattern of instructions that fill a new `Data` with constants, such as zeros."""
 FOREIGN = re.compile(r"^_mm256_movemask_epi8$")
-"""Instruction of a crate that searches in texts. Condyle does not use integers of eight bits."""
+"""Vector instruction with integers of eight bits, which a dependency uses to search in text. Condyle does not use such
+integers."""
 
 
 def outlined(library: Path) -> list[str]:
-    """Returns the names of vector instructions that are separate functions."""
+    """Returns the names of vector instructions that the library contains as separate functions."""
     symbols = subprocess.run(["nm", "-C", library], check=True, capture_output=True, text=True).stdout
     if "condyle" not in symbols:
         sys.exit(f"{library}: expected symbols of condyle, found none")

@@ -1,6 +1,6 @@
-//! Whole-body control tracks the trot and the walk of the examples, which FDDP plans. Condyle's own constrained
-//! dynamics simulates the ground. Each command is solved, its forces lie within their cones, and it is the optimum of
-//! its program.
+//! Tests that whole-body control tracks the trot and the walk of the examples, which FDDP plans. Condyle's own
+//! constrained dynamics simulates the ground. Each control step must solve its cone program to the optimum, with forces
+//! inside the friction cones.
 #![cfg(all(feature = "loaders", feature = "optimal", feature = "wholebody"))]
 
 #[path = "../examples/support/ground.rs"]
@@ -21,28 +21,30 @@ const FRICTION: f64 = 0.7;
 const SOLE: [f64; 2] = [0.2, 0.1]; // m
 const DT: f64 = 1e-3; // s
 
-/// Number of ticks between two checks of the optimality conditions.
+/// Number of control steps between two checks of the optimality conditions.
 const EACH: usize = 8;
-/// Maximum violation of a cone by a force (N). The solver's tolerance is 1e-9, relative to the weight.
+/// Maximum distance of a contact force from its friction cone (N). The solver's tolerance is 1e-9, relative to the
+/// robot's weight.
 const CONE: f64 = 1e-6;
-/// Maximum distance of the centre of mass from its plan (m). It is large because the knots of the plan are at least 10
-/// ms apart, and feet land earlier or later than planned.
+/// Maximum distance of the centre of mass from the planned motion (m). The distance is large, because the knots of the
+/// plan are at least 10 ms apart, and feet land earlier or later than planned.
 const ASTRAY: f64 = 0.03;
 
-/// Returns whether the force lies in the friction cone about the normal n.
+/// Returns whether a contact force lies in the friction cone about the normal n.
 fn in_cone(f: &Force<f64>, n: Vec3<f64>) -> bool {
     let f_n = f.linear.dot(n);
     (f.linear - n.scale(f_n)).norm_squared().sqrt() <= FRICTION * f_n + CONE
 }
 
-/// Tracks a gait to its end, and a short time longer.
+/// Plans a gait, and tracks the plan for the plan's duration and 0.3 s longer.
 fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[Task], damping: f64) {
     let touches = gait.touches();
     let (solution, times) = gait.solve().unwrap();
     let plan = plan_of(robot, &solution, &times, &touches, 0.02).unwrap();
     let contact_gains = Gains { stiffness: 0.0, damping };
-    // With this force weight, the feet's shares of the load are well above rounding errors. The tolerance is relative
-    // to the solver's own units. It makes the gap small compared with 1 in units of the objective.
+    // The weight of contact forces in the objective is large enough to determine the load of each foot despite rounding
+    // errors. The solver's tolerance is in the solver's own units. With this value, the duality gap is small compared
+    // with 1 in units of the objective.
     let settings = Settings { contact_gains, force_weight: 1e-5, tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(robot, contacts, tasks, settings).unwrap();
     let x0 = &solution.x(0)[..robot.nq()];
@@ -58,7 +60,8 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
         controller.track(&plan, tick as f64 * DT, &mut references);
         let Command { tau, forces, status, .. } = controller.step(&world.q, &world.v, &references).clone();
         assert_eq!(status, Status::Solved, "tick {tick}");
-        // Point feet touch level ground. The normal of a sole turns with the sole, which may land on an edge.
+        // The normal of a point contact is vertical, because the ground is level. The normal of a sole turns with the
+        // sole, which may land on an edge.
         for (f, here) in forces.iter().zip(&controller.hold(&world.q).unwrap().contacts) {
             let n = if contacts.len() == 2 { here.pose.rotation.z } else { Vec3::new(0.0, 0.0, 1.0) };
             assert!(in_cone(f, n), "tick {tick}: {f:?}");

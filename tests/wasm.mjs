@@ -8,7 +8,7 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { fileURLToPath } from "node:url";
 
-/** Runs in Node.js and in a page alike: the module as base64, with vectors or without. */
+/** Runs a module, given as base64, with or without SIMD128. The function works in Node.js and in a browser's page. */
 async function run(module, vectors) {
   const bytes = Uint8Array.from(atob(module), (c) => c.charCodeAt(0));
   let said = "", memory;

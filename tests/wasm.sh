@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Runs dynamics and optimal control as WebAssembly in headless Chromium (in Node.js if Chromium is missing), without vectors and
-# with SIMD128, and compares all numbers with this machine's results. With WASM_PROFILE=release it also prints the duration of an
-# iteration of FDDP in each. It needs a compiler (`tests/targets.sh install wasm`) and Node.js; tests/page/run.sh installs
-# Chromium.
+# Runs dynamics and optimal control as WebAssembly in headless Chromium (in Node.js if Chromium is missing), without
+# SIMD and with SIMD128, and compares all numbers with the results of a native program. With WASM_PROFILE=release it
+# also prints the duration of an iteration of FDDP for both. It needs a compiler (`tests/targets.sh install wasm`) and
+# Node.js; tests/page/run.sh installs Chromium.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tests/targets.sh

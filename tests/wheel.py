@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Checks a wheel as a user installs it: size, tag, licences, linked libraries, and a computation.
+"""Checks a wheel of the Python package: size, tag, licences, linked libraries, and a computation with the installed
+wheel.
 
     python3 tests/wheel.py WHEEL [--install]
 
 The check fails if the wheel is larger than 8 MB, if it is not for the stable interface of Python 3.10, or if licences
 or types are missing. On Linux it also fails if the library needs other libraries than the manylinux tag allows, or
 newer symbols of the C library than the tag promises. --install installs the wheel into an empty virtual environment,
-and computes there.
+and runs a computation there.
 """
 
 import argparse
@@ -44,7 +45,8 @@ assert np.abs(condyle.crba(arm, data, q) @ condyle.minv(arm, data, q) - np.eye(7
 
 
 def linked(library: Path, platform: str) -> list[str]:
-    """Returns faults in the libraries and symbols that a library for Linux needs."""
+    """Returns faults: libraries and symbols that a library for Linux needs, but that the manylinux tag does not
+    allow."""
     if shutil.which("objdump") is None:
         print("NOT RUN: there is no objdump to look at the libraries with")
         return []

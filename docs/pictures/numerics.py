@@ -3,7 +3,8 @@
 
 .venv/pinocchio/bin/python docs/pictures/numerics.py
 
-The functions come from docs/numerics.md. Nothing is timed: the picture is the same on each machine, up to rounding.
+The program uses the functions of docs/numerics.md. It measures no times, so the picture is equal on all machines, up to
+rounding.
 """
 
 import importlib.util
@@ -25,7 +26,7 @@ STYLES = {
 
 
 def page() -> dict[str, Any]:
-    """Returns the names that the page defines."""
+    """Returns the functions and variables that the blocks of docs/numerics.md define."""
     spec = importlib.util.spec_from_file_location("run", Path(__file__).parents[1] / "run.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -42,7 +43,7 @@ def main() -> None:
         ("A light gripper holds 1 kg", "armature (kg m²)", np.logspace(-7, 0, 15), book["gripper"]),
     )
     for axis, (title, label, values, model) in zip(axes, sweeps, strict=False):
-        with np.errstate(all="ignore"):  # pivots may vanish in single precision
+        with np.errstate(all="ignore"):  # pivots may be zero in single precision
             found = np.array([book["errors"](model(x))[:4] for x in values])
         for (name, (colour, line)), error in zip(STYLES.items(), found.T, strict=True):
             axis.loglog(values, np.maximum(error, 1e-17), line, color=colour, label=name)

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/playback.png: a trotting quadruped in the page of `condyle.viz.play`, in a real browser.
+"""Makes docs/pictures/playback.png: a picture from a browser of a trotting quadruped, which `condyle.viz.play` shows.
 
 .venv/pinocchio/bin/python docs/pictures/playback.py
 
-Needs Node.js and the browser that tests/page/run.sh installs. Without a GPU it takes a few minutes.
+The program needs Node.js and the browser that tests/page/run.sh installs. Without a GPU the program takes a few
+minutes.
 """
 
 import subprocess
@@ -19,7 +20,7 @@ sys.path.insert(0, str(HERE.parents[1] / "python" / "examples"))
 
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 SECONDS = 60
-"""Time for the page to draw (s)."""
+"""Time that the page gets to draw before the picture is taken (s)."""
 
 
 def main() -> None:
@@ -39,7 +40,7 @@ def main() -> None:
         urdf.write(condyle.robots.QUADRUPED)
         urdf.flush()
         player = viz.play(robot, solution.xs[:, : robot.nq], 0.01, solution.forces, urdf.name)
-    player.show(22)  # in the middle of the first step
+    player.show(22)  # the picture shows the middle of the first step
     browser = ["node", HERE / "browser.mjs", player.url, HERE / "playback.png", str(SECONDS)]
     subprocess.run(browser, check=True, cwd=HERE)
     player.close()

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/slopes.png: time over the number of joints, and times of three methods of forward dynamics.
+"""Makes docs/pictures/slopes.png: the time of algorithms over the number of joints, and the times of three methods of
+forward dynamics.
 
 .venv/pinocchio/bin/python docs/pictures/slopes.py [FILE.json] [--quick]
 
@@ -24,12 +25,12 @@ import condyle
 
 SIZES = (4, 8, 16, 32, 64, 128, 256)
 STATES = 8
-"""Number of states of a batch: one vector of eight, or two of four."""
+"""Number of states of a batch: one vector of eight lanes, or two vectors of four lanes."""
 METHODS = {"aba": "ABA", "dense": "M, dense factor", "sparse": "M, sparse factor"}
 
 
 def chain(n: int) -> condyle.Model:
-    """Returns a chain of n hinges about changing axes."""
+    """Returns the model of a chain of n hinges. The axes of successive hinges differ."""
     rng, builder, body = np.random.default_rng(7), condyle.ModelBuilder("chain"), condyle.WORLD
     for i in range(n):
         place = np.eye(4)
@@ -40,7 +41,7 @@ def chain(n: int) -> condyle.Model:
 
 
 def least(call: Callable[[], object], seconds: float) -> float:
-    """Returns the shortest time of a call (s), over a number of seconds and at least 20 calls."""
+    """Calls a function for a number of seconds, at least 20 times, and returns the shortest time of a call (s)."""
     times: list[float] = []
     end = time.perf_counter() + seconds
     while len(times) < 20 or time.perf_counter() < end:
@@ -51,7 +52,7 @@ def least(call: Callable[[], object], seconds: float) -> float:
 
 
 def calls_of(model: condyle.Model) -> dict[str, Callable[[], object]]:
-    """Returns a call of each algorithm on a batch of states."""
+    """Returns, for each algorithm, a function that calls it on a batch of states."""
     n, data = model.nv, condyle.Data(model)
     q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, STATES, n))
     M, x = np.zeros((STATES, n, n)), np.zeros((STATES, n))
@@ -64,7 +65,8 @@ def calls_of(model: condyle.Model) -> dict[str, Callable[[], object]]:
 
 
 def growth(seconds: float) -> dict[str, dict[str, Any]]:
-    """Returns the time per state of a batch at each size (µs), and the log-log slope over the upper half of sizes."""
+    """Returns the time per state of a batch at each size (µs), and the slope of log time over log size for the upper
+    half of the sizes."""
     times: dict[str, list[float]] = {}
     for n in SIZES:
         for name, call in calls_of(chain(n)).items():
@@ -77,8 +79,8 @@ def growth(seconds: float) -> dict[str, dict[str, Any]]:
 def spread(model: condyle.Model, calls: int) -> dict[str, dict[str, Any]]:
     """Returns mean, standard deviation, median and 95th percentile (µs) of single calls at random states.
 
-    The methods take turns. The first tenth of the calls is left out, and so is the slowest thousandth, which the
-    operating system has interrupted.
+    The methods are called alternately. Two groups of calls are left out: the first tenth, and the slowest thousandth,
+    which the operating system has interrupted.
     """
     rng, data, out = np.random.default_rng(2), condyle.Data(model), np.zeros(model.nv)
     q = [condyle.random_configuration(model, seed=k) for k in range(256)]

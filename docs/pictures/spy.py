@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/spy.png: the entries of M of real robots, and the entries that are zero because of the tree.
+"""Makes docs/pictures/spy.png: the nonzero entries of the inertia matrix M of real robots, and the entries that are
+zero because of the tree.
 
 .venv/pinocchio/bin/python docs/pictures/spy.py
 """
@@ -17,7 +18,8 @@ from example_robot_data.robots_loader import ROBOTS, getModelPath
 import condyle
 
 ROUNDING = 1e-14
-"""Maximum size, relative to the largest entry, of entries that are zero by geometry; they consist of rounding."""
+"""Maximum magnitude of an entry that counts as zero because of the robot's geometry, relative to the largest entry.
+Such an entry consists of rounding errors."""
 SHOWN = {"panda": "Panda, an arm", "anymal": "ANYmal", "talos": "TALOS", "allegro_right_hand": "Allegro hand"}
 
 

@@ -1,4 +1,4 @@
-//! Allocator that counts the allocations of each thread.
+//! Allocator that counts the allocations of each thread, for tests that a call does not allocate.
 #![allow(unsafe_code)] // an allocator requires unsafe code
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -22,7 +22,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System.alloc` with this `layout`.
+        // SAFETY: the caller got `pointer` from this allocator, and so from `System.alloc`, with the same `layout`.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -30,7 +30,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// Returns the number of allocations of this thread so far.
+/// Returns the number of allocations that this thread has made so far.
 #[allow(dead_code)] // only some tests use it
 pub(crate) fn allocated() -> usize {
     COUNT.get()

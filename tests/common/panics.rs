@@ -14,12 +14,12 @@ pub(crate) struct Panic {
 }
 
 thread_local! {
-    /// Last panic of this thread; recorded only while the thread waits for a panic.
+    /// Last panic of this thread. It is recorded only while `panic_of` runs.
     static SEEN: RefCell<Option<Panic>> = const { RefCell::new(None) };
 }
 
-/// Calls a function and returns the panic of the function; `None` if it does not panic. Other threads may panic at the
-/// same time.
+/// Calls a function and returns its panic, or `None` if the function does not panic. Panics of other threads at the
+/// same time have no effect on the result.
 pub(crate) fn panic_of(call: impl FnOnce()) -> Option<Panic> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -1,16 +1,17 @@
-/* CUDA driver without a GPU, for tests. Its devices are this processor. Their memory is host memory, but separate from it.
+/* Simulated CUDA driver without a GPU, for tests. The CPU simulates its devices. Device memory is a separate part of host
+ * memory.
  *
  *     cc -shared -fPIC -o libcuda.so.1 driver.c -ldl -lpthread
  *
- * It provides the functions that Condyle calls, with the driver's semantics as far as a mistake would show:
- * - Operations on a stream wait, and run only when something ordered after them is waited for. A missing order is thus
- *   detected. The legacy default stream is ordered with all streams that are not "non-blocking".
+ * It provides the functions that Condyle calls, with the real driver's rules, and detects mistakes in their use:
+ * - An operation on a stream runs only when the host waits for it or for a later operation. So a missing order of two
+ *   operations is detected. The legacy default stream is ordered with all streams that are not "non-blocking".
  * - Only kernels and copies can access device memory: any other access is a segmentation fault. Device memory begins as NaN, a
  *   guard follows it, and freed memory is never reused.
  * - Handles, pointers, sizes, and the context that must be current are checked. `fake_complaint` reports mistakes that a driver
  *   would silently allow. `fake_live` counts the objects that were created and not destroyed, `fake_fail` makes a function fail.
  *
- * Kernels are compiled by nvrtc.c: shared libraries with a function that runs one thread. */
+ * nvrtc.c compiles a kernel to a shared library with a function that runs one thread. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <pthread.h>
@@ -93,7 +94,7 @@ long fake_live(int kind) { return live[kind]; }
 const char *fake_complaint(void) { return complaint; }
 void fake_fail(const char *name, int code) { snprintf(failing, sizeof failing, "%s", name); failing_with = code; }
 void fake_devices(int count) { devices = count; }
-/* Returns the number of launches; `last` receives blocks, threads of a block, and rows of blocks of the last one. */
+/* Returns the number of launches; `last` receives blocks, threads of a block, and rows of blocks of the last launch. */
 long fake_launches(unsigned *last) { memcpy(last, last_launch, sizeof last_launch); return launches; }
 long fake_pending(void) { long n = 0; for (long k = 0; k < op_count; k++) n += !ops[k]->done; return n; }
 

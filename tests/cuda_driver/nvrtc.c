@@ -1,4 +1,4 @@
-/* NVIDIA's run-time compiler without a GPU, for tests: it passes the source to the system's C++ compiler.
+/* Simulated run-time compiler of NVIDIA without a GPU, for tests: it passes the source to the system's C++ compiler.
  *
  *     cc -shared -fPIC -o libnvrtc.so.12 nvrtc.c
  *

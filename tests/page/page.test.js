@@ -1,7 +1,8 @@
-// Tests the pages of plans in headless Chromium: an arm that reaches, a quadruped that trots, meshes. PAGES names their folder.
+// Tests the pages of plans in headless Chromium: an arm that reaches, a quadruped that trots, meshes. PAGES names their
+// folder.
 //
-// Checks a reader's view: no request, no error, a robot that moves with slider, player and keys, a gait, dark mode, small
-// windows, printing, and a link to a time. Pictures are written to PAGES.
+// Checks that a page causes no requests and no errors, and that slider, player and keys move the robot. Also checks a
+// gait, dark mode, small windows, printing, and a link to a time. Pictures are written to PAGES.
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { join } from "node:path";
@@ -23,7 +24,7 @@ before(async () => {
 });
 after(() => browser?.close());
 
-/** Opens a page; what it complains of and asks for is collected. */
+/** Opens a page, and collects its errors, its warnings and the addresses that it requests. */
 async function open(name, { hash = "#t=0", width = 900, height = 640, dark = false } = {}) {
   const page = await browser.newPage();
   page.setDefaultTimeout(PATIENCE);
@@ -37,7 +38,7 @@ async function open(name, { hash = "#t=0", width = 900, height = 640, dark = fal
   await settled(page);
   return { page, wrong };
 }
-/** Two frames later: what was asked to be drawn is. */
+/** Waits for two frames, after which all changes are drawn. */
 const settled = (page) => page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 const picture = async (page) => Buffer.from(await (await page.$("#view canvas")).screenshot()).toString("base64");
 const clock = (page) => page.$eval("#clock b", (b) => Number(b.textContent));
@@ -58,7 +59,8 @@ for (const name of ["reach", "trot"]) {
   test(`${name}: play, pause and keys`, async () => {
     const { page, wrong } = await open(name);
     await page.select("#speed", "0.1");
-    // The page itself pauses: on slow machines, the motion would end before a command from here arrives.
+    // The page's own script pauses the motion: on slow machines, the motion would end before a command of this test
+    // arrives.
     const pausing = page.evaluate(() => new Promise((done) => {
       const look = () => {
         if (Number(document.querySelector("#clock b").textContent) <= 0.02) return requestAnimationFrame(look);

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Tests the page of `condyle plan` in headless Chromium. Needs Node.js with npm, which installs the browser and its driver
-# into .venv/page. Without Node.js, or if the installation fails, the test is skipped with a message. CHROMIUM names another
-# browser. Pictures are written to .venv/page/pages.
+# Tests the page of `condyle plan` in headless Chromium. The test needs Node.js with npm, which installs the browser and
+# its driver into .venv/page. Without Node.js, or if the installation fails, the test is skipped with a message.
+# CHROMIUM names another browser. Pictures are written to .venv/page/pages.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -24,7 +24,7 @@ fi
 "$program" plan --out "$folder/pages/reach.html" >/dev/null
 "$program" plan --example trot >"$folder/pages/trot.toml"
 "$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
-# A motion that does not reach its target still gives a picture: exit status 1 is not an error here.
+# A page is also written for a motion that does not reach its target, so exit status 1 is not an error here.
 plan() { "$program" plan "$@" >/dev/null 2>"$folder/pages/notes" || [ $? = 1 ] || { cat "$folder/pages/notes"; exit 1; }; }
 plan --robot crates/cli/tests/boxes/boxes.urdf --target 0.2,0.1,0.6 --knots 40 --out "$folder/pages/meshes.html"
 # If the environment of the peers contains a humanoid with meshes, the page's time per frame is measured with this robot.

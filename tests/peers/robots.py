@@ -1,16 +1,16 @@
-"""Compares every robot file below some folders with the libraries that also read it. Prints a table of what is equal
-and what differs.
+"""Compares every robot file below some folders: Condyle's model with the models of other libraries that read the file.
+Prints a table of equal and different models.
 
     python tests/peers/robots.py FOLDER… [--only PATTERN] [--list] [--table FILE] [--jobs N]
 
 URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, and SDFs with Drake. Any of these libraries may
-be missing. Each file is read in its own process with a time limit, so that a crash of a library is only a row of the
+be missing. Each file is read in its own process with a time limit, so a crash of a library is reported as a row of the
 table.
 
-A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or next to FOLDER, gives the
-commits: a line has `owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public
-robots in that file. `pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest of the file and keeps the
-section.
+In a path, a folder `owner+repository` names the GitHub repository of a file. `SOURCES.tsv` in FOLDER, or next to
+FOLDER, contains the commits of the repositories: a line has `owner/repository`, a tab and the commit.
+`--table VALIDATION.md` replaces the section on public robots in that file.
+`pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest of the file and keeps the section.
 
 The exit status is 1 if a robot differs or a process crashes.
 """
@@ -32,7 +32,7 @@ COMMAND = "python tests/peers/robots.py FOLDER --table VALIDATION.md"
 
 
 def main() -> int:
-    """Reads the command line, compares the robots, and prints the table."""
+    """Compares the robots that the command line names, and prints the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="+", help="folder with robots")
     parser.add_argument("--only", metavar="PATTERN", help="only paths below a folder that match, such as '*anymal*'")

@@ -1,4 +1,4 @@
-//! A plan with residuals and constraints that a user defines, and a controller that follows the plan.
+//! Tests a plan with residuals and constraints that a user defines, and a controller that follows the plan.
 
 use condyle::nalgebra::DVector;
 use condyle::optimal::robot::{
@@ -9,7 +9,7 @@ use condyle::wholebody::{Settings, Task, WholeBodyController};
 use condyle::{Error, Model, Scalar, Vec3};
 use std::sync::Arc;
 
-/// Height of a frame above a slope, z − 0.1 x.
+/// Residual: the height of a frame above a slope, z − 0.1 x.
 struct Height {
     frame: usize,
 }
@@ -46,14 +46,15 @@ pub fn reach(arm: &Arc<Model>, x0: &[f64], target: Vec3<f64>, above: Option<f64>
     Ok(Problem::new(x0.to_vec(), vec![Box::new(knot)], vec![0; 30], Box::new(end))?)
 }
 
-/// Solves a problem; the initial guess is the arm at rest.
+/// Solves a problem. In the initial guess, the arm is at rest at all knots.
 pub fn solve(problem: &mut Problem) -> Result<Solution, Error> {
     let xs = problem.x0().repeat(problem.horizon() + 1);
     let us = problem.quasi_static(&xs)?;
     Ok(Fddp::new(problem).solve(problem, &xs, &us)?.clone())
 }
 
-/// Plans a motion, and returns the effort of a controller's first tick. Errors of three crates pass through `?`.
+/// Plans a motion, and returns the efforts of a controller's first step. The operator `?` converts the errors of three
+/// crates.
 pub fn first_effort(arm: &Arc<Model>, x0: &[f64]) -> Result<DVector<f64>, Error> {
     let mut problem = reach(arm, x0, Vec3::new(0.35, 0.2, 0.6), None)?;
     let solution = solve(&mut problem)?;

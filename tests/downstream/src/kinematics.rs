@@ -1,4 +1,4 @@
-//! Frames and points of a robot, forces that act at points, and the types of these values.
+//! Tests frames and points of a robot, forces that act at points, and the types of these values.
 
 use condyle::nalgebra::{DMatrix, DVector, Vector3};
 use condyle::{Batch, Data, Error, Force, Model, Se3, Vec3, aba, aba_derivatives, forward_velocities};
@@ -9,7 +9,7 @@ pub fn with_pen(arm: &Model) -> Result<Model, Error> {
     Ok(arm.with_frame("pen", "tool", tip)?)
 }
 
-/// Returns the Jacobian of the pen's tip, and two values of the tip's velocity: by the Jacobian and by the recursion.
+/// Returns the Jacobian of the pen's tip, and the tip's velocity, computed by the Jacobian and by forward kinematics.
 pub fn velocity_of_the_tip(arm: &Model, q: &[f64], v: &[f64]) -> Result<(DMatrix<f64>, [Vector3<f64>; 2]), Error> {
     let (pen, mut data, mut jacobian) = (arm.frame("pen")?, Data::new(arm), DMatrix::zeros(3, arm.nv()));
     let motion = forward_velocities(arm, &mut data, q, v);
@@ -18,7 +18,7 @@ pub fn velocity_of_the_tip(arm: &Model, q: &[f64], v: &[f64]) -> Result<(DMatrix
     Ok((jacobian, [by_jacobian, motion.frame_point_velocity(pen, Vec3::zero()).into()]))
 }
 
-/// Returns the accelerations of a resting arm whose pen is pushed by a force in world coordinates.
+/// Returns the accelerations of an arm at rest, if a force in world coordinates acts on its pen.
 pub fn pushed(arm: &Model, q: &[f64], tau: &[f64], push: Vec3<f64>) -> Result<Vec<f64>, Error> {
     let (pen, mut data) = (arm.frame("pen")?, Data::new(arm));
     let (body, rest) = (arm.frames()[pen].body, vec![0.0; arm.nv()]);
@@ -28,7 +28,7 @@ pub fn pushed(arm: &Model, q: &[f64], tau: &[f64], push: Vec3<f64>) -> Result<Ve
     Ok(aba(arm, &mut data, q, &rest, tau, &f_ext).to_vec())
 }
 
-/// Returns ∂q̈/∂τ times τ for the last state of a batch, and the same from a single call.
+/// Returns ∂q̈/∂τ times τ for the last state of a batch, computed by the batch and by a single call.
 pub fn last_of_a_batch(arm: &Model, states: usize) -> [DVector<f64>; 2] {
     let (q, v, tau) = (vec![0.3; states * arm.nv()], vec![0.1; states * arm.nv()], vec![0.2; states * arm.nv()]);
     let mut batch = Batch::new(arm, states, 1);
@@ -54,7 +54,8 @@ mod tests {
         Ok(())
     }
 
-    /// Checks M (q̈₁ − q̈₀) = Jᵀ f, where q̈₁ is with the force f and q̈₀ is without it.
+    /// Checks M (q̈₁ − q̈₀) = Jᵀ f, where q̈₁ is the acceleration with the force f, and q̈₀ the acceleration without
+    /// it.
     #[test]
     fn forces_at_points_act_by_the_jacobian() -> Result<(), Error> {
         let (arm, q, tau, push) = (with_pen(&robots::arm7())?, [0.3; 7], [0.0; 7], Vec3::new(1.0, -2.0, 3.0));

@@ -1,5 +1,5 @@
-//! First steps of a user, with the crate `condyle` alone: robots, points and forces, a plan, a controller and a
-//! simulation.
+//! Tests the first steps of a user who depends only on the crate `condyle`: robots, points and forces, a plan, a
+//! controller and a simulation.
 #![deny(warnings)]
 
 #[cfg(feature = "control")]

@@ -1,4 +1,4 @@
-//! If a caller makes a mistake, the panic reports a line of this file.
+//! Tests that the panic for a caller's mistake reports the line of the call, which is in this file.
 
 use condyle::{Data, robots};
 

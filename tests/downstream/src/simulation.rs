@@ -1,17 +1,17 @@
-//! A robot that lands on the ground and stands there.
+//! Tests a simulation of a robot that lands on the ground and stands there.
 
 use condyle::simulation::{Control, Ground, Settings, Simulation, Status};
 use condyle::{Error, Model};
 use std::sync::Arc;
 
-/// A robot that falls onto its feet while springs and dampers hold its joints.
+/// Simulation of a robot that falls onto its feet while springs and dampers hold its joints.
 pub struct Standing {
     simulation: Simulation,
     pose: Vec<f64>,
 }
 
 impl Standing {
-    /// Puts a robot above the ground. The frames `feet` may touch the ground.
+    /// Creates a simulation of a robot above the ground. The frames `feet` may touch the ground.
     pub fn new(robot: Arc<Model>, feet: &[&str], pose: &[f64]) -> Result<Self, Error> {
         let feet = feet.iter().map(|foot| robot.frame(foot)).collect::<Result<Vec<_>, _>>()?;
         let mut simulation = Simulation::new(robot, Settings::default());
@@ -20,7 +20,7 @@ impl Standing {
         Ok(Self { simulation, pose: pose.to_vec() })
     }
 
-    /// Simulates this number of steps, and returns the status of the simulation.
+    /// Simulates `steps` time steps, and returns the status of the simulation.
     pub fn run(&mut self, steps: usize) -> Status {
         let Self { simulation, pose } = self;
         simulation.run(steps, |now: &mut Control<'_, f64>| {

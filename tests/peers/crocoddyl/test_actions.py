@@ -1,4 +1,5 @@
-"""Tests built-in actions and drives, and problems with one action per knot, as they occur in Crocoddyl's scripts."""
+"""Compares built-in actions and actuation models with Crocoddyl, and problems with a separate action for each knot, as
+in Crocoddyl's example scripts."""
 
 import crocoddyl
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import condyle
 from condyle import optimal
 
-# Tolerance of equal sums in another order.
+# Tolerance of sums whose terms are added in another order.
 ROUNDING = 1e-12
 # Tolerance of the costs of iterates, the same as in benches/peers/ocp.py.
 COST = 1e-6

@@ -1,8 +1,8 @@
 """Tests `condyle.crocoddyl`: Condyle solves Crocoddyl's problems, and Crocoddyl's solvers use Condyle's dynamics.
 Iterates must be equal.
 
-The problems are the same as in `test_problems.py`. `test_residuals.py` converts all residuals, activations and
-integrators.
+The problems are the same as in `test_problems.py`. `test_residuals.py` tests the conversion of all residuals,
+activations and integrators.
 """
 
 import subprocess
@@ -24,12 +24,12 @@ from ocp_converted import Converted
 from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
-# Tolerance of equal sums in another order, relative to the largest number.
+# Tolerance of sums whose terms are added in another order, relative to the largest number.
 ROUNDING = 1e-11
 
 
 class Loose(Converted):
-    """The same problem, but some of its actions are written in Python as classes of Crocoddyl."""
+    """Problem from test_problems.py in which some actions are Python classes derived from Crocoddyl's."""
 
     strict = False
 
@@ -40,7 +40,8 @@ def test_same_trace(name, solver):
     assert result["good"], result
 
 
-# First solver of each file. A file is skipped if Crocoddyl repeats none of its own iterations.
+# First solver for each problem file.
+# A file is skipped if a tiny perturbation changes all iterations of Crocoddyl.
 FIRST = {name: (name, solver) for name, solver in reversed(FILES) if ocp.CHAOTIC.get((name, solver)) != 0}
 
 
@@ -55,7 +56,7 @@ def test_same_trace_of_a_file(name, solver):
 
 
 class OnOurs(Theirs):
-    """Crocoddyl's problem with Condyle's dynamics in Crocoddyl's Euler steps."""
+    """Problem of Crocoddyl in which Crocoddyl's Euler steps call Condyle's dynamics."""
 
     def stage(self, stage):
         step = super().stage(stage)
@@ -74,11 +75,11 @@ def test_our_dynamics_in_their_solver(name, solver):
     spec, robot = PROBLEMS[name]()
     theirs, ours = Theirs(spec, robot, solver), OnOurs(spec, robot, solver)
     start = theirs.warm_start()
-    for found, expected in zip(ours.warm_start()[1], start[1], strict=True):  # the controls come from quasiStatic
+    for found, expected in zip(ours.warm_start()[1], start[1], strict=True):  # quasiStatic computes the controls
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7 * max(1.0, np.abs(expected).max(initial=0.0)))
     a, b = ours.solve(*start), theirs.solve(*start)
     assert ocp.agreeing(a.rows, b.rows) == len(a.rows) == len(b.rows)
-    # Convert back: the actions with Condyle's dynamics become the same problem.
+    # The actions with Condyle's dynamics are converted back, which must give the original problem.
     again = condyle.crocoddyl.problem(ours.problem, strict=True)
     us = start[1] if len({len(u) for u in start[1]}) > 1 else np.array(start[1])
     first = condyle.crocoddyl.problem(theirs.problem, strict=True)
@@ -87,8 +88,8 @@ def test_our_dynamics_in_their_solver(name, solver):
 
 
 def arm():
-    """Creates an arm in Crocoddyl. Returns its model, its state, its drives, and a function that creates a sum of
-    costs."""
+    """Creates an arm in Crocoddyl. Returns its model, its state, its actuation model, and a function that creates a sum
+    of costs."""
     model = pin.buildModelFromXML(condyle.robots.ARM7)
     state = crocoddyl.StateMultibody(model)
 
@@ -113,7 +114,7 @@ def shooting(state, drives, running, end, knots=5, constraints=None):
 
 
 def test_costs_of_controls_vanish_at_the_end():
-    """Tests that residuals of controls, efforts or forces are zero in terminal models, as in Crocoddyl."""
+    """Tests that residuals of controls, efforts or forces are zero at the terminal knot, as in Crocoddyl."""
     model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
     state = crocoddyl.StateMultibody(model)
     drives, foot = crocoddyl.ActuationModelFloatingBase(state), model.getFrameId("left_sole")
@@ -147,7 +148,7 @@ def test_costs_of_controls_vanish_at_the_end():
         assert ours.costs[1] == data.cost == 0.0, residual
         problem.calc([x, x], [u])
         assert ours.costs[0] == pytest.approx(problem.runningDatas[0].cost, rel=1e-9) and ours.costs[0] > 0.0, residual
-    # A constant residual is not converted.
+    # A terminal residual with a constant cost is not converted: Crocoddyl evaluates the action, with a warning.
     total = crocoddyl.CostModelSum(state, nu)
     effort = crocoddyl.ResidualModelJointEffort(state, drives, np.ones(nu), nu)
     total.addCost("term", crocoddyl.CostModelResidual(state, effort), 1.0)
@@ -161,8 +162,8 @@ def test_costs_of_controls_vanish_at_the_end():
 
 
 def test_a_residual_that_means_something_else_stays_theirs():
-    """Crocoddyl's residual of gravity in contact is not converted: it omits the forces that its documentation
-    includes."""
+    """Tests that Crocoddyl's residual of gravity in contact is not converted: Crocoddyl evaluates the action, with a
+    warning. This residual omits the contact forces, although its documentation includes them."""
     model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
     state = crocoddyl.StateMultibody(model)
     drives = crocoddyl.ActuationModelFloatingBase(state)
@@ -217,13 +218,13 @@ def test_lqr():
     converted = condyle.crocoddyl.problem(theirs, strict=True)
     found = Fddp(converted, project_warm_start=False).solve(np.ones((11, 4)), np.zeros((10, 2)))
     assert found.cost == pytest.approx(solver.cost, rel=1e-9)
-    # Crocoddyl's feedback has the opposite sign.
+    # Crocoddyl defines feedback gains with the opposite sign.
     np.testing.assert_allclose(found.K, -np.array([np.array(K) for K in solver.K]), atol=1e-8)
 
 
 class ActivationModelQuad(crocoddyl.ActivationModelQuad):
-    """User-defined activation Σ r². Its class has the same name as one of Crocoddyl's classes; the converter must not
-    mistake it for that class."""
+    """User-defined activation Σ r². Its class has the same name as a class of Crocoddyl. The converter must not treat
+    it as Crocoddyl's class."""
 
     def calc(self, data, r):
         data.a_value = float(r @ r)
@@ -300,7 +301,7 @@ def test_a_robot_with_a_joint_that_is_not_here():
 
 
 class Circle(crocoddyl.StateAbstract):
-    """State space of a point on a circle, (cos, sin), and its rate."""
+    """State space of a point on a circle: position (cos, sin) and angular rate."""
 
     def __init__(self):
         crocoddyl.StateAbstract.__init__(self, 3, 2)
@@ -323,7 +324,7 @@ class Circle(crocoddyl.StateAbstract):
 
 
 class Turns(crocoddyl.ActionModelAbstract):
-    """User-defined action on a manifold: a wheel rotates to the angle 2."""
+    """User-defined action on a manifold: a wheel rotates to the angle 2 rad."""
 
     def __init__(self):
         crocoddyl.ActionModelAbstract.__init__(self, Circle(), 1, 2)
@@ -371,7 +372,8 @@ def test_a_class_of_ones_own_is_not_taken_for_another():
 
 
 def test_drives_of_any_kind():
-    """Tests drives τ = S u with any constant S. Drives that depend on the state are not converted."""
+    """Tests the conversion of actuation τ = S u with any constant S. Actuation that depends on the state is not
+    converted."""
     _, state, _, costs = arm()
 
     class Springs(crocoddyl.ActuationModelAbstract):

@@ -12,7 +12,7 @@ from example_robot_data.robots_loader import ROBOTS
 import condyle
 from condyle.optimal import Activation, Cost, Fddp, FreeDynamics, Problem, Residual
 
-# Tolerance of costs: under a perturbation of 1e-12, Crocoddyl repeats its own costs only to 1e-6.
+# Tolerance of costs: a perturbation of 1e-12 changes Crocoddyl's own costs by up to 1e-6.
 COST = 1e-6
 
 SPEC = json.loads((Path(__file__).parent / "arm_panda.json").read_text())
@@ -29,7 +29,8 @@ SOLVERS = {
     "box fddp": crocoddyl.SolverBoxFDDP,
     "box ddp": crocoddyl.SolverBoxDDP,
 }
-# Bounds on efforts. The unbounded solution exceeds both lower and upper bounds, but the bounds suffice to hold the arm.
+# Bounds on efforts. The unbounded solution exceeds the lower and the upper bound.
+# Efforts within the bounds can hold the arm at rest.
 LOWER = np.array([-1.5, -22.0, -8.0, -5.0, -5.0, -5.0, -0.5, -0.5, -0.5])
 UPPER = np.array([9.0, 7.5, 21.0, 22.0, 4.0, 2.5, 0.5, 0.5, 0.5])
 
@@ -95,9 +96,9 @@ def warm_start(kind):
     running, _ = our_problem()
     hold = running.quasi_static(X0)
     xs, us = np.tile(X0, (SPEC["knots"] + 1, 1)), np.tile(hold, (SPEC["knots"], 1))
-    if kind == "gaps":  # no controls lead to these states
+    if kind == "gaps":  # no controls can produce these states
         xs[1:, 1] += np.linspace(0.0, 0.3, SPEC["knots"])
-    if kind == "gap at the start":  # there is also a gap at the initial state
+    if kind == "gap at the start":  # the guess of the first state differs from x0
         xs[:, 3] += 0.1
     return xs, us
 
@@ -126,7 +127,7 @@ def test_same_optimum_and_gains():
     np.testing.assert_allclose(ours.cost, theirs.cost, rtol=1e-10)
     np.testing.assert_allclose(ours.xs, np.array(theirs.xs), atol=1e-6)
     np.testing.assert_allclose(ours.us, np.array(theirs.us), atol=1e-5)
-    np.testing.assert_allclose(-ours.K[0], np.array(theirs.K[0]), rtol=1e-6, atol=1e-6)  # Crocoddyl's sign is opposite
+    np.testing.assert_allclose(-ours.K[0], np.array(theirs.K[0]), rtol=1e-6, atol=1e-6)  # the signs differ
 
 
 def test_one_iteration_is_the_same_to_rounding():

@@ -1,6 +1,7 @@
-"""Compares whole problems with Crocoddyl, iteration by iteration.
+"""Compares solves of whole problems with Crocoddyl, iteration by iteration.
 
-The problems are from `benches/peers/ocp_problems.py`, and from the files of a folder that CONDYLE_PROBLEMS may name.
+The problems are from `benches/peers/ocp_problems.py`. If the environment variable CONDYLE_PROBLEMS names a folder, its
+files are tested, too.
 """
 
 import json

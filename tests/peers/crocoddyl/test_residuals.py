@@ -19,8 +19,8 @@ from condyle.optimal import (
     WrenchCone,
 )
 
-# Tolerance after three iterations of a few knots.
-# Rounding errors grow with the condition number of the problem, which is about 1e4.
+# Tolerance of iterates after three iterations on a few knots.
+# The condition number of the problem, about 1e4, amplifies rounding errors.
 SAME = 1e-9
 
 DT, KNOTS = 0.02, 4
@@ -28,7 +28,7 @@ RNG = np.random.default_rng(5)
 
 
 class Robot:
-    """A robot in both libraries, with a bent posture, and with feet or a tool."""
+    """Robot in Condyle and in Crocoddyl, with a bent posture, and with feet or a tool."""
 
     def __init__(self, name):
         if name == "arm7":
@@ -180,8 +180,8 @@ def jump(r, nu):
     return crocoddyl.ResidualModelImpulseCoM(r.state), 1.0, Residual.impulse_center_of_mass(), 3
 
 
-# The velocity along the world's axes is left out.
-# Its Jacobian in Crocoddyl differs by 0.3 from differences of the velocity.
+# The residual of velocity along the world's axes is not tested.
+# Crocoddyl's Jacobian of this residual differs by 0.3 from finite differences of the velocity.
 ANY = {
     "state": state,
     "com": com,
@@ -207,7 +207,8 @@ ACTIVATIONS = {
 
 
 def costs(r, nu, make, activation):
-    """Returns the same sum of costs in both libraries: the given term, and small terms that keep the problem convex."""
+    """Returns the same sum of costs for Condyle and for Crocoddyl: the given term, and small terms that keep the
+    problem convex."""
     residual, weight, ours, n = make(r, nu)
     theirs_activation, ours_activation = ACTIVATIONS[activation](n)
     total = crocoddyl.CostModelSum(r.state, nu)
@@ -223,7 +224,7 @@ def costs(r, nu, make, activation):
 
 
 def same_iterates(r, ours, theirs):
-    """Solves a horizon of one knot in both libraries, and compares the first three iterations."""
+    """Solves a horizon of one knot with Condyle and with Crocoddyl, and compares the first three iterations."""
     end = crocoddyl.CostModelSum(r.state, r.nu)
     end.addCost("rest", crocoddyl.CostModelResidual(r.state, crocoddyl.ResidualModelState(r.state, r.goal, r.nu)), 1.0)
     last = crocoddyl.IntegratedActionModelEuler(
@@ -291,7 +292,7 @@ def test_runge_kutta(order):
         theirs.calc(data, r.x0, u)
         problem = Problem(r.x0, [ours], [0], FreeDynamics(r.ours, None, []))
         np.testing.assert_allclose(problem.rollout(u[None])[1], data.xnext, atol=1e-13)
-        if r is ARM and order != 3:  # otherwise Crocoddyl's derivatives differ by up to 6e-6 from differences
+        if r is ARM and order != 3:  # otherwise Crocoddyl's derivatives differ from finite differences by up to 6e-6
             same_iterates(r, ours, theirs)
 
 
@@ -303,7 +304,7 @@ def test_control_gravity():
 
 
 def partial_contacts(r, kind, axes):
-    """Returns, in both libraries, contacts of both feet that act along a line or in a plane."""
+    """Returns contacts of both feet that act along a line or in a plane, for Condyle and for Crocoddyl."""
     contacts, ours = crocoddyl.ContactModelMultiple(r.state, r.nu), {}
     word, R, x = "local" if axes == pin.LOCAL else "local_world_aligned", placement().rotation, 0.1
     for foot in r.feet:
@@ -312,7 +313,7 @@ def partial_contacts(r, kind, axes):
             made = crocoddyl.ContactModel1D(r.state, r.frame(foot), x, axes, R, r.nu, gains)
             constraint = condyle.ContactConstraint(foot, kind, None, word, *gains, at, axes=R.T)
         else:
-            # kp is 0: Crocoddyl takes the error of position along the world's axes, whatever the frame's axes are.
+            # kp is 0, because Crocoddyl always computes the position error along the world's axes.
             gains = np.array([0.0, 10.0])
             made = crocoddyl.ContactModel2D(r.state, r.frame(foot), np.zeros(2), r.nu, gains)
             constraint = condyle.ContactConstraint(foot, kind, kd=10.0)
@@ -346,7 +347,7 @@ def test_contacts_along_axes(robot, kind, axes, term):
     dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, theirs, total, 0.0, True)
     knot = ContactDynamics(r.ours, ours, DT, mine)
     same_iterates(r, knot, crocoddyl.IntegratedActionModelEuler(dynamics, DT))
-    # These controls hold the robot at rest.
+    # The controls u hold the robot at rest.
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(knot.quasi_static(x), dynamics.quasiStatic(dynamics.createData(), x), atol=1e-7)
 
@@ -377,8 +378,8 @@ def test_control_polynomial(robot, integrator, controls):
         if free
         else crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, held, total, 0.0, True)
     )
-    # In Crocoddyl, a quadratic needs an integrator of three or four stages.
-    # For other integrators, the quadratic has the nodes of four stages.
+    # In Crocoddyl, controls that are quadratic in time need a Runge-Kutta integrator of three or four stages.
+    # For other integrators, the test gives the quadratic the time points of four stages.
     of = kind if kind == crocoddyl.RKType.three else crocoddyl.RKType.four
     polynomial = POLYNOMIALS[controls](r.nu, of)
     if kind is None:
@@ -395,5 +396,5 @@ def test_control_polynomial(robot, integrator, controls):
     np.testing.assert_allclose(at.costs[0], data.cost, rtol=1e-11)
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(ours.quasi_static(x), theirs.quasiStatic(theirs.createData(), x), atol=1e-7)
-    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are inaccurate, see test_runge_kutta
+    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are inaccurate
         same_iterates(r, ours, theirs)

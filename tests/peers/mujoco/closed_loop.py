@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Makes the tables of whole-body control in MuJoCo: disturbances, the largest survived pushes, and the trot of 20 s.
+"""Prints tables of whole-body control of robots in MuJoCo: motions under disturbances, and the largest pushes that a
+robot survives.
 
     .venv/pinocchio/bin/python tests/peers/mujoco/closed_loop.py [disturbances] [pushes] [--write]
 
-Without a name the program makes both tables, which takes several minutes on all cores with a release build. With
---write it puts the tables into docs/wholebody.md.
+Without the name of a table the program computes both tables, which takes several minutes on all cores with a release
+build. With --write it replaces the tables in docs/wholebody.md.
 """
 
 import re
@@ -32,15 +33,16 @@ DISTURBANCES = {
     "10 %, five ticks late, more": Disturbance(0.1, 5, 1.2),
 }
 DIRECTIONS = range(0, 360, 30)
-"""Directions in which TALOS is pushed: angles in degrees, from ahead towards the left."""
+"""Directions in which TALOS is pushed (degrees): 0 is ahead, 90 is to the left."""
 STIFFNESS = 20.0
-"""Stiffness of the PD control that holds the posture: a fraction of a joint's maximum effort, per rad."""
+"""Stiffness of the PD control that holds the posture, as a multiple of a joint's maximum effort, per rad."""
 PUSH = 20.0
 """Size of the push in the table of disturbances (N s)."""
 LAWS = {"cones": {}, "pyramids of 4 sides": {"cone": Pyramid(4, True)}, "PD hold": {"stiffness": STIFFNESS}}
 """Names and settings of the compared controllers."""
 FIRST, STRIDE, STEP = 40.0, 8.0, 2.0
-"""Parameters of the search for the largest push (N s): first push, first step, and accuracy of the result."""
+"""Parameters of the search for the largest push (N s): the first push, the first increment, and the accuracy of the
+result."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -55,7 +57,7 @@ def deviation(record: Record) -> float:
 
 
 def cell(record: Record, unsolved: int) -> str:
-    """Returns a few words that describe a run."""
+    """Returns the text of a table cell for a run: the deviation, or when the robot falls."""
     if not record.stands:
         return f"falls after {record.t[-1]:.1f} s"
     failed = f", {unsolved} ticks unsolved" if unsolved else ""
@@ -63,7 +65,7 @@ def cell(record: Record, unsolved: int) -> str:
 
 
 def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
-    """Returns the motions of TALOS, each as a function that makes the run."""
+    """Returns the motions of TALOS by name; each motion is a function that simulates it."""
     return {
         "stands, 5 s": lambda h: h.run(h.control(), 5.0),
         "shifts its weight by ± 6 cm, 8 s": lambda h: h.run(h.control(h.shift), 8.0),
@@ -73,7 +75,7 @@ def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
 
 
 def disturbances() -> str:
-    """Returns the table of disturbances, which shows the motions that the robots survive."""
+    """Returns the table of motions under disturbances."""
     rows = []
     for name, case in humanoid_cases().items():
         cells = []
@@ -90,8 +92,8 @@ def disturbances() -> str:
 
 
 def largest(survives: Callable[[float], bool]) -> float:
-    """Returns the largest push (N s) that the robot survives, if it also survives all weaker pushes that were
-    tested."""
+    """Searches for the largest push (N s) that the robot survives. All weaker pushes that were tested are survived,
+    too."""
     low = high = FIRST
     if survives(FIRST):
         while survives(high := low + STRIDE):

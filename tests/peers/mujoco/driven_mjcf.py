@@ -1,4 +1,5 @@
-"""Random robots in MJCF, with actuators, springs, tendons, loops, gravity compensation and default classes."""
+"""Generates random robots in MJCF, with actuators, springs, tendons, loops, gravity compensation and default
+classes."""
 
 import random
 from collections.abc import Callable
@@ -8,10 +9,11 @@ T = TypeVar("T")
 
 
 class DrivenMjcf:
-    """Text of a random robot. MuJoCo may reject it: ranges may be empty, and classes may not fit."""
+    """Text of a random robot. MuJoCo may reject the text, because a range may be empty or a class may not fit its
+    element."""
 
     def __init__(self, seed: int) -> None:
-        """Writes the robot for a seed."""
+        """Generates the text of the robot for a seed."""
         self.random = random.Random(seed)
         self.joints: list[tuple[str, str]] = []
         self.bodies: list[str] = []
@@ -30,7 +32,7 @@ class DrivenMjcf:
         )
 
     def number(self, lower: float = -1.0, upper: float = 1.0) -> float:
-        """Returns a random number with three digits."""
+        """Returns the text of a random number with three digits."""
         return round(self.random.uniform(lower, upper), 3)
 
     def numbers(self, count: int) -> str:
@@ -43,15 +45,15 @@ class DrivenMjcf:
         return f"{lower} {upper + 0.01:.3f}"
 
     def chance(self, share: float) -> bool:
-        """Returns true with this probability."""
+        """Returns true with the given probability."""
         return self.random.random() < share
 
     def maybe(self, share: float, text: str) -> str:
-        """Returns the text with this probability, and an empty text otherwise."""
+        """Returns the text with the given probability, and otherwise an empty text."""
         return text if self.chance(share) else ""
 
     def pick(self, values: list[T]) -> T:
-        """Returns one of the values at random."""
+        """Returns one of the given values at random."""
         return self.random.choice(values)
 
     def polynomial(self, greatest: float) -> str:
@@ -77,7 +79,7 @@ class DrivenMjcf:
         return text + self.maybe(0.25, f'springdamper="{self.number(0.1, 1)} {self.number(0.2, 2)}" ') + "/>"
 
     def body(self, depth: int, floats: bool = False) -> str:
-        """Returns a body, with the bodies that it carries."""
+        """Returns a body, with its child bodies."""
         k = len(self.bodies)
         self.bodies.append(f"b{k}")
         kinds = [self.pick(["hinge", "hinge", "slide", "ball"]) for _ in range(self.pick([0, 1, 1, 1, 2]))]
@@ -108,7 +110,7 @@ class DrivenMjcf:
         return f'<fixed name="t{k}" {chosen}>{joints}</fixed>'
 
     def laws(self) -> dict[str, Callable[[], str]]:
-        """Returns the attributes of each kind of actuator."""
+        """Returns the attributes that are specific to each kind of actuator."""
         gain = self.number
         return {
             "motor": lambda: "",

@@ -1,10 +1,11 @@
-"""Compares robots with one feature each. The features are all elements and attributes in MuJoCo's schema.
+"""Compares robots in Condyle and MuJoCo. Each robot has one feature: one element or attribute of MuJoCo's schema of
+MJCF.
 
     python tests/peers/mujoco/features.py [PATTERN]
 
 prints a line for each feature. If a feature changes MuJoCo's compiled model (inertias, poses, limits, losses, actuators
-and so on), it must change Condyle's model in the same way, or give a warning or an error that names it.
-`test_features.py` asserts this.
+and so on), it must change Condyle's model in the same way. Otherwise Condyle must give a warning or an error that names
+the feature. `test_features.py` asserts this.
 """
 
 import fnmatch
@@ -47,8 +48,8 @@ HOLES = {"asset": MESH, "in_b": "", "in_c": "", "in_world": "", "after": "", "in
 ORIENTED = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"]
 ACTUATOR_TARGET = ["joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"]
 
-# Values of an attribute; they are tried until MuJoCo accepts one that has an effect.
-# Attributes that are not listed take values of GENERIC.
+# Values that the test tries for each attribute, until MuJoCo accepts a value that has an effect.
+# For attributes that are not listed here, the test tries the values in GENERIC.
 VALUES = {
     "quat": ["0.8 0.2 0.4 0.4"],
     "axisangle": ["1 2 3 40"],
@@ -153,8 +154,8 @@ def schema() -> Iterator[tuple[tuple[str, ...], list[str]]]:
 
 
 def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
-    """Yields test cases for an attribute of an element: a name, the robot without the attribute, and the robot with the
-    attribute. In the last robot, `@` is the placeholder of the attribute."""
+    """Yields test cases for an attribute of an element. A case consists of a name, a robot without the attribute, and
+    the same robot with `@` in place of the attribute."""
 
     def robot(**holes: str) -> str:
         return ROBOT.format(**HOLES | holes)
@@ -219,7 +220,7 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
             ends = "joint1='j' joint2='l'" if kind == "joint" else "body1='b' body2='f' anchor='0.1 0 0'"
             holes = {"in_world": "<body name='f'><joint name='z' axis='1 0 0'/><geom size='0.1' pos='0.1 0 0'/></body>"}
             base = f"<equality><{kind} name='x' {ends}/></equality>"
-            yield kind, robot(**holes), robot(**holes, after=base)  # the feature is the whole element
+            yield kind, robot(**holes), robot(**holes, after=base)  # this feature is a whole element
             yield kind, robot(**holes, after=base), robot(**holes, after=base.replace("/>", " @/>"))
         case ("actuator", kind):
             ends = {
@@ -255,7 +256,8 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
 
 @functools.cache
 def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
-    """Returns MuJoCo's model and all its fields that have an effect; or MuJoCo's error."""
+    """Compiles a text by MuJoCo. Returns MuJoCo's model and its fields that affect kinematics, dynamics or limits, or
+    MuJoCo's error."""
     try:
         m = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
@@ -318,7 +320,7 @@ def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
         "actuator_ctrllimited",
     ]:
         effect[field] = getattr(m, field).copy()
-    effect["eq_data"][:, 10] = 0.0  # the torque scale only matters for compliant welds, so the comparison ignores it
+    effect["eq_data"][:, 10] = 0.0  # the comparison ignores the torque scale, which only affects compliant welds
     effect["actuator_biasprm"][m.actuator_biastype == 0] = 0.0
     effect["actuator_dynprm"][m.actuator_dyntype == 0] = 0.0
     for name in ("tendon_range", "actuator_forcerange", "actuator_ctrlrange"):
@@ -342,7 +344,7 @@ def rounded(x: Any) -> Any:
 
 @functools.cache
 def ours(text: str) -> tuple[condyle.Model, dict[str, Any]] | str:
-    """Returns Condyle's model with all its contents, or the error."""
+    """Returns Condyle's model of a text and all its contents, or Condyle's error."""
     try:
         model = condyle.Model.from_mjcf_str(text)
     except condyle.Error as error:
@@ -392,7 +394,7 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
     tau = condyle.rnea(model, data, q, v, a)
     expect("bias", there.effort(q, tau), effect["bias"])
     passive = there.effort(q, condyle.passive_torque(model, q, v, 1e-3))
-    passive = passive + model.friction * np.tanh(d.qvel / 1e-3)  # in MuJoCo, friction is a constraint
+    passive = passive + model.friction * np.tanh(d.qvel / 1e-3)  # without friction, a constraint in MuJoCo
     expect("passive", passive, effect["passive"])
     expect("gravity", model.gravity, effect["gravity"] if not effect["disabled"][0] & 128 else 0 * effect["gravity"])
     frames = {f.name for f in model.frames}
@@ -421,8 +423,8 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
 
 
 def cases() -> Iterator[tuple[str, str, str]]:
-    """Yields a name, the robot without the feature, and the robot with the feature. In the last robot, `@` is the
-    placeholder of an attribute, which is named `*`."""
+    """Yields the test cases of all features. A case consists of a name, a robot without the feature, and the same robot
+    with the feature."""
     for path, attributes in schema():
         if VISUAL & set(path):
             continue
@@ -445,7 +447,8 @@ def cases() -> Iterator[tuple[str, str, str]]:
 
 
 def verdict(base: str, text: str) -> tuple[str, str]:
-    """Returns `silent`, `wrong`, `held`, `warned`, `refused`, `no effect`, or `invalid` if MuJoCo rejects the robot."""
+    """Compares Condyle's treatment of a feature with MuJoCo's. The verdict is `held`, `warned`, `refused`, `no effect`,
+    `wrong`, `silent` (ignored without a warning), or `invalid` if MuJoCo rejects the robot."""
     theirs, before = compiled(text), compiled(base)
     if isinstance(theirs, str):
         return "invalid", theirs.splitlines()[0]
@@ -457,7 +460,7 @@ def verdict(base: str, text: str) -> tuple[str, str]:
         return "refused", mine
     warnings = [str(w) for w in mine[0].warnings]
     known = [str(w) for w in plain[0].warnings]
-    # A warning already names an element that is left out, whatever the element's attributes are.
+    # If an element is left out, its warning exists with and without the attribute, so warnings about `x` count, too.
     said = [w for w in warnings if w not in known or "`x`" in w]
     if not said and (wrong := differences(theirs, mine)):
         return "wrong", f"{wrong}; MuJoCo's changes: {effect}"
@@ -476,7 +479,7 @@ if __name__ == "__main__":
         if fnmatch.fnmatch(name, pattern):
             try:
                 kind, what = verdict(base, text)
-            except Exception as error:  # the comparison itself cannot handle this case
+            except Exception as error:  # a failure of the comparison itself is reported as a crash
                 kind, what = "crash", repr(error)
             counts[kind] = counts.get(kind, 0) + 1
             print(f"{kind:10} {name}: {what}")

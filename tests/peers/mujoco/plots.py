@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Draws the pictures of docs/wholebody.md from runs in MuJoCo, and from the table of the largest pushes in that page.
+"""Draws the pictures of docs/wholebody.md from simulations in MuJoCo, and from the table of the largest pushes in
+docs/wholebody.md.
 
 .venv/pinocchio/bin/python tests/peers/mujoco/plots.py
 """
@@ -16,18 +17,18 @@ from scenes import FEET, Humanoid, Quadruped, anymal, urdf
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "wholebody.md"
 PICTURES = DOCUMENT.parent / "pictures"
-PUSHES = (10.0, 20.0, 30.0, 40.0)  # pushes forwards (N s)
+PUSHES = (10.0, 20.0, 30.0, 40.0)  # impulses of the forward pushes (N s)
 
 
 def save(figure: plt.Figure, name: str) -> None:
-    """Writes a picture as a file of small size."""
+    """Writes a picture to a compressed file."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     figure.savefig(PICTURES / name, dpi=90, metadata={"Software": None})
     plt.close(figure)
 
 
 def push() -> None:
-    """Plots TALOS under forward pushes of several sizes."""
+    """Plots the motion of TALOS after forward pushes of several sizes."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", sharey=True)
     for axes, title in ((left, "whole-body control, cones"), (right, "PD hold of the joints")):
         for size in PUSHES:
@@ -53,7 +54,7 @@ def pushes() -> None:
     around = np.radians(np.r_[found[:, 0], found[0, 0] + 360.0])
     for k, (law, line) in enumerate(zip(laws, ("-", "--", ":"), strict=True), 1):
         axes.plot(around, np.r_[found[:, k], found[0, k]], line, marker="o", markersize=4, label=law)
-    axes.set_theta_zero_location("N")  # ahead is up, and left is left
+    axes.set_theta_zero_location("N")  # in the plot, ahead is up, and left is left
     axes.set_thetagrids(range(0, 360, 90), ["ahead", "left", "back", "right"])
     axes.set_rlim(0.0, 10.0 * np.ceil(found[:, 1:].max() / 10.0))
     axes.set_title("largest push that is survived (N s)")
@@ -62,7 +63,7 @@ def pushes() -> None:
 
 
 def lift() -> None:
-    """Plots TALOS lifting a foot."""
+    """Plots the motion of TALOS that lifts a foot."""
     humanoid = Humanoid()
     record = humanoid.run(humanoid.control(humanoid.lift), 7.0)
     figure, (above, below) = plt.subplots(2, 1, figsize=(7.5, 4.6), layout="constrained", sharex=True)
@@ -78,7 +79,7 @@ def lift() -> None:
 
 
 def trot() -> None:
-    """Plots ANYmal trotting for 20 s."""
+    """Plots the motion of ANYmal that trots for 20 s."""
     quadruped = Quadruped(urdf("anymal"), FEET, anymal())
     record = quadruped.run(20.0)
     figure, (above, below) = plt.subplots(2, 1, figsize=(7.5, 4.6), layout="constrained")

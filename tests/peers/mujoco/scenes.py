@@ -1,4 +1,4 @@
-"""Robots in MuJoCo, with their controllers and their tasks."""
+"""Robots that MuJoCo simulates, their controllers, and the motions that the controllers perform."""
 
 import sys
 from collections import deque
@@ -34,16 +34,17 @@ SOLES = ["left_sole_link", "right_sole_link"]
 SOLE = (0.2, 0.12)
 """Side lengths of TALOS's soles (m)."""
 TRUSTED = (0.19, 0.11)
-"""Side lengths of the soles that the controller assumes (m). They are smaller, since a sole tips at its very edges."""
+"""Side lengths of the soles that the controller assumes (m). They are smaller than the real side lengths, because a
+sole tips if the force acts at its edge."""
 FEET = ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]
 BALL = 0.03
 """Radius of ANYmal's feet (m)."""
 FRICTION = 0.7
 PUSH_TIME = 0.1
-"""Duration of a push (s)."""
+"""Duration of a push (s), with constant force."""
 FALLEN = 0.75
-"""Limits of a fall. The robot has fallen if the trunk is below this fraction of its initial height, or leans by more
-than this angle (rad)."""
+"""Limits that define a fall: a fraction of the trunk's initial height, and an angle (rad). The robot has fallen if the
+trunk is below this height or leans by more than this angle."""
 
 
 def urdf(name: str) -> str:
@@ -54,12 +55,12 @@ def urdf(name: str) -> str:
 
 
 class Disturbance(NamedTuple):
-    """Disturbances that the controller does not know."""
+    """Disturbances of a simulation that the controller does not know."""
 
     noise: float = 0.0
     """Standard deviation of the noise of each velocity, relative to the velocity."""
     delay: int = 0
-    """Number of ticks after which the controller receives a state."""
+    """Delay after which the controller receives a state, in control steps."""
     friction: float = 1.0
     """Friction coefficient that the controller assumes, as a multiple of the real coefficient μ."""
 
@@ -68,10 +69,10 @@ NONE = Disturbance()
 
 
 class Record(NamedTuple):
-    """Record of a run. Each array has one entry per `every` ticks."""
+    """Record of a simulation. Each array has one entry per `every` time steps."""
 
     stands: bool
-    """Whether the robot is still standing at the end."""
+    """Whether the robot stands at the end of the simulation."""
     t: Array
     """Times (s)."""
     q: Array
@@ -81,7 +82,7 @@ class Record(NamedTuple):
     loads: Array
     """Vertical force on each foot (N)."""
     wanted: Array
-    """Reference of the centre of mass (m)."""
+    """Reference positions of the centre of mass (m)."""
 
 
 def run(
@@ -106,7 +107,7 @@ def run(
         if tick % every == 0:
             c = condyle.com(world.model, data, q)
             rows.append((t, q, c, world.loads()[:, 2], wanted() if wanted else c))
-        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis, in the world
+        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis in world coordinates
         if not (q[2] - world.ground > FALLEN * height and upright > np.cos(FALLEN)):
             stands = False
             break
@@ -121,7 +122,7 @@ def ramp(t: float, begin: float, end: float) -> Array:
 
 
 class Humanoid:
-    """TALOS, which stands on two soles."""
+    """Robot TALOS in MuJoCo, standing on two soles."""
 
     def __init__(
         self,
@@ -145,14 +146,15 @@ class Humanoid:
         for side, sign in (("left", 1.0), ("right", -1.0)):
             for name, angle in (posture | {"arm_*_1": sign * 0.26, "arm_*_2": sign * 0.17}).items():
                 q[model.idx_qs[model.joint(name.replace("*", side) + "_joint")]] = angle
-        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # the soles are then at height 0
+        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # at this height of the trunk, the soles are at height 0
         self.q, self.start = q, self.controller.hold(q)
         self.references = self.start.copy()
         self.unsolved = 0
         self.world.set_state(q, np.zeros(model.nv))
 
     def control(self, aim: Callable[[float, References], None] | None = None) -> Law:
-        """Returns the whole-body controller as a law. `aim` changes the controller's references over time."""
+        """Returns the whole-body controller as a function of time and state. `aim` changes the controller's references
+        over time."""
 
         def law(t: float, q: Array, v: Array) -> Array:
             if aim:
@@ -164,12 +166,12 @@ class Humanoid:
         return law
 
     def hold(self, stiffness: float) -> Law:
-        """Returns PD control that holds the joints at the posture, with efforts that compensate gravity. This is no
-        whole-body control.
+        """Returns PD control that holds the joints at the posture, with efforts that compensate gravity. The law uses
+        no whole-body controller.
 
         stiffness: a fraction of the joint's maximum effort, per rad. The damping is a tenth of the stiffness, per
-        rad/s. Both act without delay and limit, as in a motor's own control loop: MuJoCo includes them in its implicit
-        step.
+        rad/s. Stiffness and damping act without delay and limit, as in a motor's own control loop: MuJoCo includes both
+        in its implicit time step.
         """
         most = np.where(np.isfinite(limit := self.world.model.limits.effort), limit, 0.0)
         tau0 = self.controller.step(self.q, np.zeros(len(most)), self.start).solved().tau
@@ -182,7 +184,7 @@ class Humanoid:
         return law
 
     def run(self, law: Law, seconds: float, push: Sequence[float] | None = None, begin: float = 0.5) -> Record:
-        """Runs a law for some seconds. A `push` (N s) is distributed evenly over PUSH_TIME."""
+        """Runs a control law for some seconds. The force of a `push` (N s) is constant for PUSH_TIME."""
 
         def force(t: float) -> Sequence[float]:
             pushed = push is not None and begin <= t < begin + PUSH_TIME
@@ -202,7 +204,8 @@ class Humanoid:
         references.com.velocity[1], references.com.acceleration[1] = v, a
 
     def lift(self, t: float, references: References) -> None:
-        """Shifts the weight to the left sole, lifts the right foot by 10 cm, and returns. All this takes 7 s."""
+        """Shifts the weight to the left sole, lifts the right foot by 10 cm, sets it down, and shifts the weight back,
+        in 7 s."""
         start = self.start
         to, back = ramp(t, 0.2, 1.4), ramp(t, 5.2, 6.4)
         aside = start.contacts[0].pose[:2, 3] - start.com.position[:2]
@@ -215,7 +218,7 @@ class Humanoid:
 
 
 class Quadruped:
-    """A quadruped that trots along a plan made by FDDP."""
+    """Robot ANYmal in MuJoCo, which trots along a plan made by FDDP."""
 
     def __init__(
         self,
@@ -238,14 +241,14 @@ class Quadruped:
         self.world.set_state(self.references.posture.q.copy(), np.zeros(self.world.model.nv))
 
     def law(self, t: float, q: Array, v: Array) -> Array:
-        """Returns the efforts that track the plan."""
+        """Returns the efforts with which the controller tracks the plan."""
         self.controller.track(self.plan, t, self.references)
         command = self.controller.step(q, v, self.references)
         self.unsolved += command.status != "solved"
         return command.tau
 
     def run(self, seconds: float) -> Record:
-        """Runs the first seconds of the plan."""
+        """Simulates the first seconds of the plan."""
         return run(self.world, self.law, seconds, None, self.disturbance, lambda: self.references.com.position.copy())
 
 

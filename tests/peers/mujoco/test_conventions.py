@@ -1,5 +1,5 @@
-"""Compares `condyle.conventions` with MuJoCo: one state, converted to each library's convention, must give the same
-motion."""
+"""Compares `condyle.conventions` with MuJoCo. If one state is converted to the convention of each library, both
+libraries must compute the same motion."""
 
 from collections.abc import Sequence
 
@@ -23,7 +23,7 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 @pytest.fixture(params=["quadruped", "talos"])
 def world(request: pytest.FixtureRequest) -> World:
-    """Creates one robot in both libraries, without damping or friction."""
+    """Creates one robot in Condyle and in MuJoCo, without damping or friction."""
     robots: dict[str, tuple[str, Sequence[str], tuple[float, float] | float]] = {
         "quadruped": (condyle.robots.QUADRUPED, FEET, BALL),
         "talos": (urdf("talos"), SOLES, SOLE),
@@ -64,7 +64,7 @@ def test_state_acceleration_effort(world: World) -> None:
         body = data.body(name)
         close(body.xpos, poses[i][:3, 3])
         close(conventions.rotation(conventions.xyzw(body.xquat)), poses[i][:3, :3])
-        # MuJoCo's velocity of a body is [angular, linear] at the centre of mass. Here it is along the world's axes.
+        # MuJoCo's velocity of a body is [angular, linear] at the centre of mass, along the world's axes.
         theirs = np.zeros(6)
         mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_BODY, body.id, theirs, 0)
         ours = condyle.body_velocity(model, scratch, q, v, i)

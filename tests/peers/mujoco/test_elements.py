@@ -10,10 +10,11 @@ import condyle
 
 TABLE = Path(__file__).parents[3] / "crates/model/src/io/mjcf/elements.txt"
 
-# How each attribute of the structure is treated.
-# HELD: a model holds the attribute, or rejects a value by name. LEFT_OUT: a warning says that it is left out.
+# Treatment of each attribute of elements that define the tree of bodies, in three groups.
+# HELD: a model contains the attribute's effect, or the reader rejects its value with an error.
+# LEFT_OUT: a warning states that the attribute is left out.
 # NO_EFFECT: the attribute has no effect on kinematics, dynamics and limits.
-# `features.py` tests springs, actuators, tendons, constraints and keyframes one by one.
+# `features.py` tests attributes of springs, actuators, tendons, constraints and keyframes one by one.
 HELD = {
     "compiler": "alignfree angle assetdir autolimits balanceinertia boundinertia boundmass coordinate eulerseq "
     "fitaabb inertiafromgeom inertiagrouprange meshdir settotalmass strippath",
@@ -44,7 +45,7 @@ NO_EFFECT = {
     "usethread",
     "option": "ccd_iterations ccd_tolerance cone impratio integrator iterations jacobian ls_iterations ls_tolerance "
     "magnetic noslip_iterations noslip_tolerance o_friction o_margin o_solimp o_solref sdf_initpoints "
-    "sdf_iterations sleep_tolerance solver timestep tolerance wind",  # wind acts through the medium, which is left out
+    "sdf_iterations sleep_tolerance solver timestep tolerance wind",  # wind only affects fluids, which are left out
     "flag": "autoreset contact diagexact energy eulerdamp filterparent fwdinv invdiscrete ipc island midphase "
     "multiccd nativeccd override refsafe sensor sleep speculative warmstart",
     "mesh": "material normal smoothnormal texcoord",
@@ -53,7 +54,7 @@ NO_EFFECT = {
     "joint": "group margin solimpfriction solimplimit solreffriction solreflimit user",
     "freejoint": "group",
     "geom": "adhesion castshadow conaffinity condim contype fluidcoef fluidshape friction gap margin material "
-    "priority rgba solimp solmix solref surfacevel user",  # fluidshape acts through the medium, which is left out
+    "priority rgba solimp solmix solref surfacevel user",  # fluidshape only affects fluids, which are left out
     "site": "group material mesh rgba size user",
     "camera": "focal focalpixel fovy ipd output principal principalpixel projection resolution sensorsize target user",
 }
@@ -61,7 +62,7 @@ NO_EFFECT = {
 
 def table() -> dict[str, tuple[set[str], dict[str, str]]]:
     """Returns attributes and children of each type of element. The type of a child is empty if its contents are
-    ignored. The line of `*`, which lists misplaced elements, is left out."""
+    ignored. The line that begins with `*` lists misplaced elements and is ignored."""
     types = {}
     for line in TABLE.read_text().splitlines():
         name, rest = line.split(":", 1)
@@ -87,7 +88,7 @@ def test_each_type_is_reached_and_has_a_line() -> None:
             reached.add(name)
             waiting += [kind for kind in types.get(name, (set(), {}))[1].values() if kind]
     assert reached >= types.keys()
-    assert reached - types.keys() <= {"distance"}  # an older constraint, whose attributes are not in this table
+    assert reached - types.keys() <= {"distance"}  # obsolete constraint of MJCF, whose attributes are not in this table
 
 
 def test_what_mujoco_knows_is_known() -> None:
@@ -96,7 +97,7 @@ def test_what_mujoco_knows_is_known() -> None:
         kinds = {"mujoco"}
         for tag in path[1:]:
             found = {types[kind][1][tag] for kind in kinds if kind and tag in types[kind][1]}
-            found |= {"body", "worldbody"} if tag == "body" else set()  # one row of the schema describes both
+            found |= {"body", "worldbody"} if tag == "body" else set()  # one row of the schema describes both elements
             assert found or "" in kinds, f"<{tag}> is unknown in {path}"
             kinds = found | ({""} & kinds)
         for kind in kinds - {"", "worldbody"}:

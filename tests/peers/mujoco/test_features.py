@@ -12,7 +12,8 @@ CASES = {path: list(cases) for path, cases in itertools.groupby(features.cases()
 
 @pytest.mark.parametrize("path", CASES)
 def test_features(path: str) -> None:
-    """Each attribute of an element has the same effect as in MuJoCo, has no effect, gives a warning, or is rejected."""
+    """Tests that each attribute of an element has the same effect as in MuJoCo, has no effect, gives a warning, or is
+    rejected."""
     verdicts: dict[str, list[str]] = collections.defaultdict(list)
     for name, base, text in CASES[path]:
         kind, what = features.verdict(base, text)

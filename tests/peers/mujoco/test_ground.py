@@ -15,14 +15,14 @@ BALL = 0.03
 STIFF, DAMPED = 600.0, 8.0
 """Stiffness and damping of the joints (N m/rad, N m s/rad)."""
 SOFT = 1e-3
-"""Tolerance of a posture (m, rad). In three seconds, MuJoCo's contacts yield by several hundredths of a millimetre, and
-creep sideways by several tenths of a millimetre."""
+"""Tolerance of a posture (m, rad). In three seconds, feet in MuJoCo sink by several hundredths of a millimetre, and
+slide sideways by several tenths of a millimetre."""
 LOADS = 5e-3
-"""Tolerance of the load on a foot, relative to the weight. A foot that yields carries less, and the other feet carry
-more."""
+"""Tolerance of the load on a foot, relative to the robot's weight. In MuJoCo, a foot that sinks carries less load, and
+the other feet carry more."""
 PROMILLE = 3e-3
-"""Relative tolerance of a stopping distance. Errors of both methods are of order h, and MuJoCo's friction builds up
-gradually."""
+"""Relative tolerance of a stopping distance. The errors of both libraries are proportional to the time step, and
+MuJoCo's friction force increases gradually."""
 
 
 def standing(model: condyle.Model) -> Array:
@@ -37,12 +37,12 @@ def standing(model: condyle.Model) -> Array:
 
 @pytest.mark.parametrize("lean", [0.0, 0.05])
 def test_a_quadruped_stands(lean: float) -> None:
-    """If both libraries use the same PD control of the joints, posture, height and the load of each foot are the
-    same."""
+    """Tests that a robot with the same PD control of its joints has the same posture, height and foot loads in both
+    libraries."""
     world = World(condyle.robots.QUADRUPED, FEET, BALL, FRICTION)
-    # in Condyle, damping and friction act only if requested
+    # a simulation in Condyle includes damping and friction only if requested
     world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0
-    world.mj.opt.impratio, world.mj.geom_solref[:] = 100.0, (0.002, 1.0)  # nearly rigid, so friction creeps less
+    world.mj.opt.impratio, world.mj.geom_solref[:] = 100.0, (0.002, 1.0)  # nearly rigid contacts, so feet slide less
     model, data = world.model, condyle.Data(world.model)
     q0 = standing(model)
     aim = q0.copy()
@@ -53,7 +53,7 @@ def test_a_quadruped_stands(lean: float) -> None:
         tau[6:] = -STIFF * (q[7:] - aim[7:]) - DAMPED * v[6:]
         return tau
 
-    # The contact points are the lowest points of the balls that surround the feet.
+    # The contact points are the lowest points of the balls around the feet.
     below = [condyle.frame_placement(model, data, q0, foot)[:3, :3].T @ [0.0, 0.0, -BALL] for foot in FEET]
     points = [(foot, [point]) for foot, point in zip(FEET, below, strict=True)]
     simulation = Simulation(model, ground=Ground(points, height=-BALL, friction=FRICTION))
@@ -77,7 +77,7 @@ def test_a_quadruped_stands(lean: float) -> None:
 
 @pytest.mark.parametrize(("mu", "speed"), [(0.2, 1.0), (0.5, 2.0)])
 def test_a_box_slides_to_a_stop(mu: float, speed: float) -> None:
-    """The stopping distance is the same in both libraries, and equals v²/(2 μ g)."""
+    """Tests that a sliding box stops after the distance v²/(2 μ g) in both libraries."""
     x, y, z, dt = 0.2, 0.15, 0.05, 5e-4
     text = f"""<mujoco>
       <option timestep="{dt}" cone="elliptic" impratio="100" integrator="implicitfast"/>
@@ -89,7 +89,7 @@ def test_a_box_slides_to_a_stop(mu: float, speed: float) -> None:
       </worldbody></mujoco>"""
     mj = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(mj)
-    for _ in range(400):  # the box comes to rest on its compliant contacts
+    for _ in range(400):  # the box first settles on MuJoCo's compliant contacts
         mujoco.mj_step(mj, data)
     begin = data.qpos[0]
     data.qvel[0] = speed

@@ -12,30 +12,30 @@ import condyle
 
 Array = np.ndarray
 SAME = 1e-8
-"""Tolerance relative to each number. Some of the numbers are computed with M⁻¹."""
+"""Tolerance relative to each compared number. Some numbers are computed with M⁻¹ and have larger rounding errors."""
 BOTH = (-1.0, 1.0)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
-"""First of MuJoCo's kinds of joints that have one degree of freedom."""
+"""Smallest code of MuJoCo's joint types with one degree of freedom."""
 HUGE = 1e8
-"""Control that exceeds all ranges. An effort larger than a hundredth of it has no limit."""
+"""Control that exceeds all ranges. An effort larger than a hundredth of this control counts as unlimited."""
 
 
 class Robot:
-    """A robot, as MuJoCo compiles it and as Condyle reads it."""
+    """Robot in two forms: compiled by MuJoCo, and read by Condyle."""
 
     def __init__(self, text: str, theirs: mujoco.MjModel) -> None:
-        """Reads the robot's text."""
+        """Reads the robot's text by both libraries."""
         model = condyle.Model.from_mjcf_str(text)
         self.ours: dict[str, Any] = json.loads(model.to_json())
         self.said = [str(warning) for warning in model.warnings]
         self.theirs, self.data, self.text = theirs, mujoco.MjData(theirs), text
 
     def says(self, what: str) -> bool:
-        """Returns whether a warning contains these words."""
+        """Returns whether a warning of Condyle contains the given words."""
         return any(what in warning for warning in self.said)
 
     def position(self) -> Array:
-        """Returns the position of MuJoCo's state in Condyle's order, with quaternions as x, y, z, w."""
+        """Converts a position of MuJoCo to Condyle's order, with quaternions as x, y, z, w."""
         q, m = self.data.qpos.copy(), self.theirs
         for at, kind in zip(m.jnt_qposadr, m.jnt_type, strict=True):
             if mujoco.mjtJoint(kind) in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
@@ -52,7 +52,7 @@ class Robot:
 
 
 def robots() -> list[Robot]:
-    """Returns the first random robots that MuJoCo accepts."""
+    """Generates random robots and returns those that MuJoCo accepts."""
     found: list[Robot] = []
     seed = 0
     while len(found) < 150:
@@ -77,13 +77,13 @@ def close(found: Any, expected: Any) -> None:
 
 
 def ends(limits: list[float | None]) -> list[float]:
-    """Returns a range that JSON contains, with infinity in place of null."""
+    """Converts a range from JSON to numbers; null becomes infinity."""
     lower, upper = limits
     return [-np.inf if lower is None else lower, np.inf if upper is None else upper]
 
 
 def pose(X: dict[str, Any]) -> Array:
-    """Returns a pose from JSON as a matrix."""
+    """Converts a pose from JSON to a matrix."""
     matrix = np.eye(4)
     columns = [[column[k] for k in "xyz"] for column in (X["rotation"][c] for c in "xyz")]
     matrix[:3, :3], matrix[:3, 3] = np.array(columns).T, [X["translation"][k] for k in "xyz"]
@@ -111,7 +111,7 @@ def test_armature_and_friction(read: list[Robot]) -> None:
 
 
 def spring(robot: Robot, q: Array) -> Array:
-    """Returns the efforts of all springs at the position q."""
+    """Returns the efforts of all springs of Condyle's robot at the position q."""
     tau = np.zeros(robot.theirs.nv)
     for s in robot.ours["springs"]:
         body, k, rest = robot.ours["bodies"][s["body"]], s["stiffness"], np.array(s["rest"])
@@ -154,7 +154,8 @@ def test_springs_and_damping(read: list[Robot]) -> None:
 
 
 def test_actuators(read: list[Robot]) -> None:
-    """Compares laws, gears and ranges in the table of actuators. A warning must name each actuator that is left out."""
+    """Compares the force laws, gears and ranges of Condyle's actuators with MuJoCo's. A warning must name each actuator
+    that is left out."""
     compared = 0
     for robot in read:
         m = robot.theirs
@@ -201,12 +202,12 @@ def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
         controls = slice(m.actuator_ctrladr[i], m.actuator_ctrladr[i] + m.actuator_ctrlnum[i])
         moment = moments[m.actuator_outadr[i], k]
         if m.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
-            m.actuator_gear[i] = 0.0  # such an actuator does not limit a joint
+            m.actuator_gear[i] = 0.0  # an actuator on a site does not limit the effort of a joint, so it is disabled
             continue
         driven |= moment != 0.0
         if mujoco.mjtGain(m.actuator_gaintype[i]) not in fixed or m.actuator_biasprm[i, 1:3].any():
-            # If the force depends on length and velocity, only the force's range limits it.
-            # The test then makes the actuator a motor.
+            # If an actuator's force depends on length or velocity, only the range of the force limits its effort.
+            # So the test replaces such an actuator by a motor with the same range of force.
             m.actuator_gaintype[i], m.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
             m.actuator_gainprm[i, 0], m.actuator_ctrllimited[controls] = 1.0, 0
         d.ctrl[controls] = sign * np.sign(moment * m.actuator_gainprm[i, 0]) * HUGE
@@ -234,8 +235,8 @@ def test_limits_of_effort(read: list[Robot]) -> None:
 
 
 def test_limits_of_position(read: list[Robot]) -> None:
-    """A tendon over one joint limits this joint. If the tendon's range excludes the joint's own range, there is a
-    warning."""
+    """Tests that the range of a tendon over one joint limits this joint. If the tendon's range and the joint's own
+    range do not overlap, a warning must say so."""
     for robot in read:
         m, at = robot.theirs, 0
         for j in range(m.njnt):
@@ -252,7 +253,8 @@ def test_limits_of_position(read: list[Robot]) -> None:
 
 
 def test_constraints(read: list[Robot]) -> None:
-    """Frames of loops are at the anchors in `eq_data`. Couplings have the polynomial about the initial position."""
+    """Compares closed loops and couplings of joints with MuJoCo's `eq_data`: the frames of a loop must be at its
+    anchors, and a coupling must have the same polynomial."""
     compared = 0
     for robot in read:
         m, counts = robot.theirs, {"connect": 0, "weld": 0, "joint": 0}

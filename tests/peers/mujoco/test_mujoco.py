@@ -14,17 +14,17 @@ import condyle
 SAME = 1e-9
 """Tolerance of accelerations, relative to the largest acceleration."""
 SWAY = 1e-3
-"""Maximum motion of the centre of mass in a stand (m). It is not 0, since the ground is compliant and joints have
-friction."""
+"""Maximum motion of the centre of mass of a standing robot (m). It is not 0, because the ground is compliant and joints
+have friction."""
 RETURNED = 5e-3
 """Maximum distance of the centre of mass from its reference 3 s after a push (m)."""
 ASTRAY = 0.05
-"""Maximum distance of the centre of mass from its plan in a trot (m)."""
+"""Maximum distance of the centre of mass from the planned motion in a trot (m)."""
 QUADRUPED_FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 
 
 def somewhere(model: condyle.Model) -> tuple[Array, Array, Array]:
-    """Returns a random state in the air, rotated and moving, and random efforts of the joints."""
+    """Returns a random state of a robot in the air, with rotation and velocity, and random efforts of the joints."""
     rng = np.random.default_rng(0)
     q, v, tau = condyle.random_configuration(model, seed=1), *rng.standard_normal((2, model.nv))
     q[:3] = 1.0, 2.0, 5.0
@@ -38,14 +38,14 @@ def somewhere(model: condyle.Model) -> tuple[Array, Array, Array]:
     ("text", "feet", "size"), [(urdf("talos"), SOLES, SOLE), (condyle.robots.QUADRUPED, QUADRUPED_FEET, BALL)]
 )
 def test_one_robot_in_both(text: str, feet: Sequence[str], size: tuple[float, float] | float) -> None:
-    """A state is restored after conversion. In the air, both libraries move the robot in the same way, so (q, v) and τ
-    have the same meaning."""
+    """Tests the conversion of states and efforts. A state is unchanged after conversion to MuJoCo and back. In the air,
+    both libraries compute the same motion of the robot."""
     world = World(text, feet, size)
     q, v, tau = somewhere(world.model)
     world.set_state(q, v)
     for found, given in zip(world.state(), (q, v), strict=True):
         np.testing.assert_allclose(found, given, atol=1e-12)
-    # in Condyle, damping and friction act only if requested
+    # a simulation in Condyle includes damping and friction only if requested
     world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0
     world.data.qfrc_applied[:] = world.generalized(tau)
     mujoco.mj_forward(world.mj, world.data)

@@ -20,7 +20,8 @@ SAME = 1e-11
 MESHES = 1e-8
 """Tolerances of masses, poses and M, relative to the largest entry. Quaternions from files are rounded twice.
 
-`MESHES` is for models with meshes. MuJoCo rotates meshes into their principal axes with an error of about 1e-7 rad.
+`MESHES` is the tolerance for models with meshes: MuJoCo rotates meshes into their principal axes with an error of about
+1e-7 rad.
 """
 
 LOADED = """<mujoco model="loaded">
@@ -48,8 +49,7 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 
 def same_robot(ours: condyle.Model, other: condyle.Model, inertia: float = 0.0) -> None:
-    """Checks that two models of Condyle are the same robot, up to rounding. `inertia` is an additional tolerance of
-    inertias."""
+    """Checks that two models of Condyle are equal, up to rounding. `inertia` is an additional tolerance of inertias."""
     for what in ("name", "names", "body_names", "joint_types", "parents", "idx_qs", "idx_vs"):
         assert getattr(ours, what) == getattr(other, what), what
     apart = np.abs(ours.inertial_parameters - other.inertial_parameters)
@@ -136,7 +136,7 @@ def test_numbers_that_were_changed_after_compiling() -> None:
 
 
 def test_the_text_compiles_to_the_same_numbers() -> None:
-    """The text that Condyle writes compiles to the same model in MuJoCo, so nothing is lost."""
+    """Tests the MJCF text that Condyle makes from a compiled model: MuJoCo must compile it to the same model."""
     inside = """<body name="b" pos="0 0 1" gravcomp="0.5">
       <joint name="j" axis="0 1 0" ref="10" springref="20" stiffness="1 2 3" damping="0.5 0.1 0.2" range="-10 20"/>
       <joint name="k" type="ball" stiffness="2" actuatorgravcomp="true" range="0 60"/>
@@ -165,21 +165,21 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
         if part not in ("jnt", "dof", "tendon", "key", "wrap", "qpos", "qpos0", "body", "actuator", "site", "eq"):
             continue
         found, expected = getattr(second, field), getattr(first, field)
-        # Skip bounding volumes of geoms, and the marks of relative poses that the compiler chose.
+        # Fields of bounding volumes and of geoms are not compared.
         if not isinstance(expected, np.ndarray) or "bvh" in field or "geom" in field:
             continue
         if field == "eq_data":
             found, expected = found[:, :10], expected[:, :10]
         if field in ("body_margin", "body_contype", "body_conaffinity", "site_size", "site_rgba", "actuator_ctrlspec"):
-            continue  # shapes and colours do not count, nor does the meaning of a control
+            continue  # fields of shapes, of colours, and of the meaning of a control are not compared
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13, err_msg=field)
         compared += 1
     assert compared > 80
 
 
 def test_controls_of_keyframes() -> None:
-    """Keyframes have one number for each actuator of the model, whatever numbers of inputs and states the actuators
-    have in MuJoCo."""
+    """Tests that a keyframe has one number for each actuator of Condyle's model, even if the actuator has several
+    inputs or states in MuJoCo."""
     text = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
     <actuator><pid name="a" joint="j" kp="2"/><pid name="b" joint="j" kp="2" input="pos" ki="1" slewmax="1"/>
     <muscle joint="j" lengthrange="0 1"/><intvelocity name="c" joint="j" kp="2" actrange="-1 1"/>
@@ -201,18 +201,18 @@ def robots_of_packages() -> list[Path]:
 
 @pytest.mark.skipif(not robots_of_packages(), reason="no packages of robots in .venv/robots")
 def test_robots_of_packages() -> None:
-    """Each model equals MuJoCo's. It also equals the robot that Condyle's reader makes from the file, if the reader
-    accepts the file."""
+    """Tests that each converted model equals MuJoCo's model. If Condyle's reader accepts the file, the converted model
+    must also equal the model that the reader returns."""
     compared = read = 0
     for file in robots_of_packages():
         try:
             theirs = mujoco.MjModel.from_xml_path(str(file))
-        except ValueError:  # the file is a part of a model, or refers to a missing file
+        except ValueError:  # MuJoCo rejects the file: it is a part of a model, or refers to a missing file
             continue
         ours = condyle.Model.from_mujoco(theirs)
         try:
             other = condyle.Model.from_mjcf(file)
-        except condyle.Error:  # a mesh has an unsupported format
+        except condyle.Error:  # Condyle rejects the file: a mesh has an unsupported format
             other = None
         if other is not None:
             same_robot(ours, other, MESHES)
@@ -224,7 +224,7 @@ def test_robots_of_packages() -> None:
 
 
 def test_words_for_what_has_none() -> None:
-    """Elements without a name get the names that Condyle's reader gives."""
+    """Tests that elements without a name get the same names as from Condyle's reader."""
     text = """<mujoco><worldbody><body><joint/><joint axis="1 0 0"/><geom size="1"/>
       <body name="body3"><joint/><geom size="1"/><body><joint name="body3_joint"/><geom size="1"/></body></body>
     </body></worldbody></mujoco>"""
@@ -244,12 +244,14 @@ def test_losses_that_differ_within_a_joint() -> None:
 
 
 PLAIN = re.sub("</?replicate[^>]*>| settotalmass=.7.", "", LOADED)
-"""The robot without the features that can only be written to an expanded file."""
+"""Robot of LOADED without `replicate` and `settotalmass`: changed inertias cannot be written into a file with these
+features."""
 
 
 @pytest.mark.parametrize("text", [PLAIN, *(RandomMjcf(k).text for k in range(8))])
 def test_written_numbers(text: str, tmp_path: Path) -> None:
-    """Inertias, limits and armature are changed in a copy of a file. MuJoCo must read the same robot from this copy."""
+    """Tests that Condyle writes changed inertias, limits and armature into a copy of a file. MuJoCo must read the
+    changed robot from this copy."""
     original, new = tmp_path / "original.xml", tmp_path / "new.xml"
     original.write_text(text, encoding="utf-8")
     model, rng = condyle.Model.from_mjcf(original), np.random.default_rng(1)
@@ -294,12 +296,13 @@ def test_actuators_that_are_disabled() -> None:
     (warning,) = ours.warnings
     assert warning == "general `off`: it is disabled by <option>: it is no actuator, and no limit of effort"
     assert (warning.kind, warning.file, warning.line) == ("left_out", None, None)
-    theirs.opt.disableactuator = 1  # disables group 0 only
+    theirs.opt.disableactuator = 1  # disables only actuators of group 0
     assert [actuator.name for actuator in condyle.Model.from_mujoco(theirs).actuators] == ["off"]
 
 
 def test_constraints_that_are_disabled() -> None:
-    """A flag disables limits, friction and equalities of the compiled model, as it does in the model's file."""
+    """Tests that a flag of a compiled model disables limits, friction and equalities, as the same flag in a file
+    does."""
     joint = '<joint name="j" axis="0 1 0" range="-10 10" frictionloss="1"/>'
     tree = f'<worldbody><body name="b">{joint}<geom size="0.1"/></body></worldbody>'
     loop = '<equality><connect body1="b" anchor="1 0 0"/></equality>'
@@ -310,7 +313,8 @@ def test_constraints_that_are_disabled() -> None:
 
 
 def test_range_of_a_tendon() -> None:
-    """The force in the table of actuators has the same limits as `actuator_force`."""
+    """Tests that the force limits of Condyle's actuator and the coefficients of its tendon give the same efforts as in
+    MuJoCo."""
     theirs = mujoco.MjModel.from_xml_string(DRIVEN)
     data = mujoco.MjData(theirs)
     data.ctrl[:] = 0.0, 5.0
@@ -321,7 +325,8 @@ def test_range_of_a_tendon() -> None:
 
 
 def test_compensation_after_a_change_of_masses(tmp_path: Path) -> None:
-    """`gravcomp` is a ratio: heavier bodies get more support, in Condyle as in MuJoCo."""
+    """Tests that gravity compensation is a fraction of a body's weight: if masses are doubled, the compensating efforts
+    double, as in MuJoCo."""
     original = tmp_path / "driven.xml"
     original.write_text(DRIVEN, encoding="utf-8")
     theirs, ours = mujoco.MjModel.from_xml_string(DRIVEN), condyle.Model.from_mjcf(original)
@@ -336,7 +341,8 @@ def test_compensation_after_a_change_of_masses(tmp_path: Path) -> None:
 
 
 def test_a_compiled_model_is_written_to_its_source(tmp_path: Path) -> None:
-    """MuJoCo's compiler rounds numbers. So only the numbers that were changed are written."""
+    """Tests that an unchanged model leaves its file unchanged, although MuJoCo's compiler has rounded the numbers of
+    the model."""
     original, new = tmp_path / "original.xml", tmp_path / "new.xml"
     text = RandomMjcf(3).text
     original.write_text(text, encoding="utf-8")

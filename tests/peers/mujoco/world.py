@@ -1,7 +1,7 @@
-"""A robot in MuJoCo and in Condyle, both made from one URDF, and conversions between the states of both.
+"""Robot in MuJoCo and in Condyle, both made from one URDF, with conversions between the states of the two libraries.
 
 MuJoCo stores the quaternion of a free joint with w first. The joint's linear velocity is along the world's axes, and
-its angular velocity is along the body's axes. Condyle (as Pinocchio) stores w last, and has both velocities along the
+its angular velocity is along the body's axes. Condyle (like Pinocchio) stores w last, and both velocities are along the
 body's axes.
 """
 
@@ -17,14 +17,15 @@ import condyle
 Array = NDArray[np.float64]
 
 STIFFNESS = (0.005, 1.0)
-"""Time constant (s) and damping ratio of MuJoCo's contacts. They yield several tenths of a millimetre under a
-humanoid."""
+"""Time constant (s) and damping ratio of MuJoCo's contacts. Under a humanoid, the contacts yield by several tenths of a
+millimetre."""
 THICKNESS = 0.02
 """Thickness of the box that represents a sole (m)."""
 
 
 def bare(urdf: str) -> ET.Element:
-    """Returns the links and joints of a URDF without shapes. The root link moves freely."""
+    """Returns a URDF that contains only the links and joints of the given URDF, without shapes. The root link moves
+    freely."""
     robot = ET.fromstring(urdf)
     for link in robot.iter("link"):
         for shape in link.findall("visual") + link.findall("collision"):
@@ -45,8 +46,8 @@ def bare(urdf: str) -> ET.Element:
 
 
 class World:
-    """A robot on level ground in MuJoCo. Soles are boxes below the frames of the feet; point feet are balls around
-    their frames."""
+    """Robot on level ground in MuJoCo. Soles are boxes below the frames of the feet; point feet are balls around their
+    frames."""
 
     def __init__(
         self,
@@ -77,7 +78,7 @@ class World:
             body = spec.body(self.model.body_names[frame.body])
             body.add_geom(name=foot, contype=1, conaffinity=0, mass=0.0, **shape, **contact)
         if isinstance(size, float):
-            self.ground = -size  # in the plan, the balls' centres are at height 0
+            self.ground = -size  # the plan assumes that the centres of the balls are at height 0
         plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "pos": [0.0, 0.0, self.ground]}
         spec.worldbody.add_geom(name="ground", contype=0, conaffinity=1, **plane, **contact)
         self.mj = spec.compile()
@@ -122,8 +123,8 @@ class World:
         return out
 
     def step(self, tau: Array, push: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Makes one step under efforts of the joints and a force on the trunk (N). The force acts at the trunk's centre
-        of mass, along the world's axes."""
+        """Simulates one time step with given efforts of the joints and a given force on the trunk (N). The force acts
+        at the trunk's centre of mass, along the world's axes."""
         self.data.qfrc_applied[:] = self.generalized(tau)
         self.data.xfrc_applied[self.trunk, :3] = push
         mujoco.mj_step(self.mj, self.data)
@@ -136,7 +137,7 @@ class World:
             contact = self.data.contact[k]
             mujoco.mj_contactForce(self.mj, self.data, k, force)
             names = [self.mj.geom(geom).name for geom in contact.geom]
-            sign = 1.0 if names[0] == "ground" else -1.0  # the force acts on the second geom of the contact
+            sign = 1.0 if names[0] == "ground" else -1.0  # the contact force acts on the contact's second geom
             out[self.feet.index(next(name for name in names if name != "ground"))] += (
                 sign * contact.frame.reshape(3, 3).T @ force[:3]
             )

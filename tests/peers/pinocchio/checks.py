@@ -1,4 +1,4 @@
-"""Checks that a pair of models, Pinocchio's and Condyle's, gives the same results."""
+"""Checks that Pinocchio's model and Condyle's model of a robot give the same results."""
 
 import numpy as np
 import pinocchio as pin
@@ -10,10 +10,10 @@ from condyle.simulation import Simulation
 
 METHODS = (None, "aba", "dense", "sparse")
 GRAINS = (1, 4)
-"""Grain sizes of divide and conquer: 1, which gives the largest number of cuts, and a larger size."""
+"""Tested numbers of bodies that divide and conquer does not divide further. 1 gives the largest number of cuts."""
 CUTS = 10.0
-"""Factor on the tolerance of divide and conquer. The pieces of a robot have larger condition numbers than the whole
-robot."""
+"""Factor by which the tolerance of divide and conquer is larger, because the pieces of a robot have larger condition
+numbers than the whole robot."""
 FRAMES = {
     "local": pin.ReferenceFrame.LOCAL,
     "world": pin.ReferenceFrame.WORLD,
@@ -22,8 +22,8 @@ FRAMES = {
 STEP = 1e-5
 """Step of central differences."""
 DIFFERENCES = 1e-7
-"""A tenth of the tolerance of central differences. Their error is rounding of 1e-16/step, and step² times a third
-derivative."""
+"""Tenth of the tolerance of central differences. Their error consists of rounding errors of 1e-16/step, and of step²
+times a third derivative."""
 KINDS = {
     pin.FrameType.BODY: "link",
     pin.FrameType.JOINT: "joint",
@@ -33,7 +33,7 @@ KINDS = {
 
 
 def check_model(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias, losses, limits and frames."""
+    """Compares sizes, names, order, placements, inertias, damping, friction, limits and frames of the models."""
     check_bodies(pair)
     check_losses(pair)
     check_limits(pair)
@@ -41,7 +41,7 @@ def check_model(pair: Pair) -> None:
 
 
 def check_bodies(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias and armature."""
+    """Compares sizes, names, order, placements, inertias and armature of the models' bodies and joints."""
     ours, theirs = pair.ours, pair.theirs
     assert ours.name == theirs.name
     assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
@@ -64,13 +64,14 @@ def check_bodies(pair: Pair) -> None:
 
 
 def check_losses(pair: Pair) -> None:
-    """Compares damping and friction."""
+    """Compares the damping and the friction of joints."""
     pair.expect("damping", pair.ours.damping, pair.theirs.damping)
     pair.expect("friction", pair.ours.friction, pair.theirs.upperDryFrictionLimit)
 
 
 def check_limits(pair: Pair) -> None:
-    """Compares limits. A limit that Pinocchio lacks is infinite here (or ±1.01 for the numbers of a rotation)."""
+    """Compares limits. If Pinocchio has no limit, Condyle's limit must be infinite (or ±1.01 for the numbers of a
+    rotation)."""
     ours, theirs = pair.ours.limits, pair.theirs
     finite = np.zeros(theirs.nq, bool)
     for joint in theirs.joints[1:]:
@@ -162,8 +163,8 @@ def check_motion(state: State) -> None:
 
 
 def check_centroidal(state: State) -> None:
-    """Compares centre of mass, momentum, and the maps and rates of both. Neither library counts bodies that are fixed
-    to the world."""
+    """Compares the centre of mass, the momentum, and their Jacobians and rates. Neither library counts bodies that are
+    fixed to the world."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     data = pair.their_data
     theirs(pin.centerOfMass, q, v, a)
@@ -186,14 +187,14 @@ def check_centroidal(state: State) -> None:
 
 
 def expect_fields(pair: Pair, what: str, ours: "tuple[np.ndarray, ...]", theirs: dict[str, np.ndarray]) -> None:
-    """Compares the fields of a named tuple, by name."""
+    """Compares the fields of a named tuple with expected values, by name."""
     for name, value in theirs.items():
         pair.expect(f"{what}: {name}", getattr(ours, name), value)
 
 
 def check_energy(state: State) -> None:
     """Compares energies and their regressors, for robots without armature. Pinocchio's kinetic energy omits the
-    armature of a revolute joint whose axis is not aligned."""
+    armature of a revolute joint whose axis is not x, y or z."""
     pair, ours, theirs, q, v = state.pair, ours_of(state), theirs_of(state), state.q, state.v
     assert not pair.theirs.armature.any()
     pair.expect("kinetic_energy", ours(condyle.kinetic_energy, q, v), theirs(pin.computeKineticEnergy, q, v))
@@ -231,8 +232,8 @@ def check_equations_of_motion(state: State) -> None:
 
 
 def check_lock(state: State) -> None:
-    """Locks every third joint and compares the robots. Pinocchio rejects some robots: it finds no frame if a joint and
-    a link have the same name."""
+    """Locks every third joint and compares the robots. Pinocchio rejects robots in which a joint and a link have the
+    same name."""
     pair, rng = state.pair, np.random.default_rng(0)
     locked = list(range(1, pair.theirs.njoints, 3))
     ours = pair.ours.lock([body for i in locked for body in pair.chains[i]], state.q)
@@ -305,15 +306,16 @@ def check_motion_derivatives(state: State) -> None:
     theirs(pin.computeForwardKinematicsDerivatives, q, v, a)
     theirs(pin.centerOfMass, q, v, a)
     dvcom_dq = pin.getCenterOfMassVelocityDerivatives(model, data)
-    if np.isfinite(dvcom_dq).all():  # Pinocchio divides by the mass that each joint carries
+    if np.isfinite(dvcom_dq).all():  # Pinocchio divides by the mass beyond each joint, so the mass must not be zero
         pair.expect("centroidal_derivatives: dvcom_dq", d.dvcom_dq, dvcom_dq)
 
 
 def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
-    """Returns the columns of ∂a/∂q that are correct in Pinocchio.
+    """Returns the indices of the columns of ∂a/∂q that are correct in Pinocchio.
 
-    Along the world's axes, ∂a/∂q contradicts differences of Pinocchio's own accelerations, while Condyle's agrees with
-    them. The wrong columns belong to joints with several degrees of freedom on a moving body.
+    Along the world's axes, Pinocchio's ∂a/∂q contradicts finite differences of Pinocchio's own accelerations. Condyle's
+    ∂a/∂q agrees with these differences. The wrong columns belong to joints with several degrees of freedom on a moving
+    body.
     """
     right = np.ones(model.nv, bool)
     for joint, parent in zip(model.joints, model.parents, strict=True):
@@ -325,8 +327,8 @@ def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
 def of_numbers(by_q: np.ndarray, motion: pin.Motion, J: np.ndarray) -> np.ndarray:
     """Converts ∂/∂q of a motion to the derivative of the motion's six numbers in LOCAL_WORLD_ALIGNED.
 
-    The frame's origin moves with q by the linear part of J. Pinocchio's derivative is of the motion itself, at the
-    fixed current origin.
+    A motion's linear part belongs to the frame's origin, which moves with q (by the linear part of J). Pinocchio's
+    derivative is at a fixed point, the current origin.
     """
     moved = by_q.copy()
     moved[:3] += np.cross(motion.angular, J[:3], axisb=0).T
@@ -369,8 +371,8 @@ def check_effort_derivatives(state: State) -> None:
 def check_hessian(state: State) -> None:
     """Compares the Hessian of λᵀ τ along a direction with differences of Pinocchio's first derivatives.
 
-    Pinocchio has no second derivatives in Python. Along one direction d, the differences between the tangent spaces at
-    q ⊕ h d have no effect.
+    Pinocchio has no second derivatives in Python. The test uses one direction d. For this direction, it does not matter
+    that derivatives at q ± h d belong to different tangent spaces.
     """
     pair, q, v, a, tau = state.pair, state.q, state.v, state.a, state.tau
     d = np.random.default_rng(0).standard_normal(pair.theirs.nv)
@@ -391,7 +393,7 @@ def check_hessian(state: State) -> None:
 
 
 def check_inverse_dynamics(state: State) -> None:
-    """Compares rnea and nonlinear_effects, which Pinocchio also supports for mimic joints."""
+    """Compares rnea and nonlinear_effects. Pinocchio supports these functions also for mimic joints."""
     pair, ours, theirs = state.pair, ours_of(state), theirs_of(state)
     q, v, a = state.q, state.v, state.a
     pair.expect("rnea", ours(condyle.rnea, q, v, a), theirs(pin.rnea, q, v, a))
@@ -401,12 +403,12 @@ def check_inverse_dynamics(state: State) -> None:
 
 
 def check_crba(state: State) -> None:
-    """Compares both triangles of M."""
+    """Compares all entries of the inertia matrix M, in both triangles."""
     state.pair.expect("crba", ours_of(state)(condyle.crba, state.q), theirs_of(state)(pin.crba, state.q))
 
 
 def check_gravity(state: State) -> None:
-    """Compares the efforts of gravity."""
+    """Compares the joint efforts that gravity causes."""
     ours, theirs = ours_of(state), theirs_of(state)
     state.pair.expect("gravity", ours(condyle.gravity, state.q), theirs(pin.computeGeneralizedGravity, state.q))
 
@@ -426,7 +428,7 @@ def check_forward_dynamics(state: State) -> bool:
     """Compares q̈, M⁻¹ and the derivatives of q̈, with and without external forces. Returns false if M has no inverse.
 
     A body without mass at the end of a limb makes M singular. Then Pinocchio's q̈ is not finite, and Condyle's
-    functions reject the robot with the name of the joint.
+    functions raise an error that names the joint.
     """
     pair, q, v, tau = state.pair, state.q, state.v, state.tau
     ours, theirs, distance = ours_of(state), theirs_of(state), pair.self_distance
@@ -496,7 +498,7 @@ def check_configuration(state: State) -> None:
     transport.
 
     Pinocchio's dIntegrateTransport multiplies by ∂(q ⊕ v)/∂q, from q to q ⊕ v. Condyle's function multiplies by the
-    inverse, in the opposite direction.
+    inverse matrix.
     """
     pair, q, q1, v = state.pair, state.q, state.q1, state.v
     ours, theirs = pair.ours, pair.theirs
@@ -521,10 +523,11 @@ def check_configuration(state: State) -> None:
 
 
 def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Returns `moved`, but with the sign of each quaternion for which it is nearer to the quaternion of q.
+    """Returns the position `moved`, in which each quaternion has the sign that makes it nearer to the quaternion in q.
 
-    Condyle always returns the nearer quaternion, and Pinocchio returns it for an integrated free-flyer. Pinocchio may
-    return the other one for a spherical joint that rotates by more than half a turn, and for interpolated positions.
+    A quaternion and its negative are the same rotation. Condyle always returns the quaternion nearer to the quaternion
+    in q; so does Pinocchio for an integrated free-flyer. Pinocchio may return its negative for a spherical joint that
+    rotates by more than half a turn, and for interpolated positions.
     """
     first = {"JointModelSpherical": 0, "JointModelFreeFlyer": 3}
     for joint in model.joints:
@@ -535,5 +538,5 @@ def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) 
 
 
 def poses(placements: "pin.StdVec_SE3") -> np.ndarray:
-    """Returns poses as homogeneous 4 × 4 matrices."""
+    """Converts Pinocchio's poses to homogeneous 4 × 4 matrices."""
     return np.array([X.homogeneous for X in placements])

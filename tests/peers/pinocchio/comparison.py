@@ -1,4 +1,4 @@
-"""One robot in both libraries, the states in which the libraries are compared, and the tolerances."""
+"""Robot in Pinocchio and in Condyle, the states in which the libraries are compared, and the tolerances."""
 
 import inspect
 from collections import defaultdict
@@ -13,12 +13,13 @@ import pinocchio as pin
 import condyle
 
 TOLERANCE = 1e-10
-"""Tolerance relative to 1 + the largest number of Pinocchio's result. It allows several thousand rounding errors of
-double precision, with a margin for ill-conditioned poses."""
+"""Tolerance relative to 1 + the largest number of Pinocchio's result. The tolerance allows several thousand rounding
+errors of double precision, and more for ill-conditioned positions."""
 SELF_DISTANCE = 10.0
-"""Tolerance of results that contain M⁻¹, as a multiple of the difference between two of Pinocchio's own results."""
+"""Tolerance of results that contain M⁻¹, as a multiple of the difference between two methods of Pinocchio for the same
+result."""
 UNLIMITED = 3.0
-"""Random coordinates without limits are drawn from −3 to 3 (rad, m)."""
+"""Bound of random coordinates without limits: they are between −3 and 3 (rad, m)."""
 
 ROOT_JOINTS = {
     "free_flyer": pin.JointModelFreeFlyer,
@@ -28,11 +29,11 @@ ROOT_JOINTS = {
 }
 
 BATCH, HERE = 11, 9
-"""Number of states in a batch, and index of the state that is compared. The number exceeds a vector and is no multiple
-of a vector's length."""
+"""Number of states in a batch, and index of the state that is compared. The number is larger than the number of lanes
+of a SIMD vector and not a multiple of it."""
 
 SELF_STATES = 20
-"""Number of states in which two of Pinocchio's own results are compared."""
+"""Number of states in which two methods of Pinocchio for the same result are compared."""
 
 
 @dataclass
@@ -40,13 +41,13 @@ class Record:
     """Largest difference of one quantity from Pinocchio, over all robots and states."""
 
     share: float = 0.0
-    """Largest difference, as a fraction of the tolerance in that case."""
+    """Largest difference, as a fraction of its tolerance."""
     difference: float = 0.0
-    """The same difference, relative to 1 + the largest number of Pinocchio's result."""
+    """Largest difference, relative to 1 + the largest number of Pinocchio's result."""
     bound: float = TOLERANCE
-    """Tolerance in the case of the largest difference."""
+    """Tolerance of the comparison with the largest difference."""
     where: str = ""
-    """Name of the robot in the case of the largest difference."""
+    """Name of the robot with the largest difference."""
     robots: set[str] = field(default_factory=set)
     """Names of all robots for which the quantity was compared."""
 
@@ -57,13 +58,13 @@ class Record:
 
 
 records: dict[str, Record] = defaultdict(Record)
-"""Record of each quantity, by name, for the summary."""
+"""Map from the name of a quantity to its record, for the summary."""
 sizes: dict[str, tuple[str, int, int, int]] = {}
-"""Root joint, number of moving bodies, nq and nv of each robot that was read, for the summary."""
+"""Map from the name of a robot to its root joint, number of moving bodies, nq and nv, for the summary."""
 
 
 class Pair:
-    """One robot in Pinocchio and in Condyle."""
+    """Models of one robot in Pinocchio and in Condyle."""
 
     def __init__(
         self,
@@ -76,11 +77,11 @@ class Pair:
         self.name, self.theirs, self.ours, self.root_joint = name, theirs, ours, root_joint
         self.their_data, self.data = theirs.createData(), condyle.Data(ours)
         self.chains = chains or [[i] for i in range(ours.nbodies)]
-        """Condyle's bodies for each joint of Pinocchio. A composite joint has several bodies."""
+        """Indices of Condyle's bodies for each joint of Pinocchio. A composite joint has several bodies."""
         self.bodies = [chain[-1] for chain in self.chains]
-        """Condyle's body that each joint of Pinocchio carries."""
+        """Index of Condyle's body that each joint of Pinocchio moves directly."""
         self.rates = all(len(chain) == 1 for chain in self.chains)
-        """Whether Pinocchio's rates and derivatives are correct. They are not for composite joints, whose axes
+        """Whether Pinocchio's rates and derivatives are correct. They are wrong for composite joints, whose axes
         Pinocchio treats as fixed in the body."""
 
     @cached_property
@@ -111,13 +112,13 @@ class Pair:
 
     @cached_property
     def self_distance(self) -> float:
-        """Returns the largest relative difference between two of Pinocchio's own results of forward dynamics; NaN if M
-        has no inverse."""
+        """Returns the largest relative difference between two methods of Pinocchio for forward dynamics; NaN if M has
+        no inverse."""
         return float(np.max([state.self_distance() for state in self.states(SELF_STATES, seed=100)]))
 
     def expect(self, what: str, ours: np.ndarray, theirs: np.ndarray, self_distance: float = 0.0) -> None:
-        """Checks that two results are equal. `self_distance` is the relative difference between two of Pinocchio's own
-        results."""
+        """Checks that Condyle's result equals Pinocchio's. `self_distance` is the relative difference between two
+        methods of Pinocchio for the same result."""
         ours, theirs = np.asarray(ours), np.asarray(theirs)
         assert ours.shape == theirs.shape, f"{what} of {self.name}: shape {ours.shape}, expected {theirs.shape}"
         if not theirs.size:
@@ -130,7 +131,8 @@ class Pair:
 
 
 def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False) -> Pair:
-    """Reads a robot from the same URDF with both libraries. With `mimic`, the size of the robot is not recorded."""
+    """Reads a robot from the same URDF with Pinocchio and with Condyle. With `mimic`, the size of the robot is not
+    recorded."""
     root = (ROOT_JOINTS[root_joint](),) if root_joint else ()
     theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
     pair = Pair(name, theirs, condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic), root_joint)
@@ -140,7 +142,7 @@ def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False)
 
 
 class State:
-    """Position, velocity, acceleration, efforts and external forces."""
+    """State for a comparison: position, velocity, acceleration, efforts and external forces."""
 
     def __init__(self, pair: Pair, seed: int) -> None:
         model, rng = pair.theirs, np.random.default_rng(seed)
@@ -155,7 +157,7 @@ class State:
         self.f_ext[pair.bodies] = rng.standard_normal((model.njoints, 6))
         self.pair = pair
         self.in_batch = False
-        """Whether Condyle's functions are called for a batch of states that contains this state."""
+        """Whether Condyle's functions are called with a batch of states that contains this state."""
 
     @cached_property
     def their_forces(self) -> "pin.StdVec_Force":
@@ -165,15 +167,15 @@ class State:
         return forces
 
     def self_distance(self) -> float:
-        """Returns the relative difference between two of Pinocchio's results of forward dynamics: in the world's frame
-        and in the bodies' frames."""
+        """Returns the relative difference between two results of Pinocchio for forward dynamics: one computed in the
+        world's frame, one in the bodies' frames."""
         args = (self.pair.theirs, self.pair.their_data, self.q, self.v, self.tau)
         local, world = pin.aba(*args, pin.Convention.LOCAL).copy(), pin.aba(*args, pin.Convention.WORLD).copy()
         return float(np.abs(local - world).max() / (1.0 + np.abs(world).max()))
 
 
 def ours_of(state: State) -> Callable[..., np.ndarray]:
-    """Returns Condyle's functions, with model and data filled in."""
+    """Returns an object with Condyle's functions, which passes model and data to each function."""
     model, data = state.pair.ours, state.pair.data
     if not state.in_batch:
         return lambda function, *args: function(model, data, *args)
@@ -196,13 +198,13 @@ def ours_of(state: State) -> Callable[..., np.ndarray]:
 
 @cache
 def arguments_of(function: Callable[..., Any]) -> list[str]:
-    """Returns the names of a function's parameters, without model and data. They are cached, because reading a
+    """Returns the names of a function's parameters, without model and data. The names are cached, because reading a
     signature takes longer than most calls."""
     return list(inspect.signature(function).parameters)[2:]
 
 
 def of_state(results: Any) -> Any:
-    """Returns, from the results of a batch, the results for the compared state."""
+    """Returns the results for the compared state, selected from the results of a batch."""
     if not isinstance(results, tuple):
         return results[HERE]
     members = map(of_state, results)
@@ -210,5 +212,5 @@ def of_state(results: Any) -> Any:
 
 
 def theirs_of(state: State) -> Callable[..., np.ndarray]:
-    """Returns Pinocchio's functions, with model and data filled in."""
+    """Returns an object with Pinocchio's functions, which passes model and data to each function."""
     return lambda function, *args: function(state.pair.theirs, state.pair.their_data, *args)

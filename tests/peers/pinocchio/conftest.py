@@ -1,5 +1,5 @@
-"""After the tests, prints the largest difference of each quantity from Pinocchio, and writes it to the file that
---validation names."""
+"""Prints the largest difference of each quantity from Pinocchio after the tests. The option --validation names a file
+to which the differences are written."""
 
 from pathlib import Path
 

@@ -1,4 +1,5 @@
-"""Compiles the generated code of one robot in one language into a library, which is called with arrays."""
+"""Compiles the generated code of one robot in one language into a shared library, and calls its functions with
+arrays."""
 
 import ctypes
 import hashlib
@@ -17,26 +18,26 @@ compiler = os.environ.get("CC", "cc").split()[0]
 
 WARNINGS = ["-Wall", "-Wextra", "-Werror"]
 C = [*WARNINGS, "-O0", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC"]
-"""Compiler options that make the compilation short, not the code fast. Vectors match the processor."""
+"""Compiler options for a short compilation instead of fast code. The code uses the vector instructions of the
+processor."""
 RUST = ["--edition=2021", "--crate-type=cdylib", "-Copt-level=0", "-Cdebuginfo=0", "-Ccodegen-units=1"]
 
 
 def missing(language: str) -> str | None:
-    """Returns the name of the compiler that a language needs, if the compiler is missing."""
+    """Returns the name of the compiler that a language needs, if this compiler is not installed; otherwise None."""
     name = "rustc" if language.startswith("rust") else compiler
     return None if shutil.which(name) else name
 
 
 def lanes(language: str) -> int:
-    """Returns the number of states that a call of code in this language computes."""
+    """Returns the number of states that one call of a generated function in a language computes."""
     return int(language[-1]) if language[-1] in "48" else 1
 
 
 class Library:
     """Functions of a robot in one language, compiled into one shared library.
 
-    A call takes `lanes` states, whose numbers have the type `real`. Sources with the same text are compiled only once
-    per folder.
+    A call computes `lanes` states. Their numbers have the type `real`. A source text is compiled only once per folder.
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class Library:
         shutil.rmtree(folder)
 
     def _exports(self) -> str:
-        """Returns Rust source that exports the functions of a module under the names that these functions have in C."""
+        """Returns Rust source code that exports the functions of a Rust module under the names of the C functions."""
         real = {4: "f32", 8: "f64"}[self.real.itemsize]
         text = f'#![deny(warnings)]\n#![allow(non_snake_case)]\n#[path = "{self.stem}.rs"]\nmod robot;\n'
         for name, (inputs, outputs) in self.functions.items():
@@ -90,7 +91,7 @@ class Library:
         return text
 
     def __call__(self, name: str, states: Sequence[Sequence[np.ndarray]]) -> list[list[np.ndarray]]:
-        """Returns the results of a function. The number of given states must be `lanes`."""
+        """Calls a function and returns its results. The number of states in the arguments must be `lanes`."""
         inputs, outputs = self.functions[name]
         assert len(states) == self.lanes and all(len(state) == len(inputs) for state in states)
         # Number k of state i is at index lanes * k + i.

@@ -1,8 +1,10 @@
-"""MJCFs of random robots, with hinges, slides, balls, a free body, several joints on a body, and bodies without joints.
+"""Generates MJCFs of random robots, with hinges, slides, balls, a free body, several joints on a body, and bodies
+without joints.
 
-The robots exclude what Pinocchio reads differently from MuJoCo. If the world contains several bodies, Pinocchio only
-reads the first body; if this body has no joint, Pinocchio ignores its pose. The position of a free body is relative to
-its pose in the file, and ball joints lose their damping and friction.
+The robots contain no features that Pinocchio reads differently from MuJoCo. These features are: the world contains
+several bodies (Pinocchio reads only the first body), the first body has no joint (Pinocchio ignores its pose), the
+initial position of a free body (in Pinocchio it is relative to the pose in the file), and damping and friction of ball
+joints (Pinocchio ignores them).
 """
 
 import numpy as np
@@ -11,7 +13,7 @@ KINDS = ("hinge", "hinge", "slide", "ball", "two", "none")
 
 
 class RandomMjcf:
-    """A random robot with several bodies. The first body may be free."""
+    """Random robot with several bodies. The first body may have a free joint."""
 
     def __init__(self, seed: int, bodies: int = 10) -> None:
         self.rng = np.random.default_rng(seed)

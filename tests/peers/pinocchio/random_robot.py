@@ -1,7 +1,8 @@
-"""Random robots that are made by calls of both libraries. They have every kind of joint that exists in either library.
+"""Random robots, which are built by calls of Pinocchio and of Condyle. Together the robots have every kind of joint of
+both libraries.
 
-Pinocchio's universal, spherical ZYX and composite joints are either one joint each, or several joints with massless
-bodies between them, as in Condyle. q and v have the same layout.
+Universal, spherical ZYX and composite joints of Pinocchio are built in two forms: as one joint, or as several joints
+with massless bodies between them, as in Condyle. In both forms, q and v have the same layout.
 """
 
 import numpy as np
@@ -12,7 +13,8 @@ import condyle
 from condyle import BodyId, Inertia, Joint, ModelBuilder
 
 BRANCH = 0.4
-"""Probability that a body is on an ancestor of the previous body, instead of on the previous body."""
+"""Probability that the parent of a new body is an ancestor of the previous body, instead of the previous body
+itself."""
 ONE = ("revolute", "continuous", "prismatic", "helical")
 """Kinds of joints with an axis, which may be x, y, z or any other axis."""
 OTHERS = ("spherical", "planar", "translation", "free_flyer")
@@ -30,7 +32,7 @@ UNALIGNED = {
     "prismatic": pin.JointModelPrismaticUnaligned,
     "helical": pin.JointModelHelicalUnaligned,
 }
-"""Continuous joints about any axis. In Pinocchio, only the URDF parser creates such joints."""
+"""Kind of continuous joints about any axis. In Pinocchio, only the URDF parser creates such joints."""
 FREE = {
     "spherical": (pin.JointModelSpherical, Joint.spherical),
     "planar": (pin.JointModelPlanar, Joint.planar),
@@ -39,7 +41,7 @@ FREE = {
 }
 
 Part = tuple[pin.JointModel, Joint, pin.SE3]
-"""A joint in both libraries, and its placement."""
+"""Joint in Pinocchio and in Condyle, with its placement."""
 
 
 class RandomRobot:
@@ -70,7 +72,7 @@ class RandomRobot:
         return axis / np.linalg.norm(axis)
 
     def part(self, kind: str) -> Part:
-        """Returns a joint that has one axis or no axis."""
+        """Creates a simple joint, which has one axis or no axis."""
         X = pin.SE3.Random()
         if kind in FREE:
             theirs, ours = FREE[kind]
@@ -85,7 +87,7 @@ class RandomRobot:
         return pin.JointModelRevoluteUnaligned(axis), Joint.revolute(axis), X
 
     def parts(self, kind: str) -> list[Part]:
-        """Returns the joints of which a joint of this kind consists."""
+        """Returns the simple joints of which a joint of the given kind consists."""
         X, here = pin.SE3.Random(), pin.SE3.Identity()
         if kind == "universal":
             a, b = self.axis(), self.axis()
@@ -99,7 +101,7 @@ class RandomRobot:
         return [self.part(kind)]
 
     def add(self, name: str, parts: list[Part], parent: int, on: BodyId) -> tuple[int, BodyId]:
-        """Adds a body with its joint, and a frame on the body, in both libraries."""
+        """Adds a body with its joint, and a frame on the body, to Pinocchio's and to Condyle's robot."""
         inertia, kind = pin.Inertia.Random(), name.split()[1]
         ours = Inertia.from_com(inertia.mass, inertia.lever, inertia.inertia)
         if kind == "spherical_zyx":
@@ -121,7 +123,7 @@ class RandomRobot:
         return joint, body
 
     def add_one(self, name: str, part: Part, inertia: pin.Inertia, parent: int, on: BodyId) -> tuple[int, BodyId]:
-        """Adds a joint that is one joint in both libraries, with limits and losses."""
+        """Adds a joint that is a single joint in Pinocchio and in Condyle, with limits, damping and friction."""
         their, our, X = part
         effort, velocity, friction, damping = self.rng.uniform(0, 1, 4)
         lower, upper = self.rng.uniform(-3, 0), self.rng.uniform(0, 3)
@@ -154,7 +156,7 @@ class RandomRobot:
 
 
 def composite(kind: str, parts: list[Part]) -> pin.JointModel:
-    """Combines several joints into one joint of Pinocchio. It has the placement of the first joint."""
+    """Combines several joints into one composite joint of Pinocchio with the placement of the first joint."""
     if kind == "universal":
         return pin.JointModelUniversal(*(ours.axis for _, ours, _ in parts))
     if kind == "spherical_zyx":

@@ -1,21 +1,21 @@
-"""URDFs of random robots: every kind of joint, unusual axes and names, links without inertia, and fixed joints between
-moving ones."""
+"""Generates URDFs of random robots with every kind of joint, unusual axes and names, links without inertia, and fixed
+joints between moving joints."""
 
 import numpy as np
 
 AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 -1", "-1 0 0", "0 0 2", "1e-9 0 1", "0 3 4")
-"""Axes of joints: aligned, negative, not normalised, and nearly aligned. The robots also have random axes, and joints
-without an axis."""
+"""Axes of joints: along x, y or z, negative, not normalised, and almost along x, y or z. The robots also have random
+axes, and joints without an axis."""
 NAMES = ("J3", "_0", "j1", "j10", "j2", "J", "hip.left", "hip-left", "Über", "a b")
-"""Names of joints. Their order by bytes is neither alphabetical nor numerical."""
+"""Names of joints. If the names are sorted by bytes, the order is neither alphabetical nor numerical."""
 KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 ONE = ("revolute", "continuous", "prismatic")
-"""Kinds of joints with one degree of freedom; such joints may follow another joint."""
+"""Kinds of joints with one degree of freedom; such a joint may mimic another joint."""
 
 
 class RandomUrdf:
-    """A random robot with several links. With `mimics`, some joints follow other joints."""
+    """Random robot with several links. With `mimics`, some joints mimic other joints."""
 
     def __init__(self, seed: int, links: int = 12, mimics: bool = False) -> None:
         self.rng = np.random.default_rng(seed)
@@ -37,8 +37,8 @@ class RandomUrdf:
         self.text = "\n".join([lines[0], *(lines[i] for i in order), "</robot>\n"])
 
     def _leader(self, kind: str, leaders: list[str]) -> str | None:
-        """Returns the name of a leader, or None if the joint follows no other joint. Only a rotating joint may follow a
-        continuous joint."""
+        """Returns the name of the joint that a joint mimics, or None if it mimics no joint. Only a rotating joint may
+        mimic a continuous joint."""
         turns = kind in ("revolute", "continuous")
         leaders = [name for name in leaders if turns or self.kinds[name] != "continuous"]
         return str(self.rng.choice(leaders)) if kind in ONE and leaders and self.rng.random() < 0.4 else None
@@ -61,7 +61,7 @@ class RandomUrdf:
         axes = (f'<axis xyz="{self._numbers(3, 1.0)}"/>', "", *(f'<axis xyz="{axis}"/>' for axis in AXES))
         axis = axes[self.rng.integers(len(axes))] if kind in ("revolute", "continuous", "prismatic") else ""
         if kind == "planar":
-            axis = '<axis xyz="0 0 1"/>'  # Pinocchio's planar joint moves only in this plane
+            axis = '<axis xyz="0 0 1"/>'  # Pinocchio's planar joint moves only in the xy plane
         lower, upper, velocity, effort = self.rng.uniform((-3, 0, 0, 0), (0, 3, 10, 100))
         limited = kind in ("revolute", "prismatic") or (kind == "continuous" and self.rng.random() < 0.5)
         limit = f'<limit lower="{lower}" upper="{upper}" velocity="{velocity}" effort="{effort}"/>' if limited else ""

@@ -7,10 +7,10 @@ import pytest
 from condyle.algebra import SE3, Force, Inertia, Jexp3, Jexp6, Jlog3, Jlog6, Motion, exp3, exp6, log3, log6
 
 EXACT = 1e-12
-"""Tolerance for several thousand rounding errors of numbers near 1."""
+"""Tolerance for numbers near 1, which allows several thousand rounding errors."""
 ANGLES = [0.0, 1e-12, 1e-7, 1e-4, 0.05, 0.0999, 0.1001, 0.999, 1.001, 2.0, 3.0, np.pi - 1e-4]
-"""Angles on both sides of each angle at which a formula changes. Nearer to π, Pinocchio's own logarithm loses
-digits."""
+"""Test angles (rad), on both sides of each angle at which the algebra uses another formula. Nearer to π, Pinocchio's
+logarithm loses digits."""
 
 
 def motions(angle: float) -> np.ndarray:
@@ -26,8 +26,8 @@ def close(found: np.ndarray, expected: np.ndarray, bound: float = EXACT) -> None
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_exponentials(angle: float) -> None:
-    """Compares exponentials and logarithms. Pinocchio computes Jacobians of small angles from series of few terms, so
-    they agree only to 1e-9."""
+    """Compares exponentials, logarithms and their Jacobians. Pinocchio computes the Jacobians for small angles from
+    series of few terms, so Jacobians agree only to 1e-9."""
     many = motions(angle)
     for k, m in enumerate(many):
         X = pin.exp6(m)
@@ -99,8 +99,8 @@ def test_batches_and_what_is_refused() -> None:
 
 
 def test_inertias_of_shapes() -> None:
-    """Compares inertias with Pinocchio's. Those of a capsule and a cylinder are also compared with sums over many
-    points."""
+    """Compares inertias with Pinocchio's. The inertias of a capsule and a cylinder are also compared with sums over
+    many points."""
     for ours, theirs in (
         (Inertia.from_sphere(2.0, 0.3), pin.Inertia.FromSphere(2.0, 0.3)),
         (Inertia.from_ellipsoid(2.0, [0.3, 0.2, 0.1]), pin.Inertia.FromEllipsoid(2.0, 0.3, 0.2, 0.1)),

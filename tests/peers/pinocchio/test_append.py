@@ -12,11 +12,12 @@ from condyle import Inertia, Joint, ModelBuilder
 
 STATES = 3
 PARTS = [("panda", "ur5"), ("double_pendulum", "panda"), ("kinova", "xarm7")]
-"""Pairs of fixed robots that stand on one platform. Joints of the two robots have different names."""
+"""Pairs of robots with fixed bases that are mounted on one platform. The joints of the two robots have different
+names."""
 
 
 def together(names: tuple[str, str], seed: int) -> Pair:
-    """Returns both robots on one platform that slides and rotates."""
+    """Returns a robot that consists of two robots on one platform. The platform slides and rotates."""
     pin.seed(seed)
     theirs, builder = pin.Model(), ModelBuilder("together")
     theirs.name = "together"

@@ -1,4 +1,4 @@
-"""Tests functions of the book: the identities in `factorisation.md` for robots of example-robot-data, and sizes of
+"""Tests functions of the book for robots of example-robot-data: the identities in `factorisation.md`, and the sizes of
 subtrees."""
 
 import importlib.util
@@ -13,13 +13,14 @@ from test_robots import NO_URDF, ROBOTS, SINGULAR, root_joint, urdf_path
 import condyle
 
 EXACT = 1e-11
-"""Tolerance relative to the largest entry: several thousand rounding errors."""
+"""Tolerance relative to the largest entry, which allows several thousand rounding errors."""
 INVERSE = 1e-9
-"""Tolerance of results that are divided by pivots. The ratio of pivots is up to 1e7 for all robots except icub."""
+"""Tolerance of results that contain a division by pivots. The ratio of the largest to the smallest pivot is at most
+1e7, except for icub."""
 SEMIDEFINITE = 1e-11
 """Largest eigenvalue that counts as zero, relative to the largest entry."""
 NOT_PHYSICAL = {"icub", "icub_reduced"}
-"""Robots with physically impossible inertias, for which pivots lose 11 digits."""
+"""Names of robots with physically impossible inertias, whose pivots lose 11 digits."""
 
 
 def chapter(name: str) -> dict[str, Any]:
@@ -45,7 +46,7 @@ def test_one_factorisation(book: dict[str, Any], name: str) -> None:
     armature = rng.uniform(0.1, 1.0, model.nv) * (rng.random(model.nv) < 0.5)
     for kind, first in zip(model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer":
-            armature[first : first + 3] = armature[first]  # the same value along all linear coordinates
+            armature[first : first + 3] = armature[first]  # linear armature must be the same in all directions
     found = book["identities"](model.with_armature(armature), condyle.random_configuration(model, seed=0))
     assert len(found) == 6
     for identity, value in found.items():

@@ -1,4 +1,4 @@
-"""Tests that the comparison with CasADi runs, and that its three methods find the same motion."""
+"""Tests that the benchmark against CasADi runs, and that its three methods of planning find the same motion."""
 
 import json
 import subprocess

@@ -1,8 +1,8 @@
-"""Compares the spanning tree of Cassie, an SDF with closed loops, with a tree assembled in Pinocchio. Pinocchio reads
-no SDF here.
+"""Compares the spanning tree of Cassie, an SDF with closed loops, with a tree that the test builds in Pinocchio.
+Pinocchio's own SDF reader is not used.
 
 The test reads the file by the rules of SDF 1.6. Poses of links are relative to the model, and poses of joints are
-relative to their child. Axes are in the joint's frame, or in the model's frame with `use_parent_model_frame`.
+relative to the child link. Axes are in the joint's frame, or in the model's frame with `use_parent_model_frame`.
 """
 
 import os
@@ -42,10 +42,10 @@ def inertia(link: ElementTree.Element) -> pin.Inertia:
 
 
 def tree() -> pin.Model:
-    """Builds the tree from the pelvis, breadth first. Joints are added in the order of the file, without joints that
-    close a loop.
+    """Builds the tree from the pelvis, breadth first. At each link, joints are added in the order of the file. Joints
+    that close a loop are omitted.
 
-    The joints of the result are numbered depth first.
+    Pinocchio numbers the joints of the tree depth first.
     """
     robot = ElementTree.parse(path()).getroot().find("model")
     links = {link.get("name"): link for link in robot.findall("link")}

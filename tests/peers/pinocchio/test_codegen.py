@@ -1,5 +1,5 @@
-"""Tests generated code for robots of example-robot-data. It is compared with Pinocchio and the library, and used as
-CasADi's `external`."""
+"""Tests generated code for robots of example-robot-data. The tests compare the code with Pinocchio and with the
+library, and call it by CasADi's `external`."""
 
 import itertools
 import os
@@ -22,32 +22,37 @@ import condyle
 import condyle.codegen
 
 BOUND = 1e-10
-"""Tolerance of results that Pinocchio computes in another order, relative to 1 + the largest number. It is the same as
-in comparison.py."""
+"""Tolerance of differences from Pinocchio, relative to 1 + the largest number, the same as in comparison.py. Pinocchio
+computes the results in another order of operations."""
 ROUNDING = 1e-12
-"""Tolerance of results that the library computes in another order, relative to 1 + the largest number."""
+"""Tolerance of differences from the library, relative to 1 + the largest number. The library computes the results in
+another order of operations."""
 WORST = 1e10
-"""Condition number from which results are not compared. Such numbers arise if a contact acts in a direction in which
-the robot cannot move."""
+"""Maximum condition number for which results are compared. Condition numbers are larger if a contact acts in a
+direction in which the robot cannot move."""
 MILD = 1e3
-"""Condition number of M up to which ROUNDING holds. Above it, the tolerance grows with the condition number."""
+"""Maximum condition number of M for which the tolerance is ROUNDING. For larger condition numbers, the tolerance grows
+in proportion."""
 APART = 2.0
-"""Factor on the tolerance for all states except the first. The errors of the code and of the library may have opposite
-signs.
+"""Factor by which the tolerance is larger for all states except the first. The errors of generated code and library may
+have opposite signs and add up.
 
-For solo12's aba_hessian in the seventh state, both errors are 4.4e-12, compared with extended precision, and the
-difference of both results is 8.7e-12. The condition number in this state allows 8.2e-12.
+An example is aba_hessian of solo12 in the seventh state. Compared with extended precision, both errors are 4.4e-12, and
+the two results differ by 8.7e-12. Without this factor, the tolerance would be 8.2e-12.
 """
 SINGLE = float(np.finfo(np.float32).eps / np.finfo(np.float64).eps)
-"""Ratio of the rounding errors of the types float and double. For floats, it multiplies ROUNDING."""
+"""Ratio of the rounding errors of the types float and double. For code with floats, the tolerance is ROUNDING times
+this ratio."""
 WORST_SINGLE = 1e5
-"""Condition number from which results of floats are not compared, because fewer than two digits would be correct."""
+"""Maximum condition number for which results of floats are compared. For larger numbers, fewer than two digits would be
+correct."""
 
 ALL = "CONDYLE_FULL" in os.environ
-"""Whether code is compiled for all robots, which takes a quarter of an hour on two cores."""
+"""Whether the tests compile code for all robots, which takes a quarter of an hour on two cores."""
 SOME = ["panda", *(["solo12", "anymal"] if ALL else [])]
 FEW = ["double_pendulum_continuous", "ur5", "borinot"]
-"""Robots for which all languages are compiled: one with a joint on a circle, an arm, and a flying base with a limb."""
+"""Robots whose code is compiled in all languages: a robot with a continuous joint (cos, sin), an arm, and a flying base
+with a limb."""
 LANGUAGES = ["c-casadi", "c-float", "c-4", "c-8", "rust"]
 CASES = [
     (name, language)
@@ -58,8 +63,8 @@ CASES = [
 ]
 """Pairs of a robot and a language.
 
-With vectors of four numbers, compilers take a minute for eight lanes of a robot, so only one robot is compiled with
-them. The three languages with floats are compiled for the two smaller robots.
+On processors with vectors of four numbers, compiling code for eight lanes takes a minute, so only one robot's code is
+compiled there. Code in the three languages with floats is compiled for the two smaller robots.
 """
 BESIDES = {"c-float": ["c-float-4", "c-float-8"], "rust": ["rust-float"]}
 """Languages that are compiled together with the language in the key, for robots with up to `SMALL` coordinates."""
@@ -110,14 +115,14 @@ LARGEST = 25
 """Maximum number of coordinates for which the longest functions are compiled: second derivatives, and functions that
 need M⁻¹."""
 COMPLETE = {("talos", "c-casadi")}
-"""Larger robots for which all functions are compiled in this language."""
+"""Pairs of a larger robot and a language for which all functions are compiled."""
 
 Numbers = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""q, v, and numbers that serve as accelerations or efforts."""
+"""Position q, velocity v, and numbers that are used as accelerations or efforts."""
 
 
 def beside(pair: Pair, function: str, frame: str, numbers: Numbers) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Returns the arguments of a function in a state, and the results of the library."""
+    """Returns the arguments of a generated function for a state, and the library's results."""
     model, data = pair.ours, pair.data
     q, v, x = numbers
     told: object
@@ -165,8 +170,8 @@ def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
 
 def chosen(pair: Pair, language: str) -> list[str]:
     """Returns the functions that are compiled for a robot in a language."""
-    # Functions of impacts are compiled only in plain C.
-    # In other languages they would take as long as all other functions together.
+    # The derivatives of impacts are compiled only in plain C.
+    # In other languages, their compilation would take as long as the compilation of all other functions.
     plain = language in ("c", "c-casadi")
     long = {"aba_derivatives", "constrained_dynamics_derivatives", "rnea_hessian", "aba_hessian"}
     long |= set() if plain else {"impulse_dynamics_derivatives"}
@@ -175,22 +180,23 @@ def chosen(pair: Pair, language: str) -> list[str]:
 
 
 def frame_of(pair: Pair) -> str:
-    """Returns the frame that the largest number of joints moves. Functions are evaluated for this frame, and a contact
-    constrains it."""
+    """Returns the name of the frame that the largest number of joints moves. The tests compute the kinematics of this
+    frame and hold it by a contact."""
     model, q = pair.ours, pair.states(1)[0].q
     moved = [condyle.frame_jacobian(model, pair.data, q, k).any(axis=0).sum() for k in range(len(model.frames))]
     return str(model.frames[int(np.argmax(moved))].name)
 
 
 Call = Callable[[str, Sequence[Sequence[np.ndarray]]], list[list[np.ndarray]]]
-"""A function that takes a name and states, and returns the results of the generated function with this name."""
+"""Function that takes the name of a generated function and states, and returns the results of the generated
+function."""
 
 
 def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, Any]], Call]) -> Call:
-    """Checks that code gives the library's results, up to rounding errors that inverses amplify by their condition
-    number.
+    """Checks that generated code and the library give the same results. The tolerance grows with the condition number
+    of the inverted matrices.
 
-    compiled: compiles the named functions with options. This function returns the compiled code.
+    compiled: function that compiles the named functions with options, and returns a function that calls them.
     """
     single = "float" in language
     rounding, worst = (ROUNDING * SINGLE, WORST_SINGLE) if single else (ROUNDING, WORST)
@@ -218,7 +224,8 @@ def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, 
 
 @pytest.mark.parametrize("name", SOME)
 def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
-    """Compiles functions one by one with `condyle.codegen.compile`, and compares them with the library's results."""
+    """Tests functions that `condyle.codegen.compile` compiles one by one: their results must equal the library's
+    results."""
     pair = load(name)
 
     def call(names: list[str], options: dict[str, Any]) -> Call:
@@ -235,14 +242,15 @@ def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[Path]:
-    """Creates a temporary folder for compiled libraries, which need a gigabyte for all robots."""
+    """Creates a temporary folder for compiled libraries. The libraries for all robots need a gigabyte."""
     with TemporaryDirectory() as folder:
         yield Path(folder)
 
 
 @pytest.mark.parametrize(("name", "language"), CASES)
 def test_languages(name: str, language: str, folder: Path) -> None:
-    """The code in each language gives the library's results, and CasADi receives the same results."""
+    """Tests that the generated code in each language gives the library's results, and that calls through CasADi give
+    the same results."""
     if (lacks := missing(language)) is not None:
         pytest.skip(f"there is no {lacks}")
     pair = load(name)
@@ -257,8 +265,8 @@ def test_languages(name: str, language: str, folder: Path) -> None:
 
 
 def external(pair: Pair, code: Library) -> None:
-    """Checks that calls through CasADi give the same results as the generated code. CasADi's Jacobian of a function
-    must consist of the generated derivatives."""
+    """Checks that calls through CasADi give the same results as direct calls of the generated code, and that CasADi's
+    Jacobians equal the generated derivatives."""
     state = pair.states(1)[0]
     numbers = {"q": state.q, "v": state.v, "restitution": np.array([RESTITUTION]), "lambda": state.v[::-1].copy()}
     for function, (inputs, outputs) in code.functions.items():
@@ -283,7 +291,8 @@ def external(pair: Pair, code: Library) -> None:
 
 
 def library(folder: Path) -> str:
-    """Compiles all C files of a folder to robot.so; returns the name by which the code calls the robot."""
+    """Compiles all C files of a folder to robot.so. Returns the name of the robot, with which the function names
+    begin."""
     sources = sorted(path.name for path in folder.glob("*.c"))
     flags = ["-O1", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, *sources, "-o", "robot.so", "-lm"], cwd=folder, check=True)
@@ -291,7 +300,8 @@ def library(folder: Path) -> str:
 
 
 def test_external(tmp_path: Path) -> None:
-    """CasADi finds each function and its arrays with names and shapes. It uses zeros for omitted arguments."""
+    """Tests that CasADi finds each generated function with the names and shapes of its arrays, and uses zeros for
+    omitted arguments."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     for file, text in condyle.codegen.source(model, ["rnea", "crba"], "c-casadi").items():
@@ -317,7 +327,8 @@ def test_external(tmp_path: Path) -> None:
 
 
 def test_jacobians_of_externals(tmp_path: Path) -> None:
-    """CasADi differentiates a function by the function's generated derivatives, also inside an expression."""
+    """Tests that CasADi uses the generated derivatives of a function for its Jacobian, also if the function is called
+    inside an expression."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     names = ["rnea", "aba", "rnea_derivatives", "aba_derivatives"]
@@ -362,7 +373,7 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
         chain = np.cos(np.concatenate([y, lambda_]))
         chained = chain[:, None] * expected
         assert np.abs(found[:, : chained.shape[1]] - chained).max() <= bound * (1.0 + np.abs(chained).max()), function
-        # Compare with central differences of the library's function, also for arguments that have no derivatives.
+        # Compare with central differences of the library's function, also for arguments without generated derivatives.
         step = 1e-6
         for k, by in enumerate(np.cumsum([0, *map(len, arguments[:-1])])):
             for j in range(len(arguments[k])):
@@ -383,8 +394,8 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
 
 
 def test_positions_with_quaternions_have_no_jacobian() -> None:
-    """With quaternions there is no Jacobian: derivatives along the tangent are not derivatives with respect to the
-    numbers of q."""
+    """Tests that no Jacobian is generated for robots with quaternions: the generated derivatives are along the tangent
+    space, and not with respect to the numbers of q."""
     for robot, expected in [("panda", True), ("anymal", False)]:
         text = "".join(condyle.codegen.source(load(robot).ours, ["rnea", "rnea_derivatives"], "c-casadi").values())
         assert ("jac_" in text) == expected, robot

@@ -18,19 +18,20 @@ RANDOM = 30
 STATES = 2
 LEGGED = ("anymal", "anymal_kinova", "hyq", "solo12", "go1", "bolt", "talos", "talos_legs", "icub_reduced")
 WORST_CONDITION = 1e4
-"""Maximum condition number of J M⁻¹ Jᵀ. Constraints with larger condition numbers cannot test the algorithms."""
+"""Maximum condition number of J M⁻¹ Jᵀ for tested constraints. Results for larger condition numbers have too large
+rounding errors for a comparison."""
 ROUNDINGS = WORST_CONDITION * np.finfo(float).eps
-"""Accuracy of the terms of ∂q̈/∂τ in both libraries. It is M⁻¹ minus a term of the constraints; digits cancel if M⁻¹ is
-larger."""
+"""Accuracy of ∂q̈/∂τ relative to M⁻¹, in both libraries. ∂q̈/∂τ is M⁻¹ minus a term of the constraints; digits cancel
+if M⁻¹ is larger than the difference."""
 RESTITUTION = 0.3
 STEP = 1e-6
 DIFFERENCES = 1e-5
-"""Tolerance of central differences with this step, relative to 1 + the largest number of Pinocchio's result."""
+"""Tolerance of central differences with the step STEP, relative to 1 + the largest number of Pinocchio's result."""
 
 
 @dataclass
 class Case:
-    """Constraints of a robot in a state, in both libraries."""
+    """Constraints of a robot in a state, in Condyle and in Pinocchio."""
 
     state: State
     constraints: list[condyle.ContactConstraint]
@@ -41,14 +42,14 @@ class Case:
         return condyle.ConstraintSet(self.state.pair.ours, self.constraints)
 
     def conditions(self) -> float:
-        """Returns the condition number of the Delassus matrix."""
+        """Returns the condition number of the Delassus matrix J M⁻¹ Jᵀ."""
         s = self.state
         d = ours_of(s)(condyle.constrained_dynamics_derivatives, self.set(), s.q, s.v, s.tau)
         return float(np.inf if d.redundant else np.linalg.cond(d.inertia))
 
 
 def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
-    """Returns the constraints in both libraries. In Pinocchio, the target is a part of the second placement."""
+    """Creates the constraints for Condyle and for Pinocchio. In Pinocchio, the second placement contains the target."""
     pair = state.pair
     theirs = dict(common_frames(pair))
     models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
@@ -72,7 +73,8 @@ def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
 
 
 def random_case(state: State, seed: int, loops: bool) -> Case:
-    """Chooses constraints from a dozen random ones. The robot can satisfy all chosen constraints with unique forces."""
+    """Creates a dozen random constraints, and selects constraints that the robot can satisfy together with unique
+    forces."""
     rng, pair = np.random.default_rng(seed), state.pair
     frames = [i for i, _ in common_frames(pair)]
     chosen: list[condyle.ContactConstraint] = []
@@ -96,22 +98,22 @@ def random_case(state: State, seed: int, loops: bool) -> Case:
             new = case(state, [*chosen, constraint])
             if new.conditions() < WORST_CONDITION:
                 chosen.append(constraint)
-        except condyle.ModelError:  # the frames do not move, or the constraint occurs twice
+        except condyle.ModelError:  # neither frame moves, or the constraint occurs twice
             continue
     return case(state, chosen)
 
 
 def whole(c: condyle.ContactConstraint) -> bool:
-    """Returns whether Pinocchio's ∂/∂q is correct: the derivative of Pinocchio's own q̈ and λ, which differences show.
+    """Returns whether Pinocchio's derivatives by q agree with finite differences of Pinocchio's own q̈ and λ.
 
-    It is wrong for all loops of points, and for all rigid constraints along the world's axes.
+    They do not agree for loops of points, and for rigid constraints along the world's axes.
     """
     return c.reference == "local" if c.kind == "rigid" else c.other is None
 
 
 def check_dynamics(case: Case) -> None:
-    """Compares q̈, λ and their derivatives. Where Pinocchio's ∂/∂q is wrong, compares with differences of Pinocchio's
-    q̈ and λ."""
+    """Compares accelerations q̈, constraint forces λ and their derivatives. If Pinocchio's derivatives by q are wrong,
+    compares with finite differences of Pinocchio's q̈ and λ."""
     state, pair = case.state, case.state.pair
     model, data, far = pair.theirs, pair.their_data, pair.self_distance
     settings = pin.ProximalSettings(1e-14, 1e-14, 0.0, 1)
@@ -141,7 +143,8 @@ def check_dynamics(case: Case) -> None:
 
 
 def check_impacts(case: Case) -> None:
-    """Compares v⁺, Λ and their derivatives. Pinocchio returns the derivatives of v⁺ − v."""
+    """Compares the velocities v⁺ after an impact, the impulses Λ, and their derivatives. Pinocchio returns the
+    derivatives of v⁺ − v."""
     state, pair = case.state, case.state.pair
     model, data, far = pair.theirs, pair.their_data, pair.self_distance
     args = (model, data, state.q, state.v, case.models, case.datas, RESTITUTION)
@@ -183,7 +186,7 @@ def test_legged_robots(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in LEGGED if name in ROBOTS])
 def test_batches(name: str) -> None:
-    """Tests constrained dynamics, impacts, and the derivatives of both in the lanes of a batch."""
+    """Tests constrained dynamics, impacts and their derivatives in batches, whose states are in SIMD lanes."""
     (state,) = load(name).states(1, seed=50)
     contacts = random_case(state, 50, False)
     state.in_batch = True

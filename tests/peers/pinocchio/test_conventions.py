@@ -1,4 +1,4 @@
-"""Compares `condyle.conventions` with poses, forces and motions in Pinocchio."""
+"""Compares the conversions of `condyle.conventions` with poses, forces and motions that Pinocchio computes."""
 
 import numpy as np
 import pinocchio as pin
@@ -8,12 +8,12 @@ import condyle
 from condyle import conventions
 
 SAME = 1e-12
-"""Tolerance for several rounding errors."""
+"""Tolerance, which allows several rounding errors."""
 
 
 @pytest.fixture(params=[condyle.robots.ARM7, condyle.robots.QUADRUPED, condyle.robots.HUMANOID])
 def pair(request: pytest.FixtureRequest) -> tuple[condyle.Model, pin.Model]:
-    """Returns one robot in both libraries."""
+    """Returns one robot in Condyle and in Pinocchio."""
     text, moves = request.param, request.param is not condyle.robots.ARM7
     model = condyle.Model.from_urdf_str(text, root_joint="free_flyer" if moves else None)
     theirs = pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if moves else pin.buildModelFromXML(text)
@@ -21,7 +21,7 @@ def pair(request: pytest.FixtureRequest) -> tuple[condyle.Model, pin.Model]:
 
 
 def test_the_same_coordinates(pair: tuple[condyle.Model, pin.Model]) -> None:
-    """Pinocchio's numbers are the same as Condyle's, without a conversion."""
+    """Tests that positions and velocities have the same numbers in Pinocchio and Condyle, without a conversion."""
     model, theirs = pair
     there = conventions.Coordinates(model, "pinocchio")
     q, v = condyle.random_configuration(model, seed=1), np.arange(float(model.nv))
@@ -64,7 +64,8 @@ def test_forces_and_motions(pair: tuple[condyle.Model, pin.Model]) -> None:
 
 
 def test_a_force_in_the_world(pair: tuple[condyle.Model, pin.Model]) -> None:
-    """A force in world coordinates enters the dynamics of both libraries, each by that library's own conversion."""
+    """Tests that a force in world coordinates gives the same motion in Condyle and in Pinocchio, if each library
+    converts the force by its own functions."""
     model, theirs = pair
     q, rest = condyle.random_configuration(model, seed=3), np.zeros(model.nv)
     wrench = np.random.default_rng(3).standard_normal((model.nbodies, 6))

@@ -11,7 +11,7 @@ BODIES = 100
 
 
 def expect(what: str, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Checks that two results are equal, and records their difference."""
+    """Checks that results of Condyle and Pinocchio are equal, and records their difference."""
     ours, theirs = np.asarray(ours), np.asarray(theirs)
     assert ours.shape == theirs.shape
     difference = float(np.abs(ours - theirs).max() / (1 + np.abs(theirs).max()))

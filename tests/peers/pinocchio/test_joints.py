@@ -1,4 +1,4 @@
-"""Compares robots that URDF cannot describe with Pinocchio 4.1. The robots are made by calls of each library."""
+"""Compares robots that URDF cannot describe with Pinocchio 4.1. Calls of each library build the robots."""
 
 import checks
 import numpy as np
@@ -12,10 +12,11 @@ import condyle
 ROBOTS = 20
 STATES = 2
 SINGLE = (*ONE, *ONE, *OTHERS)
-"""Kinds of joints. Kinds with an axis occur twice, so that most robots have both aligned and other axes."""
+"""Kinds of joints of the random robots. Kinds with an axis occur twice in the list, so most robots have axes along x, y
+or z and other axes."""
 STEP = 1e-6
 DIFFERENCES = 1e-6
-"""Tolerance of central differences with this step, relative to 1 + the largest number of Pinocchio's result."""
+"""Tolerance of central differences with the step STEP, relative to 1 + the largest number of Pinocchio's result."""
 
 
 def check(pair: Pair, seed: int) -> None:
@@ -48,8 +49,8 @@ def test_single_joints(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_chains_of_joints(seed: int) -> None:
-    """Compares every function for universal, spherical ZYX and composite joints. Here they are chains of joints in
-    Pinocchio, too."""
+    """Compares every function for universal, spherical ZYX and composite joints, if these are chains of simple joints
+    in both libraries."""
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=False)
     robot.pair.record_size()
     checks.check_bodies(robot.pair)
@@ -62,8 +63,8 @@ def test_chains_of_joints(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_composite_joints(seed: int) -> None:
-    """Compares the same robots, but with one joint of Pinocchio for each chain. All functions are compared, except
-    rates and derivatives."""
+    """Compares robots whose universal, spherical ZYX and composite joints are single joints in Pinocchio, and chains of
+    simple joints in Condyle. All functions are compared, except rates and derivatives."""
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=True)
     ours, theirs = robot.pair.ours, robot.pair.theirs
     assert (ours.nq, ours.nv) == (theirs.nq, theirs.nv)
@@ -78,9 +79,10 @@ def test_composite_joints(seed: int) -> None:
 
 
 def test_derivatives_through_composite_joints() -> None:
-    """Condyle's ∂τ/∂q equals differences of Pinocchio's own rnea; Pinocchio's derivatives do not.
+    """Tests that for composite joints, Condyle's ∂τ/∂q equals finite differences of Pinocchio's rnea, and that
+    Pinocchio's own ∂τ/∂q does not.
 
-    If Pinocchio's derivatives become correct, the comparisons of composite joints above need no exception.
+    If a later version of Pinocchio has correct derivatives, `test_composite_joints` can compare derivatives, too.
     """
     pair = RandomRobot("built", 0, (*ONE, *COMPOSITES), composites=True).pair
     state = pair.states(1)[0]

@@ -1,9 +1,9 @@
-"""Tests mimic joints that share a coordinate. rnea, crba and nle are compared with Pinocchio's, all other functions by
-projection.
+"""Tests mimic joints that share a coordinate. The tests compare rnea, crba and nle with Pinocchio's functions, and all
+other functions with projections of Pinocchio's results.
 
 A robot with mimic joints moves like the same robot with free joints along q_free = G q + offset. So its efforts are Gᵀ
 τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G. Pinocchio computes τ_free, M_free and
-∂τ_free for the free robot. Results of forward dynamics are checked by inserting them into the equations of motion.
+∂τ_free for the free robot. The tests check results of forward dynamics by inserting them into the equations of motion.
 """
 
 from pathlib import Path
@@ -22,21 +22,23 @@ STATES = 3
 RANDOM = 20
 ROBOTS = [n for n in test_robots.ROBOTS if n not in test_robots.NO_URDF and "<mimic" in test_robots.text(n)]
 BROKEN = {"alex_psyonic_hands"}
-"""Robots in which a joint follows a missing joint. Neither library reads them with mimic=True."""
+"""Names of robots in which a joint mimics a missing joint. Neither library reads these robots with mimic=True."""
 REFUSED = {"romeo", "talos_full", "talos_full_box"}
-"""Robots in which a joint follows a joint with a higher index. Pinocchio does not read them with mimic=True."""
+"""Names of robots in which a joint mimics a joint with a higher index. Pinocchio does not read these robots with
+mimic=True."""
 
 LARGEST = np.finfo(float).max
-"""Limit that Pinocchio stores for a joint without a limit."""
+"""Number that Pinocchio stores as the limit of a joint without a limit."""
 RANGE = 1e-9
-"""Smallest range of a position that counts as a motion."""
+"""Smallest range of positions that counts as nonzero."""
 UNREADABLE = ("not in the kinematic tree", "Mimicking and mimicked configuration spaces have different sizes")
-"""Errors of Pinocchio for random robots. A joint follows one with a higher index, or a continuous joint follows another
-kind (or the reverse)."""
+"""Error messages of Pinocchio for random robots. In these robots a joint mimics a joint with a higher index, or one of
+the two joints is continuous and the other is not."""
 
 
 class Projection:
-    """Condyle's robot with mimic joints, as a projection of Pinocchio's robot without mimic joints."""
+    """Robot with mimic joints in Condyle, and the projection to its coordinates from the same robot with free joints in
+    Pinocchio."""
 
     def __init__(self, name: str, path: str, root_joint: str | None) -> None:
         self.free = from_urdf(name, path, root_joint)
@@ -50,7 +52,7 @@ class Projection:
                 self.G[free.idx_vs[i] + k, ours.idx_vs[i] + k] = mimic.ratio if mimic else 1.0
 
     def position(self, q: np.ndarray) -> np.ndarray:
-        """Returns the position of the robot with free joints, from the position q with mimic joints."""
+        """Converts the position q of the robot with mimic joints to a position of the robot with free joints."""
         free, ours, q_free = self.free.ours, self.ours, np.empty(self.free.ours.nq)
         for i, mimic in enumerate(ours.mimics):
             own = q[ours.idx_qs[i] :][: free.nqs[i]]
@@ -63,7 +65,8 @@ class Projection:
         return q_free
 
     def check_model(self, pair: Pair) -> None:
-        """Compares the model. Limits and losses of a follower act on its leader; Pinocchio ignores them."""
+        """Compares the models. In Condyle, limits, damping and friction of a mimic joint act on the joint that it
+        mimics; Pinocchio ignores them."""
         checks.check_bodies(pair)
         checks.check_frames(pair)
         ours, free, G = pair.ours, self.free.ours, np.abs(self.G)
@@ -120,7 +123,7 @@ class Projection:
         d = condyle.aba_derivatives(*ours, q, v, tau, f_ext)
         pair.expect("mimic: aba of aba_derivatives", d.a, condyle.aba(*ours, q, v, tau, f_ext))
         assert np.array_equal(d.da_dtau, condyle.minv(*ours, q))
-        # Check M q̈ + h = τ and what follows from it: M ∂q̈/∂· = −∂τ/∂· and M M⁻¹ = 1.
+        # Check M q̈ + h = τ, and the equations M ∂q̈/∂· = −∂τ/∂· and M M⁻¹ = 1.
         dtau_dq, dtau_dv, _ = derivatives(d.a)
         pair.expect("mimic: rnea of aba", rnea(d.a), tau)
         for grain in checks.GRAINS:
@@ -181,17 +184,18 @@ def test_broken(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
 def test_refused(name: str) -> None:
-    """Pinocchio rejects these robots. If a later version reads them, they belong to the direct comparison."""
+    """Tests that Pinocchio rejects the robots in REFUSED. If a later version of Pinocchio reads them, they can be
+    compared directly."""
     with pytest.raises(ValueError, match="not in the kinematic tree"):
         pin.buildModelFromUrdf(test_robots.urdf_path(name), mimic=True)
 
 
 @pytest.mark.parametrize("seed", range(RANDOM))
 def test_random_robot(seed: int, tmp_path: Path) -> None:
-    """Compares random robots by projection; M is not compared directly.
+    """Compares random robots by projection. M is compared only with the projection, not with Pinocchio's crba.
 
-    Pinocchio's crba contradicts its own rnea if a joint with several degrees of freedom is below a joint that follows
-    another. Condyle agrees with Pinocchio's rnea.
+    Pinocchio's crba contradicts its own rnea if a joint with several degrees of freedom is a descendant of a mimic
+    joint. Condyle agrees with Pinocchio's rnea.
     """
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(1000 + seed, mimics=True).text, encoding="utf-8")

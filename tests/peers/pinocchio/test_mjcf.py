@@ -1,4 +1,4 @@
-"""Compares random robots with Pinocchio 4.1; both libraries read them from the same MJCF."""
+"""Compares random robots with Pinocchio 4.1; both libraries read the same MJCF."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ STATES = 2
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_random_robot(seed: int, tmp_path: Path) -> None:
-    """Compares the robots. Several joints on one body are one composite joint in Pinocchio, and a chain of bodies in
+    """Compares random robots. Several joints on one body are one composite joint in Pinocchio, and a chain of bodies in
     Condyle."""
     path = tmp_path / "robot.xml"
     path.write_text(RandomMjcf(seed).text, encoding="utf-8")

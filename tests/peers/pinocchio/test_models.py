@@ -1,7 +1,7 @@
-"""Converts Pinocchio's models to Condyle's and back, for all robots of example-robot-data. Joints, frames and numbers
-must be the same.
+"""Tests the conversion of Pinocchio's models to Condyle's and back, for all robots of example-robot-data. Joints,
+frames and numbers must remain the same.
 
-Named positions of SRDFs, appended robots and joints that follow others are compared with Pinocchio's results.
+The tests also compare named positions of SRDFs, appended robots and mimic joints with Pinocchio's results.
 """
 
 import os
@@ -28,14 +28,14 @@ MIMICS = [n for n in test_mimic.ROBOTS if n not in test_mimic.BROKEN | test_mimi
 
 
 def close(what: str, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Checks equality, with the tolerance that all tests in this file use."""
+    """Checks that two arrays are equal within TOLERANCE, relative to 1 + the largest number."""
     bound = TOLERANCE * (1.0 + np.abs(theirs).max(initial=0.0))
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=bound, err_msg=what)
 
 
 def check_same(ours: Model, theirs: pin.Model, bodies: list[int] | None = None, states: int = 2) -> None:
-    """Compares names, limits, losses, rnea, crba and frames. `bodies` are Condyle's bodies for each joint of
-    Pinocchio."""
+    """Compares names, limits, damping, friction, rnea, crba and frames. `bodies` contains the index of Condyle's body
+    for each joint of Pinocchio."""
     pair = Pair(theirs.name, theirs, ours, chains=None if bodies is None else [[body] for body in bodies])
     bodies = bodies or list(range(ours.nbodies))
     assert (ours.name, ours.nq, ours.nv) == (theirs.name, theirs.nq, theirs.nv)
@@ -171,7 +171,7 @@ def test_append_at_a_frame(name: str, frame: str) -> None:
     close("crba", condyle.crba(ours, data, q), pin.crba(theirs, their_data, q))
     assert np.array_equal(ours.limits.effort, np.where(theirs.upperEffortLimit > 1e30, np.inf, theirs.upperEffortLimit))
     prefixed = on.ours.append(None, arm.ours, prefix="tool_")
-    assert prefixed.names[on.ours.nbodies] == "tool_" + arm.ours.names[1]  # after the bodies already on the world
+    assert prefixed.names[on.ours.nbodies] == "tool_" + arm.ours.names[1]  # appended bodies come last
     with pytest.raises(condyle.ModelError, match="unknown frame"):
         on.ours.append("no such frame", arm.ours)
 
@@ -203,7 +203,8 @@ def test_by_name(name: str) -> None:
 
 
 def test_by_name_of_robot_descriptions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Tests with a fake of robot_descriptions, a package whose modules download the files of robots."""
+    """Tests loading a robot by its name in robot_descriptions, a package whose modules download robot files. The test
+    replaces the package by its own modules."""
     folder = tmp_path / "robot_descriptions"
     folder.mkdir()
     (tmp_path / "arm7.urdf").write_text(condyle.robots.ARM7, encoding="utf-8")

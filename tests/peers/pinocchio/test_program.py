@@ -1,7 +1,7 @@
-"""Tests the program for all robots of example-robot-data: `inspect` compared with Pinocchio, `check`, `budget`, and
-meshes.
+"""Tests the program `condyle` for all robots of example-robot-data: `inspect` compared with Pinocchio, `check`,
+`budget`, and meshes of `plan`.
 
-The tests use the program that cargo builds (as `cargo test` does), or the program that CONDYLE_PROGRAM names.
+The tests run the program that cargo builds, or the program that the environment variable CONDYLE_PROGRAM names.
 """
 
 import base64
@@ -40,8 +40,8 @@ QUADRUPEDS = {
     "go1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
     "hyq": ("foot", ["lf", "rf", "lh", "rh"], "{}_hfe_joint", "{}_kfe_joint", (0.7, -1.4), True),
 }
-"""Quadrupeds: suffix of the feet's names, names of the legs, joints of thigh and shank, angles of these joints, and
-whether the hind knees bend forwards."""
+"""Data of quadrupeds by name: the suffix of the feet's names, names of the legs, joints of thigh and shank, angles of
+these joints, and whether the hind knees bend forwards."""
 
 
 def phase(kind: str, knots: int, **numbers: object) -> str:
@@ -65,8 +65,8 @@ def plan(task: str, folder: Path) -> dict:
 
 
 def check_motion(name: str, motion: dict, ahead: float) -> None:
-    """Checks that the motion reaches its goal within Pinocchio's limits, and that each state is q ⊕ v Δt of the
-    previous state."""
+    """Checks that a planned motion reaches its goal within Pinocchio's limits, and that each position is q ⊕ v Δt of
+    the previous position q."""
     model = pin.buildModelFromUrdf(urdf_path(name), pin.JointModelFreeFlyer())
     q, v, tau = motion["q"], motion["v"], motion["tau"]
     assert abs(q[-1, 0] - q[0, 0] - ahead) < 0.03
@@ -166,7 +166,7 @@ def test_budget_in_contact(name: str) -> None:
 
 
 def on_terminal(*line: str) -> str:
-    """Returns the output that the program writes to a terminal."""
+    """Runs the program on a pseudo-terminal and returns its output."""
     leader, follower = os.openpty()
     environment = {**os.environ, "TERM": "xterm-256color"}
     with subprocess.Popen([str(PROGRAM), *line], stdout=follower, stderr=follower, env=environment) as process:
@@ -175,7 +175,7 @@ def on_terminal(*line: str) -> str:
         while True:
             try:
                 part = os.read(leader, 4096)
-            except OSError:  # on Linux, this error means that all writers have closed the terminal
+            except OSError:  # on Linux, this error means that the program has closed the terminal
                 part = b""
             if not part:
                 break
@@ -197,9 +197,9 @@ def test_colours_and_progress_are_for_terminals(command: str) -> None:
 
 
 MOST_TRIANGLES = 60_000
-"""Maximum number of triangles on a page, as `condyle plan --help` states it."""
+"""Maximum number of triangles on a page, as `condyle plan --help` states."""
 MESH_ROUNDING = 0.02
-"""Maximum difference between two boxes around a body: from the page's meshes and from the files. Relative to the
+"""Maximum difference between the bounding boxes of a body's meshes in the page and in the files, relative to the box's
 largest side.
 
 The program simplifies meshes by collapsing edges, and stores them with a resolution of 16 bits along a side.
@@ -233,8 +233,8 @@ def box_of_meshes(scene: dict, shapes: list[dict]) -> np.ndarray | None:
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name not in {*NO_URDF, *SINGULAR}])
 def test_meshes(name: str, tmp_path: Path) -> None:
-    """All meshes are found. The meshes of each body are at the same place as in Pinocchio, which reads them by
-    assimp."""
+    """Tests that the page contains all meshes, with the same bounding box of each body as in Pinocchio, which reads the
+    meshes by assimp."""
     model = pin.buildModelFromUrdf(urdf_path(name))
     if model.nv == 0:
         pytest.skip("on a fixed root nothing moves")

@@ -1,4 +1,5 @@
-"""Compares random robots with Pinocchio 4.1. They have every kind of joint of URDF, and every kind of root joint."""
+"""Compares random robots with Pinocchio 4.1. The robots have every kind of joint of URDF and every kind of root
+joint."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Compares all robots of example-robot-data with Pinocchio 4.1, from their plain URDF."""
+"""Compares all robots of example-robot-data with Pinocchio 4.1; both libraries read the same URDF."""
 
 import os
 
@@ -11,7 +11,7 @@ from example_robot_data.robots_loader import ROBOTS, getModelPath
 STATES = 3
 NO_URDF = {"cassie": "is an SDF file: see test_cassie.py"}
 SINGULAR = {"bravo7_gripper", "falcon_bravo7_gripper", "bluevolta_bravo7_gripper", "romeo"}
-"""Robots with massless bodies at the end of a limb, so that M has no inverse."""
+"""Names of robots with massless bodies at the end of a limb; their M has no inverse."""
 
 
 def urdf_path(name: str) -> str:
@@ -80,7 +80,7 @@ def test_forward_dynamics(pair: Pair) -> None:
 
 
 def test_batches(pair: Pair) -> None:
-    """Tests every function of a state in the lanes of a batch."""
+    """Tests every function with a batch of states, which are computed in SIMD lanes."""
     (state,) = pair.states(1, seed=50)
     state.in_batch = True
     checks.check_kinematics(state)
@@ -103,7 +103,7 @@ def test_configuration(pair: Pair) -> None:
 
 
 def test_armature(pair: Pair) -> None:
-    """Tests robots with armature. It makes M regular, even if a body has no mass."""
+    """Tests robots with armature, which makes M invertible even if a body has no mass."""
     armature = 0.1 + np.random.default_rng(0).random(pair.ours.nv)
     for state in pair.with_armature(armature).states(STATES):
         checks.check_inverse_dynamics(state)

@@ -1,4 +1,4 @@
-"""Tests `condyle.pinocchio`: the same code runs with it and with Pinocchio, and gives the same numbers."""
+"""Tests `condyle.pinocchio`: the same scripts run with this module and with Pinocchio, and give the same numbers."""
 
 import copy
 import doctest
@@ -25,7 +25,7 @@ Script = Callable[[ModuleType, Any, Any, Any, int], Any]
 
 
 class State:
-    """A state, and forces on all bodies."""
+    """State of a robot, and external forces on all bodies."""
 
     def __init__(self, model: condyle.Model) -> None:
         rng = np.random.default_rng(3)
@@ -187,8 +187,8 @@ def test_robots_that_are_built_in(name: str) -> None:
 
 
 def test_humanoid_of_random_numbers() -> None:
-    """The humanoid has the structure of Pinocchio's humanoid. Its derivatives, computed as in Pinocchio's examples,
-    equal Pinocchio's."""
+    """Tests that the sample humanoid has the same structure as Pinocchio's, and the same derivatives, computed as in
+    Pinocchio's examples."""
     np.random.seed(1)
     model = condyle.pinocchio.buildSampleModelHumanoidRandom()
     form = pinocchio.buildSampleModelHumanoidRandom()
@@ -240,8 +240,8 @@ def test_derivatives_of_kinematics() -> None:
 
 
 def test_inverse_kinematics() -> None:
-    """Solves for a target pose as in Pinocchio's examples. Steps and final position must be the same as in
-    Pinocchio."""
+    """Tests inverse kinematics to a target pose, as in Pinocchio's examples. The steps and the final position must be
+    the same as in Pinocchio."""
     found = []
     for pin in (condyle.pinocchio, pinocchio):
         model = pin.buildSampleModelManipulator()
@@ -382,7 +382,7 @@ def test_a_call_that_fails_leaves_no_state() -> None:
 
 
 def test_tutorial() -> None:
-    """Runs the tutorial with `condyle.pinocchio` and with Pinocchio."""
+    """Tests that the tutorial runs with `condyle.pinocchio` and with Pinocchio."""
     example = Path(__file__).parents[3] / "python" / "examples" / "coming_from_pinocchio.py"
     run = subprocess.run([sys.executable, example], capture_output=True, text=True, check=False, timeout=300)
     assert run.returncode == 0, run.stderr

@@ -1,4 +1,5 @@
-"""Tests that whole-body control with pyramids finds the same optimum as quadprog, for the same programs."""
+"""Tests that whole-body control with friction pyramids finds the same optimum as the solver quadprog, for the same
+quadratic programs."""
 
 import subprocess
 import sys
@@ -14,16 +15,16 @@ sys.path.insert(0, str(ROOT / "benches" / "peers"))
 from wholebody_programs import Program, read  # noqa: E402
 
 AGREEMENT = 1e-6
-"""Tolerance relative to 1 and the size of the compared numbers. quadprog is exact up to rounding, and Condyle's
-tolerance is 1e-9."""
+"""Tolerance, relative to 1 + the magnitude of the compared numbers. quadprog is exact up to rounding, and Condyle's
+solver has a tolerance of 1e-9."""
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Writes programs and Condyle's solutions for ticks of robots that stand, walk and trot while they are pushed.
-    Returns the folder."""
+    """Runs whole-body control of robots that stand, walk and trot while they are pushed. Writes the quadratic program
+    and Condyle's solution of each control step to a folder, and returns the folder."""
     folder = tmp_path_factory.mktemp("programs")
-    # With the features of the workspace, all dependencies are already compiled.
+    # `--workspace` selects the features with which all dependencies are already compiled.
     command = ["cargo", "bench", "--quiet", "--locked", "--workspace", "--profile", "dev", "--bench", "wholebody_peers"]
     command += ["--", "--ticks", "1600", "--window", "320", "--replays", "0", "--export", str(folder)]
     subprocess.run([*command, "humanoid", "quadruped"], cwd=ROOT, check=True)

@@ -1,5 +1,5 @@
-"""Writes random inertias, limits and armature into copies of all URDFs of example-robot-data. Pinocchio also reads the
-copies."""
+"""Tests writing random inertias, limits and armature into copies of all URDFs of example-robot-data. Condyle and
+Pinocchio must read the same robots from the copies."""
 
 from pathlib import Path
 
@@ -13,12 +13,12 @@ import condyle
 FOLDER = Path(getModelPath("a1_description"))
 FILES = sorted(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*.urdf"))
 SAME = 1e-11
-"""Tolerance of M and inertias, relative to the largest entry. Inertias are transformed between the frames of merged
-links."""
+"""Tolerance of M and inertias, relative to the largest entry. Rounding errors arise when inertias are transformed
+between the frames of merged links."""
 
 
 def other(inertia: condyle.Inertia, rng: np.random.Generator) -> condyle.Inertia:
-    """Returns another valid inertia for a body, with about the size of a limb."""
+    """Returns a random valid inertia, of about the size of a limb."""
     del inertia
     spread = 0.1 * rng.standard_normal((3, 3))
     moments = spread @ spread.T + 1e-3 * np.eye(3)

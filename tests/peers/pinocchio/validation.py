@@ -1,4 +1,4 @@
-"""Makes the table of all differences from Pinocchio, in Markdown, from the records of one test run."""
+"""Writes the tables of VALIDATION.md: all differences from Pinocchio that one test run recorded."""
 
 import platform
 import re
@@ -78,18 +78,18 @@ joint, with mimic joints, armature and external forces (`crates/dynamics/tests/s
 
 
 PUBLIC = re.compile(r"<!-- public robots -->.*<!-- end of public robots -->\n", re.DOTALL)
-"""Section of the file that `tests/peers/robots.py --table` writes."""
+"""Pattern of the section of VALIDATION.md that `tests/peers/robots.py --table` writes."""
 
 
 def kept(text: str) -> str:
-    """Returns the section on public robots, which another program writes into the file, with an empty line before
-    it."""
+    """Returns the section on public robots from the existing file, with an empty line before it. Another program writes
+    this section."""
     section = PUBLIC.search(text)
     return "\n" + section.group() if section else ""
 
 
 def report() -> str:
-    """Returns the text of the whole file."""
+    """Returns the text of VALIDATION.md without the section on public robots."""
     head = HEAD.format(
         command=COMMAND,
         ours=condyle.__version__,
@@ -108,12 +108,12 @@ def report() -> str:
 
 
 def derivatives() -> list[str]:
-    """Returns the output of the Rust tests on hand-written derivatives."""
+    """Runs the Rust tests of hand-written derivatives and returns their errors as rows of a table."""
     modules = ("derivatives", "second_order", "inputs", "motion_derivatives", "constrained_derivatives")
     command = ("cargo", "test", "--locked", "--package", "condyle-dynamics", "--test", "suite", "--", "--nocapture")
     output = subprocess.run((*command, *modules), check=True, stdout=subprocess.PIPE, text=True).stdout
     rows = set()
-    # If tests run on one thread, a test prints its name, and its output begins in the same line.
+    # If tests run on one thread, the test's name and its first line of output are in the same line.
     line = re.compile(r"^(?:test \S+ \.\.\. )?(.*[∂∇].*): (\S+) \(allowed (\S+)\)$", re.MULTILINE)
     for name, error, allowed in line.findall(output):
         way = "central differences" if float(allowed) >= 1e-6 else "the contraction" if "Σ" in name else "dual numbers"
@@ -122,7 +122,7 @@ def derivatives() -> list[str]:
 
 
 def robots() -> list[str]:
-    """Returns rows with all robots of example-robot-data, with remarks."""
+    """Returns the table of all robots of example-robot-data, with remarks."""
     lines = [
         "## Robots",
         "",
@@ -139,13 +139,13 @@ def robots() -> list[str]:
 
 
 def degrees(names: list[str]) -> str:
-    """Returns the smallest and the largest number of degrees of freedom of these robots."""
+    """Returns the smallest and the largest number of degrees of freedom of the given robots."""
     nvs = [comparison.sizes[name][3] for name in names] or [0]
     return f"{min(nvs)} to {max(nvs)}"
 
 
 def remarks(name: str) -> list[str]:
-    """Returns the special properties of a robot."""
+    """Returns remarks on the special properties of a robot."""
     found = []
     if name in test_robots.NO_URDF:
         found.append("an SDF with closed loops: its spanning tree, put together in Pinocchio")

@@ -21,14 +21,14 @@ import condyle
 
 
 class Warnings(logging.Handler):
-    """Handler that keeps Drake's warnings about the last file."""
+    """Log handler that stores the warnings of Drake about the last file."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.texts: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keeps the text of a warning."""
+        """Stores the text of a warning."""
         self.texts.append(record.getMessage())
 
 
@@ -37,12 +37,12 @@ logger = logging.getLogger("drake")
 logger.addHandler(warnings)
 logger.propagate = False
 REPLACED = ("While parsing inertia matrix", "While re-expressing as central inertia")
-"""Beginnings of warnings after which Drake uses another inertia than the file's."""
+"""Beginnings of Drake's warnings that it replaces an inertia of the file by another inertia."""
 TOLERANCE = 1e-10
 CONVERTED = 1e-8
 """Tolerance for SDFs before version 1.7. Drake converts them to a later version with rounded numbers."""
 UNLIMITED = 1e16
-"""Limit of position that means no limit: SDF's default, also common in URDFs."""
+"""Limit of position that means "no limit": the default of SDF, which is also common in URDFs."""
 LENGTHS = {
     "revolute": (1, 1),
     "prismatic": (1, 1),
@@ -53,7 +53,7 @@ LENGTHS = {
     "quaternion_floating": (7, 6),
     "weld": (0, 0),
 }
-"""Numbers of positions and of velocities, for the kinds of joints whose coordinates in Drake are known here."""
+"""Numbers of positions and of velocities of Drake's joints, for each joint type that this program can convert."""
 
 
 IRRELEVANT = {
@@ -66,8 +66,8 @@ elements."""
 
 
 class Copies:
-    """Copies of all SDFs below a folder, with the elements in `IRRELEVANT` removed, and a map of the copied packages
-    for Drake. Texts whose inertias depend on shapes are copied unchanged."""
+    """Copies of all SDFs below a folder, without the elements in `IRRELEVANT`, and Drake's map of the copied packages.
+    SDFs whose inertias depend on shapes are copied unchanged."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.place = folder, Path(tempfile.mkdtemp(prefix="robots-"))
@@ -87,7 +87,7 @@ class Copies:
                 copy.write_text(self.plain(path), encoding="utf-8")
 
     def of(self, path: Path) -> Path:
-        """Returns the path at which a file is copied, with a suffix that Drake knows."""
+        """Returns the path of a file's copy. The copy has a suffix that Drake recognises."""
         copy = self.place / path.relative_to(self.folder)
         return copy.with_name(copy.name + ".sdf") if copy.suffix == ".world" else copy
 
@@ -102,7 +102,7 @@ class Copies:
         except (ElementTree.ParseError, ValueError):
             return text
         for prefix, uri in re.findall(r"xmlns:(\w+)\s*=\s*[\"']([^\"']+)[\"']", text):
-            ElementTree.register_namespace(prefix, uri)  # Drake recognises its own elements by the prefix
+            ElementTree.register_namespace(prefix, uri)  # keep the prefixes of Drake's own elements
         for parent in list(tree.iter()):
             for child in list(parent):
                 if child.tag in IRRELEVANT:
@@ -132,7 +132,7 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
     try:
         parser.AddModels(str(copy if copy.exists() else path))
         plant.Finalize()
-    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # a failed assertion of Drake is a SystemExit
+    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # a failed assertion is a SystemExit
         raise RefusedError(str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__) from None
     if plant.num_bodies() < 2:
         raise RefusedError("no bodies")
@@ -140,7 +140,8 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
 
 
 def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLERANCE) -> Quantities:
-    """Compares all quantities that exist in both. The efforts of gravity are compared separately from other efforts."""
+    """Compares all quantities that exist in Condyle and in Drake. The efforts of gravity are compared separately from
+    other efforts."""
     found = Quantities(model, tolerance)
     if plant.num_velocities() != model.nv:
         if any("::" in frame.name for frame in model.frames) and model.nv < plant.num_velocities():
@@ -159,7 +160,7 @@ def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLE
     found.expect("total mass", model.total_mass, plant.CalcTotalMass(context))
     nq, nv = plant.num_positions(), plant.num_velocities()
     still = model.with_gravity([0.0, 0.0, 0.0])
-    falling = model.with_gravity(plant.gravity_field().gravity_vector())  # Drake ignores the gravity in the file
+    falling = model.with_gravity(plant.gravity_field().gravity_vector())  # Drake ignores the gravity of the file
     for seed in range(STATES):
         q, v = state_of(model, seed)
         state = there("drake", model, joints, q, v, nq, nv)
@@ -178,8 +179,8 @@ def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLE
 
 
 class Names:
-    """Joints, bodies or frames of a plant by name. A full name begins with the names of the models that contain the
-    object."""
+    """Joints, bodies or frames of Drake's plant, by name. A full name begins with the names of the models that contain
+    the object."""
 
     def __init__(self) -> None:
         self.all: dict[str, list[Any]] = {}
@@ -191,9 +192,9 @@ class Names:
         self.all.setdefault(around + name, []).append(thing)
 
     def find(self, name: str) -> list[Any]:
-        """Returns the objects that have a name of Condyle, in which names of the outermost models may be missing."""
+        """Returns the objects for a name in Condyle's model, which may lack the names of the outermost models."""
         ends = [full for full in self.all if f"::{full}".endswith(f"::{name}")]
-        if not ends:  # in Drake, a joint between nested models belongs to another model
+        if not ends:  # Drake assigns a joint between nested models to another model
             ends = [full for full in self.all if full.split("::")[-1] == name.split("::")[-1]]
             ends = ends if len(ends) == 1 else []
         return self.all[min(ends, key=len)] if ends else []
@@ -235,7 +236,8 @@ def matched(found: Quantities, plant: MultibodyPlant) -> list[Joint] | None:
 
 
 def limits(found: Quantities, joint: object, plant: MultibodyPlant, body: int) -> None:
-    """Compares limits of one coordinate. Effort is compared only if Drake has an actuator: it makes none for 0 N m."""
+    """Compares the limits of one coordinate. The effort limit is compared only if Drake has an actuator: Drake creates
+    no actuator for 0 N m."""
     model, limits = found.model, found.model.limits
     at, column = model.idx_qs[body], model.idx_vs[body]
     name = f"joint `{model.names[body]}`"
@@ -262,19 +264,19 @@ def springs(found: Quantities, plant: MultibodyPlant, context: object, q: np.nda
     plant.SetVelocities(context, np.zeros(nv))
     forces = MultibodyForces(plant)
     plant.CalcForceElementsContribution(context, forces)
-    weightless = found.model.with_gravity([0.0, 0.0, 0.0])  # in Drake, gravity acts on all links
+    weightless = found.model.with_gravity([0.0, 0.0, 0.0])  # Drake applies gravity to all links
     ours = condyle.passive_torque(weightless, q=q, v=np.zeros(found.model.nv), smoothing=1.0)
     found.expect("springs", ours, T.T @ forces.generalized_forces(), found.coordinate)
 
 
 def unlimited(numbers: object) -> np.ndarray:
-    """Returns limits with infinity in place of the numbers by which SDF means no limit."""
+    """Returns limits, in which infinity replaces the numbers that mean "no limit" in SDF."""
     limits = np.asarray(numbers, float)
     return np.where(np.abs(limits) >= UNLIMITED, np.sign(limits) * np.inf, limits)
 
 
 def frames(found: Quantities, plant: MultibodyPlant, context: object, q: np.ndarray) -> None:
-    """Compares frames that exist in both, by their names."""
+    """Compares the frames whose names exist in Condyle and in Drake."""
     bodies, others = Names(), Names()
     for body in (plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())):
         bodies.add(plant, body, body.name())

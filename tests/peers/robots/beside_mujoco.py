@@ -1,4 +1,5 @@
-"""Compares robots with MuJoCo. MJCFs have coordinates in the same order; for URDFs, joints are matched by name."""
+"""Compares robots with MuJoCo. For MJCFs, Condyle and MuJoCo order coordinates equally; for URDFs, joints are matched
+by name."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,8 +22,8 @@ KINDS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): {"revolute", "continuous"},
 }
 EASE = 1e12
-"""Speed over which Coulomb friction is smoothed. It removes friction from `passive_torque`, as friction is a constraint
-in MuJoCo."""
+"""Speed over which `passive_torque` smooths Coulomb friction. The speed is so large that friction is almost zero,
+because MuJoCo's passive forces contain no friction."""
 
 
 WARNED = (
@@ -40,7 +41,7 @@ WARNED = (
     ),
     ("the keyframes of the model", "keyframes of an attached model are left out, as a warning says", ("keyframes",)),
 )
-"""Words of warnings, and the quantities that differ because of these warnings."""
+"""Map from words of a warning to the quantities that differ because of the warned feature."""
 
 
 def read(path: Path) -> mujoco.MjModel:
@@ -52,7 +53,8 @@ def read(path: Path) -> mujoco.MjModel:
 
 
 def read_urdf(path: Path) -> mujoco.MjModel:
-    """Returns MuJoCo's model for a URDF without geometry. The geometry changes nothing and needs meshes."""
+    """Returns MuJoCo's model of a URDF without geometry, because geometry needs mesh files and has no effect on the
+    compared quantities."""
     try:
         tree = ElementTree.fromstring(path.read_bytes())
     except (ElementTree.ParseError, LookupError, ValueError) as error:
@@ -71,7 +73,7 @@ def read_urdf(path: Path) -> mujoco.MjModel:
 
 
 def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
-    """Compares a robot from an MJCF. Its coordinates are the same as MuJoCo's, one by one."""
+    """Compares a robot from an MJCF. Condyle's model and MuJoCo's model have the same coordinates in the same order."""
     found = Quantities(model, MESHES if mj.nmesh else TOLERANCE)
     if (mj.nq, mj.nv) != (model.nq, model.nv):
         found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {mj.nq}, {mj.nv}")
@@ -110,7 +112,8 @@ def weightless_moments(path: Path) -> bool:
 
 
 def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
-    """Compares a robot from a URDF. In MuJoCo the root link is fixed to the world, and joints are matched by name."""
+    """Compares a robot from a URDF. MuJoCo fixes the root link to the world. Joints of the two models are matched by
+    name."""
     model = without_rotors(model)
     found = Quantities(model, TOLERANCE)
     joints, bodies = [], {}
@@ -134,7 +137,7 @@ def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quanti
 
 
 def gravity(mj: mujoco.MjModel) -> np.ndarray:
-    """Returns the acceleration of free fall. It is zero if a flag disables gravity."""
+    """Returns MuJoCo's acceleration of gravity; zero if a flag disables gravity."""
     off = mj.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     return np.zeros(3) if off else mj.opt.gravity.copy()
 
@@ -172,13 +175,13 @@ def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: 
 
 
 def pose(found: Quantities, what: str, name: str, ours: np.ndarray, p: np.ndarray, R: np.ndarray) -> None:
-    """Compares one pose, with position p and rotation R in MuJoCo."""
+    """Compares a pose of Condyle with MuJoCo's position p and rotation R."""
     theirs = np.concatenate([R.reshape(3, 3), p[:, None]], 1)
     found.expect(what, ours[:3], theirs, lambda _: name)
 
 
 def frames(found: Quantities, mj: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, bodies: dict[int, int]) -> None:
-    """Compares frames: of all bodies that a joint carries, and of other bodies and sites that have a name."""
+    """Compares the frames of all bodies with a joint, and of all other bodies and sites with a name."""
     own = {(frame.name, frame.body): i for i, frame in enumerate(found.model.frames) if frame.kind == "link"}
     for i, body in bodies.items():
         name = found.model.body_names[i]
@@ -219,7 +222,7 @@ def positions(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> Non
 
 
 def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
-    """Compares gains and gears of actuators that have a name. A warning must name each actuator that Condyle's model
+    """Compares gains and gears of all actuators with a name. A warning must name each actuator that Condyle's model
     lacks."""
     ours = {actuator.name: actuator for actuator in found.model.actuators}
     warnings = " ".join(map(str, found.model.warnings))
@@ -228,7 +231,7 @@ def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
         if not name or not acts(mj, i) or mj.actuator_outnum[i] != 1:
             continue
         if name not in ours:
-            # the name of a replica is the original name with a number
+            # MuJoCo names a replica by the original name and a number
             if f"`{name}`" not in warnings and f"`{name.rstrip('0123456789')}`" not in warnings:
                 found.add("actuators", np.inf, f"actuator `{name}` is missing, without a warning")
             continue
@@ -242,7 +245,8 @@ def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
 
 
 def passive(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
-    """Compares springs, damping and gravity compensation. Friction (a constraint in MuJoCo) and fluids are left out."""
+    """Compares springs, damping and gravity compensation. Friction (a constraint in MuJoCo) and forces of fluids are
+    not compared."""
     model, data = found.model, mujoco.MjData(mj)
     if not mj.nv:
         return
@@ -259,7 +263,7 @@ def passive(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
 
 
 def keyframes(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
-    """Compares keyframes that have the same name."""
+    """Compares keyframes with the same name."""
     model = found.model
     for i in range(mj.nkey):
         name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_KEY, i)

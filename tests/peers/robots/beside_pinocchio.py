@@ -1,4 +1,4 @@
-"""Compares robots with Pinocchio, from URDF. Joints have the same names, order and coordinates."""
+"""Compares robots from URDFs with Pinocchio. Joints have the same names, order and coordinates in both libraries."""
 
 import os
 import tempfile
@@ -18,7 +18,7 @@ LARGEST = np.finfo(float).max
 
 @contextmanager
 def written() -> Iterator[list[str]]:
-    """Collects the text that is written to the standard error, also by libraries."""
+    """Captures the text that Python code and C++ libraries write to the standard error."""
     texts: list[str] = []
     before = os.dup(2)
     with tempfile.TemporaryFile() as file:
@@ -33,7 +33,7 @@ def written() -> Iterator[list[str]]:
 
 
 said: list[str] = [""]
-"""Errors in the last file that urdfdom reported and ignored."""
+"""Errors in the last file that Pinocchio's parser urdfdom reported and ignored."""
 
 
 def read(path: Path, root_joint: str | None) -> pin.Model:
@@ -49,7 +49,7 @@ def read(path: Path, root_joint: str | None) -> pin.Model:
 
 
 def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
-    """Compares all quantities that exist in both."""
+    """Compares all quantities that exist in Condyle and in Pinocchio."""
     rotors, model = model.armature, without_rotors(model)
     found = Quantities(model, TOLERANCE)
     if rotors.any():
@@ -59,7 +59,7 @@ def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
     if (theirs.nq, theirs.nv) != (model.nq, model.nv):
         found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {theirs.nq}, {theirs.nv}")
         return found
-    # If the file has its own `root_joint`, the joint above the root has another name in Condyle.
+    # If the file contains a joint named `root_joint`, Condyle gives the robot's root joint another name.
     own = 2 if model.joint_types[1:2] == ["free_flyer"] else 1
     if list(theirs.names)[own:] != model.names[own:] or list(theirs.parents) != model.parents:
         found.add("joints", np.inf, "names or parents")
@@ -96,7 +96,7 @@ def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
 
 
 def kind_of(kind: pin.FrameType) -> str:
-    """Returns Condyle's name for a kind of frame of Pinocchio."""
+    """Converts the type of a frame of Pinocchio to the name of Condyle's frame kind."""
     return {pin.FrameType.BODY: "link", pin.FrameType.OP_FRAME: "user"}.get(kind, "joint")
 
 
@@ -118,5 +118,5 @@ def limits(found: Quantities, theirs: pin.Model) -> None:
 
 
 def unlimited(numbers: np.ndarray) -> np.ndarray:
-    """Returns limits with infinity in place of the largest number."""
+    """Returns limits, in which infinity replaces the largest floating-point number."""
     return np.where(np.abs(numbers) == LARGEST, np.sign(numbers) * np.inf, numbers)

@@ -1,7 +1,7 @@
-"""One robot in Condyle and in a peer library: conversions of coordinates, and comparisons of quantities.
+"""Compares one robot in Condyle and in a peer library: converts coordinates and compares quantities.
 
-Here a prime marks the peer. Velocities are related by v' = T v, accelerations by a' = T a + Ṫ v, and efforts by τ = Tᵀ
-τ'. So M = Tᵀ M' T and h = Tᵀ (h' + M' Ṫ v).
+In formulas, a prime marks quantities of the peer library. Velocities are related by v' = T v, accelerations by a' = T
+a + Ṫ v, and efforts by τ = Tᵀ τ'. So M = Tᵀ M' T and h = Tᵀ (h' + M' Ṫ v).
 """
 
 from collections.abc import Callable
@@ -15,20 +15,20 @@ from condyle import conventions
 
 Array = NDArray[np.float64]
 UNLIMITED = 2.0
-"""Positions without limits are drawn from −2 to 2."""
+"""Bound of random positions without limits: they are between −2 and 2."""
 STATES = 2
 
 
 class RefusedError(Exception):
-    """The peer does not read the robot."""
+    """Error: the peer library does not read the robot."""
 
 
 class UnlikeError(Exception):
-    """The peer reads the robot, but it cannot be compared, for the given reason."""
+    """Error: the peer library reads the robot, but a comparison is impossible for the given reason."""
 
 
 class Joint(NamedTuple):
-    """A joint of Condyle, and the indices of its coordinates in the peer."""
+    """Joint of Condyle, with the indices of its coordinates in the peer library."""
 
     body: int
     q: int
@@ -38,18 +38,18 @@ class Joint(NamedTuple):
 
 
 class There(NamedTuple):
-    """A state in the coordinates of a peer."""
+    """State in the coordinates of a peer library."""
 
     q: Array
     v: Array
     T: Array
     """Matrix T from Condyle's velocities to the peer's velocities, (nv', nv)."""
     drift: Array
-    """Ṫ v, nv' numbers."""
+    """Product Ṫ v (nv' numbers), with the time derivative of T."""
 
 
 class Difference(NamedTuple):
-    """A quantity that differs, with the size of the difference."""
+    """Quantity that differs between Condyle and a peer library, with the size of the difference."""
 
     quantity: str
     size: float
@@ -58,7 +58,7 @@ class Difference(NamedTuple):
 
 
 def without_rotors(model: condyle.Model) -> condyle.Model:
-    """Returns the model without armature. From a URDF, no peer except Drake reads armature."""
+    """Returns the model without armature, because only Drake reads armature from a URDF."""
     return model.with_armature(np.zeros(model.nv)) if model.armature.any() else model
 
 
@@ -76,13 +76,13 @@ def state_of(model: condyle.Model, seed: int) -> tuple[Array, Array]:
 
 
 def turned(angle: float) -> Array:
-    """Returns the rotation matrix of a plane by this angle."""
+    """Returns the 2 × 2 matrix of a rotation by an angle."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
 
 
 def block(library: str, kind: str, q: Array, v: Array) -> tuple[Array, Array, Array]:
-    """Returns position, T and Ṫ v of one joint in the coordinates of a library."""
+    """Returns position, T and Ṫ v of one joint in the coordinates of a peer library."""
     same = np.eye(len(v)), np.zeros(len(v))
     if library == "pinocchio":
         return q, *same
@@ -129,7 +129,7 @@ def there(library: str, model: condyle.Model, joints: list[Joint], q: Array, v: 
 
 
 class Quantities:
-    """Differences between Condyle and one peer for one robot."""
+    """Differences between Condyle and one peer library for one robot."""
 
     def __init__(self, model: condyle.Model, tolerance: float) -> None:
         self.model, self.tolerance = model, tolerance
@@ -137,10 +137,10 @@ class Quantities:
         self.differences: dict[str, Difference] = {}
         self.compared: set[str] = set()
         self.left_out: dict[str, str] = {}
-        """Reason why a quantity is not compared, by the name of the quantity."""
+        """Map from the names of quantities to the reasons why they are not compared."""
 
     def leave_out(self, why: str, *quantities: str) -> None:
-        """Leaves quantities out of the comparison. The table of results shows the reason."""
+        """Excludes quantities from the comparison. The table of results shows the reason."""
         self.left_out |= dict.fromkeys(quantities, why)
 
     def expect(self, quantity: str, ours: Any, theirs: Any, where: Callable[[int], str] | None = None) -> None:
@@ -166,8 +166,8 @@ class Quantities:
             self.add(quantity, float(error.flat[worst]), f"{name}{a.flat[worst]:.9g}, theirs {b.flat[worst]:.9g}")
 
     def spoken(self, *words: str, held: bool = False) -> None:
-        """Records a difference, unless `held` (the model contains the feature) or a warning contains one of the
-        words."""
+        """Records a difference for a feature, unless `held` is true (the model contains the feature) or a warning
+        contains one of the words."""
         warnings = " ".join(map(str, self.model.warnings))
         self.compared.add(f"{words[0]}: held or said")
         if not held and not any(word in warnings for word in words):
@@ -195,7 +195,7 @@ class Quantities:
         return f"coordinate {i}"
 
     def inertia(self, q: Array, v: Array, state: There, M: Array, h: Array) -> None:
-        """Compares M and the bias with the peer's M and h."""
+        """Compares M and the bias efforts h with the peer library's M and h."""
         model, T = self.model, state.T
         self.expect("M", condyle.crba(model, self.data, q), T.T @ M @ T, self.coordinate)
         bias = T.T @ (h + M @ state.drift)

@@ -1,4 +1,5 @@
-"""Finds robot files below a folder. The root element gives the format; fragments are recognised."""
+"""Finds robot files below a folder. The root element of a file determines its format. Files that are only a part of a
+robot are marked."""
 
 import re
 from collections.abc import Iterator
@@ -8,7 +9,7 @@ from typing import NamedTuple
 
 SUFFIXES = {".xml", ".urdf", ".sdf", ".world", ".mjcf"}
 ROOTS = {"robot": "urdf", "sdf": "sdf", "gazebo": "sdf", "mujoco": "mjcf", "mujocoinclude": "mjcf"}
-"""Format for each name of a root element. `gazebo` is the root element of SDF 1.0 to 1.2."""
+"""Map from the name of a root element to the format. `gazebo` is the root element of SDF 1.0 to 1.2."""
 XACRO = re.compile(r"<xacro:|\$\((?:find|arg|optenv|env|dirname|eval) |\$\{")
 COMMENTS = re.compile(r"<!--.*?-->", re.DOTALL)
 ROOT = re.compile(r"<(?![?!])\s*([\w:.-]+)")
@@ -16,7 +17,7 @@ INCLUDED = re.compile(r"<include\b[^>]*\bfile\s*=\s*[\"']([^\"']+)[\"']")
 
 
 class Robot(NamedTuple):
-    """A file that may describe a robot."""
+    """File that may describe a robot."""
 
     path: Path
     format: str
@@ -24,13 +25,13 @@ class Robot(NamedTuple):
     collection: str
     """Name of the collection: `owner/repository`, or the first part of the path below the root folder."""
     fragment: str
-    """Reason why the file alone is no robot; empty for a robot."""
+    """Reason why the file alone does not describe a robot; empty if it does."""
     included: bool
     """Whether another file includes this file."""
 
 
 def text_of(path: Path) -> str:
-    """Returns the text of a file. The file may declare that it is in UTF-16 or Latin-1."""
+    """Returns the text of a file in UTF-8 or UTF-16. Bytes that are not valid UTF-8 (as in Latin-1) are replaced."""
     data = path.read_bytes()
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", "replace")
@@ -38,13 +39,13 @@ def text_of(path: Path) -> str:
 
 
 def format_of(text: str) -> str | None:
-    """Returns the format of a file, from its root element; None for other files."""
+    """Returns the format of a file, from its root element; None if the file has no known root element."""
     root = ROOT.search(COMMENTS.sub("", text))
     return ROOTS.get(root.group(1)) if root else None
 
 
 def fragment(text: str, kind: str) -> str:
-    """Returns the reason why a file alone is no robot; empty if it may be a robot."""
+    """Returns the reason why a file alone does not describe a robot; empty if it may describe a robot."""
     bare = COMMENTS.sub("", text)
     if kind == "mjcf":
         if "<mujocoinclude" in bare:
@@ -65,8 +66,8 @@ def fragment(text: str, kind: str) -> str:
 
 
 def collection(folder: Path, path: Path) -> str:
-    """Returns the name of the repository for a path `…/owner+repository/…`, otherwise the first folders below the
-    root."""
+    """Returns the name of the repository if a folder of the path is `owner+repository`, otherwise the first folders
+    below the root."""
     parts = path.relative_to(folder).parts
     for part in (*folder.parts[-2:], *parts):
         if "+" in part and not part.endswith(tuple(SUFFIXES)):
@@ -94,7 +95,7 @@ def find(folder: Path, only: str | None = None) -> list[Robot]:
 
 
 def walk(folder: Path) -> Iterator[Path]:
-    """Yields the files whose suffix may be a robot's, in order."""
+    """Yields the files with a suffix of robot files, ordered by path."""
     for path in sorted(folder.rglob("*")):
         if path.suffix.lower() in SUFFIXES and path.is_file():
             yield path

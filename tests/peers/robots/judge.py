@@ -1,4 +1,4 @@
-"""Gives a verdict on one file: Condyle is compared with every peer that reads the file."""
+"""Computes the verdict on one robot file: compares Condyle with every peer library that reads the file."""
 
 import re
 from collections.abc import Callable
@@ -21,33 +21,33 @@ except ImportError:  # `./test` does not install Drake
 
 @cache
 def packages(folder: Path) -> list[Path]:
-    """Returns the folders below a folder that contain packages or models."""
+    """Returns the subfolders of a folder that contain packages or models."""
     marks = (mark for name in ("package.xml", "model.config") for mark in folder.rglob(name))
     return sorted({mark.parent.parent for mark in marks})
 
 
 def prepare(folder: Path) -> None:
-    """Does the work that all files need, once, before processes are forked."""
+    """Prepares data that the comparisons of all files share. It is called once, before processes are forked."""
     packages(folder)
     if beside_drake is not None:
         beside_drake.copies(folder)
 
 
 class Verdict(NamedTuple):
-    """Result for one file."""
+    """Result of the comparison for one file."""
 
     verdict: str
     """Verdict: `equal`, `different`, `refused`, `only ours`, `nobody`, `fragment` or `crash`."""
     warnings: list[str]
     error: str
-    """Error of Condyle; empty if Condyle read the file."""
+    """Error that Condyle reported; empty if Condyle read the file."""
     peers: dict[str, str]
-    """For each peer, `equal`, `different`, or the reason why there is no comparison."""
+    """Map from the name of a peer library to `equal`, `different`, or the reason why no comparison was made."""
     differences: dict[str, list[Difference]]
-    """Differences, by the name of the peer."""
+    """Map from the name of a peer library to the differences."""
     compared: list[str]
     left_out: dict[str, list[str]]
-    """Reasons why quantities were not compared, by the name of the peer."""
+    """Map from the name of a peer library to the reasons why quantities were not compared."""
 
 
 FREE = "free_flyer"
@@ -59,7 +59,7 @@ def nv(plant: Any) -> int:
 
 
 class Trial:
-    """Trial of one file by Condyle and the peers."""
+    """Comparison of one file by Condyle and the peer libraries."""
 
     def __init__(self, robot: Robot, folder: Path) -> None:
         self.robot, self.folder = robot, folder
@@ -86,8 +86,8 @@ class Trial:
         return model
 
     def chosen(self, roots: tuple[str | None, ...], nv: int | None) -> condyle.Model | None:
-        """Returns Condyle's model with the first root joint that gives nv degrees of freedom. If no root joint does,
-        returns any model."""
+        """Returns Condyle's model with nv degrees of freedom: tries one root joint after another. If no root joint
+        gives nv degrees of freedom, returns the model with any root joint."""
         tried = [self.ours(root) for root in roots]
         models = [model for model in tried if not isinstance(model, str)]
         if not models:
@@ -110,7 +110,8 @@ class Trial:
         roots: tuple[str | None, ...] = (None,),
         nv: Callable[[Any], int] | None = None,
     ) -> None:
-        """Compares with one peer. If several root joints are given, takes the first one with the peer's nv."""
+        """Compares with one peer library. If several root joints are given, uses the first root joint that gives the
+        same nv as in the peer library."""
         try:
             theirs = read()
         except RefusedError as error:
@@ -133,7 +134,7 @@ class Trial:
             self.differences[peer] = sorted(found.differences.values(), key=lambda d: -d.size)
 
     def verdict(self) -> Verdict:
-        """Runs all comparisons and returns the verdict that they give together."""
+        """Runs all comparisons and returns the verdict."""
         if self.robot.fragment:
             return Verdict("fragment", [], self.robot.fragment, {}, {}, [], {})
         {"mjcf": self.mjcf, "urdf": self.urdf, "sdf": self.sdf}[self.robot.format]()
@@ -155,12 +156,13 @@ class Trial:
         return Verdict(verdict, self.warnings, error, self.peers, self.differences, compared, self.left_out)
 
     def mjcf(self) -> None:
-        """Compares with MuJoCo, which defined this format."""
+        """Compares an MJCF with MuJoCo, which defined the format."""
         path = self.robot.path
         self.beside("MuJoCo", lambda: beside_mujoco.read(path), beside_mujoco.compare_mjcf)
 
     def urdf(self) -> None:
-        """Compares with Pinocchio and Drake with a free root, and with MuJoCo with a fixed root."""
+        """Compares a URDF with Pinocchio and Drake (the root link moves freely), and with MuJoCo (the root link is
+        fixed)."""
         path, folder = self.robot.path, self.folder
         self.beside("Pinocchio", lambda: beside_pinocchio.read(path, FREE), beside_pinocchio.compare, (FREE,))
         if beside_drake is not None:
@@ -168,7 +170,7 @@ class Trial:
         self.beside("MuJoCo", lambda: beside_mujoco.read_urdf(path), partial(beside_mujoco.compare_urdf, path))
 
     def sdf(self) -> None:
-        """Compares with Drake."""
+        """Compares an SDF with Drake."""
         path, folder = self.robot.path, self.folder
         if beside_drake is not None:
             old = re.search(r"<(?:sdf|gazebo)[^>]*version\s*=\s*[\"']1\.[0-6]\b", text_of(path))

@@ -1,8 +1,8 @@
-"""Computes limits of effort from MuJoCo's actuators, with the numbers of MuJoCo's compiled model.
+"""Computes the limits of joint efforts from the actuators of MuJoCo's compiled model.
 
 An actuator gives the force f = gain · a + bias with the activation a. If gain and bias are constant, the range of a
-bounds f. `forcerange` always bounds f. The effort of a joint is the sum of moment · f over its actuators, within its
-`actuatorfrcrange`.
+bounds f. `forcerange` always bounds f. The effort of a joint is the sum of moment · f over its actuators, clipped to
+the joint's `actuatorfrcrange`.
 """
 
 import mujoco
@@ -32,7 +32,8 @@ FILTERS = (DYN_FILTER, DYN_FILTEREXACT)
 
 
 def efforts(mj: mujoco.MjModel) -> np.ndarray:
-    """Returns the least and the greatest effort of each coordinate, (nv, 2); NaN if the effort is unknown here."""
+    """Returns the least and the greatest effort of each coordinate, (nv, 2); NaN if this program cannot compute the
+    effort."""
     sums: dict[int, Range] = {}
     alone = [int(mj.actuator_trnid[i, 0]) for i in range(mj.nactuator) if mj.actuator_trntype[i] == TRN_TENDON]
     for i in range(mj.nactuator):
@@ -60,19 +61,19 @@ def efforts(mj: mujoco.MjModel) -> np.ndarray:
 
 
 def acts(mj: mujoco.MjModel, i: int) -> bool:
-    """Returns whether an actuator is not disabled."""
+    """Returns whether an actuator is enabled."""
     group = int(mj.actuator_group[i])
     off = mj.opt.disableflags & DSBL_ACTUATION
     return not off and not (0 <= group < 31 and mj.opt.disableactuator & (1 << group))
 
 
 def clip(force: Range, limits: Range) -> Range:
-    """Returns the range of a force after it is clipped to limits."""
+    """Returns a range of force, clipped to limits."""
     return np.clip(force, limits[0], limits[1])
 
 
 def times(moment: float, force: Range) -> Range:
-    """Returns the range of moment · force."""
+    """Returns the range of moment · force for a range of force."""
     return np.zeros(2) if moment == 0.0 else np.sort(moment * force)
 
 
@@ -91,7 +92,8 @@ def constant(mj: mujoco.MjModel, i: int) -> Range:
 
 
 def activation(mj: mujoco.MjModel, i: int) -> Range:
-    """Returns the range of the activation: the range of the control, or the limits of its integral."""
+    """Returns the range of the activation. This is the range of the control or, for an actuator that integrates its
+    control, the range of the integral."""
     k = int(mj.actuator_ctrladr[i])
     control = mj.actuator_ctrlrange[k] if mj.actuator_ctrllimited[k] else ALL
     limit = mj.actuator_actrange[i] if mj.actuator_actlimited[i] else ALL
@@ -105,7 +107,7 @@ def activation(mj: mujoco.MjModel, i: int) -> Range:
 
 
 def moments(mj: mujoco.MjModel, i: int) -> list[tuple[int, float]]:
-    """Returns coordinates on which an actuator acts with a constant moment, each with this moment."""
+    """Returns the coordinates on which an actuator acts with a constant moment, and the moment of each coordinate."""
     gear, target = mj.actuator_gear[mj.actuator_outadr[i]], int(mj.actuator_trnid[i, 0])
     kind = mj.actuator_trntype[i]
     if kind in (TRN_JOINT, TRN_JOINTINPARENT):
@@ -114,7 +116,7 @@ def moments(mj: mujoco.MjModel, i: int) -> list[tuple[int, float]]:
             return [(column, gear[0])]
         if kind == TRN_JOINTINPARENT:
             return []
-        # The force on a free joint is along the world's axes, and the moment is along the body's axes.
+        # For a free joint, the force is along the world's axes and the moment is along the body's axes.
         axes = range(3) if joint == JNT_BALL else range(3, 6)
         return [(column + k, gear[k]) for k in axes if gear[k]]
     if kind == TRN_TENDON:

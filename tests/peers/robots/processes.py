@@ -1,4 +1,4 @@
-"""Judges files one by one in forked processes, each with a time limit and a memory limit."""
+"""Computes the verdicts on files, each in a forked process with a time limit and a memory limit."""
 
 import multiprocessing
 import os
@@ -14,15 +14,15 @@ from files import Robot
 from judge import Trial, Verdict, prepare
 
 MEMORY = 8 << 30
-"""Maximum address space of a process, in bytes. A process that exceeds it ends."""
+"""Maximum address space of a process, in bytes. A process that exceeds this limit is ended."""
 
 
 def child(robot: Robot, folder: Path, pipe: Connection) -> None:
-    """Judges one file without any output on the terminal."""
+    """Computes the verdict on one file without any output on the terminal."""
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     os.dup2(silent, 2)
-    os.chdir(tempfile.gettempdir())  # MuJoCo writes a log into the current folder
+    os.chdir(tempfile.gettempdir())  # MuJoCo writes a log file into the current folder
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     try:
         verdict = Trial(robot, folder).verdict()
@@ -69,7 +69,7 @@ def run(robots: list[Robot], folder: Path, jobs: int, seconds: float) -> list[tu
 
 
 def ended(code: int | None) -> str:
-    """Returns how a process ended."""
+    """Returns a text that states how a process ended."""
     return f"ended by {signal.Signals(-code).name}" if code and code < 0 else f"ended with exit status {code}"
 
 

@@ -1,4 +1,4 @@
-"""Makes tables of verdicts: one table is printed, and another one is committed."""
+"""Makes two tables of verdicts: one for the terminal, and one for the file VALIDATION.md."""
 
 import platform
 import re
@@ -22,7 +22,8 @@ MEANING = {
 }
 NAMES = {"mjcf": "MJCF", "sdf": "SDF", "urdf": "URDF"}
 BEGIN, END = "<!-- public robots -->", "<!-- end of public robots -->"
-"""Marks around the section that `--table` writes. The program that writes the rest of the file keeps the section."""
+"""Marks around the section of VALIDATION.md that `--table` writes. The program that writes the rest of the file keeps
+this section."""
 
 HEAD = """## Public robots
 
@@ -42,7 +43,7 @@ robots with a warning. *Refused* are read by a peer. *Alone* are read here and b
 
 
 class Kinds(NamedTuple):
-    """Messages of one sort, such as warnings, counted by kind."""
+    """Messages of one sort (such as warnings), counted by kind."""
 
     name: str
     counts: Counter[str]
@@ -104,7 +105,7 @@ def counted(results: Results) -> str:
 
 
 def summary(results: Results) -> str:
-    """Returns the table that is printed."""
+    """Returns the table of verdicts for the terminal."""
     parts = [counted(results)]
     for format_ in sorted({robot.format for robot, _ in results}):
         for name, counts, examples in kinds(results, format_):
@@ -115,7 +116,7 @@ def summary(results: Results) -> str:
 
 
 def listing(results: Results) -> str:
-    """Returns each file with its verdict and details."""
+    """Returns a list of all files, each with its verdict and details."""
     lines = []
     for robot, verdict in results:
         lines.append(f"{verdict.verdict:10} {robot.path}")
@@ -129,7 +130,7 @@ def listing(results: Results) -> str:
 
 
 def table(results: Results, commits: dict[str, str], command: str, tolerances: str) -> str:
-    """Returns the section that is committed, as Markdown."""
+    """Returns the section of VALIDATION.md on public robots, as Markdown."""
     names = ("condyle", "mujoco", "pin", "drake")
     versions = {name: installed(name) for name in names}
     lines = [HEAD.format(command=command, python=platform.python_version(), tolerances=tolerances, **versions)]
@@ -152,7 +153,7 @@ def table(results: Results, commits: dict[str, str], command: str, tolerances: s
 
 
 def row(collection: str, commit: str, format_: str, rows: Results) -> str:
-    """Returns the row of one collection, with its numbers of files."""
+    """Returns the table row of one collection: the number of files for each verdict."""
     verdicts = Counter(verdict.verdict for _, verdict in rows)
     warned = sum(bool(verdict.warnings) for _, verdict in rows if verdict.verdict == "equal")
     different = verdicts["different"] + verdicts["crash"]
@@ -162,7 +163,7 @@ def row(collection: str, commit: str, format_: str, rows: Results) -> str:
 
 
 def short(path: Path) -> str:
-    """Returns the end of a path, beginning with the repository."""
+    """Returns the last components of a path, from the repository's name on."""
     parts = path.parts
     start = next((i for i, part in enumerate(parts) if "+" in part), max(0, len(parts) - 3))
     return f"`{parts[start].replace('+', '/', 1)}` `{'/'.join(parts[start + 1 :])}`"
@@ -182,7 +183,7 @@ def installed(name: str) -> str:
 
 
 def put(path: Path, section: str) -> None:
-    """Puts the section into a file. It replaces an existing section, otherwise it is appended."""
+    """Writes the section into a file: it replaces an existing section, or is appended."""
     text = path.read_text(encoding="utf-8") if path.exists() else ""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END + "\n")

@@ -1,4 +1,5 @@
-"""Tests verdicts on small robots that are equal, different or refused, on fragments, and on files that never end."""
+"""Tests verdicts on small robots that are equal, different or refused, on files that are only a part of a robot, and on
+files that a reader never finishes."""
 
 import os
 import signal
@@ -30,7 +31,7 @@ URDF = f"""<robot name="r">{LINK.format("a")}{LINK.format("b")}<joint name="j" t
 
 
 def judged(folder: Path, name: str, text: str) -> judge.Verdict:
-    """Writes a file and judges it in the present process."""
+    """Writes a robot file and computes its verdict in the test's own process."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / name).write_text(text, encoding="utf-8")
     (robot,) = files.find(folder, name)
@@ -80,7 +81,7 @@ def test_part(tmp_path: Path, name: str, text: str) -> None:
 
 
 def test_files(tmp_path: Path) -> None:
-    """Formats follow from root elements, and collections follow from folders."""
+    """Tests that the root element of a file determines its format, and its folders determine its collection."""
     here = tmp_path / "owner+repository" / "models"
     here.mkdir(parents=True)
     (here / "a.xml").write_text("<!-- <sdf> --><robot name='r'><link name='a'/></robot>")
@@ -107,20 +108,20 @@ def test_crash_and_time_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_efforts() -> None:
-    """Tests sums of efforts over actuators within the joint's range. The control limits a motor, and the force limits a
-    servo."""
+    """Tests that the effort limit of a joint is the sum over its actuators, clipped to the joint's range. The range of
+    the control limits a motor, and `forcerange` limits a servo."""
     text = """<mujoco><worldbody><body>
         <joint name="x" type="slide" axis="1 0 0" actuatorfrcrange="-30 8"/><joint name="y" type="slide" axis="0 1 0"/>
         <joint name="z" type="slide" axis="0 0 1"/><geom size="1"/></body></worldbody><actuator>
         <motor joint="x" ctrlrange="-1 2" gear="-10"/><position joint="x" kp="5" forcerange="-3 4" gear="2"/>
         <motor joint="y" ctrlrange="-1 2" forcerange="-9 1"/><velocity joint="z"/></actuator></mujoco>"""
     found = efforts(MjModel.from_xml_string(text))
-    # Joint x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], clipped to [−30, 8].
+    # Effort range of joint x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], clipped to [−30, 8].
     assert found.tolist() == [[-26.0, 8.0], [-1.0, 1.0], [-float("inf"), float("inf")]]
 
 
 def test_efforts_of_a_plugin() -> None:
-    """The force of a plugin is within `forcerange`, whatever the control is."""
+    """Tests that `forcerange` limits the force of a plugin, whatever the control is."""
     text = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="9"/></instance>
         </plugin></extension><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody><actuator>
         <plugin joint="j" plugin="mujoco.pid" instance="p" ctrlrange="-1 1" forcerange="-5 3"/></actuator></mujoco>"""
@@ -135,7 +136,7 @@ def test_efforts_of_a_plugin() -> None:
     ],
 )
 def test_flags(tmp_path: Path, flag: str) -> None:
-    """A model lacks the features that a flag disables, as in MuJoCo."""
+    """Tests that a model lacks the features that a flag disables, as in MuJoCo."""
     joint = "<joint name='{0}' axis='0 1 0' range='-10 20' frictionloss='1' damping='2' stiffness='3' springref='9'/>"
     bodies = "".join(f"<body pos='{k} 0 0' gravcomp='1'>{joint.format(k)}<geom size='.1'/></body>" for k in (1, 2))
     text = f"""<mujoco><option><flag {flag}="disable"/></option><worldbody>{bodies}</worldbody>
@@ -149,7 +150,7 @@ def test_flags(tmp_path: Path, flag: str) -> None:
 
 
 def test_section_of_a_file(tmp_path: Path) -> None:
-    """A new section is put at the end of the file, and replaces an existing section."""
+    """Tests that a section is appended to a file, or replaces an existing section."""
     path = tmp_path / "V.md"
     path.write_text("# Title\n")
     report.put(path, f"{report.BEGIN}\none\n{report.END}\n")
