@@ -67,8 +67,8 @@ def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
 
 
 def used(said: str, kernel: str) -> tuple[int, int, int]:
-    """Returns, for a thread of a kernel, the number of registers, the bytes of its stack, and the bytes that it moves
-    between registers and memory because registers are missing."""
+    """Returns, for a thread of a kernel, the number of registers and the bytes of the thread's stack. Also returns the
+    bytes that the thread moves between registers and memory because it has too few registers."""
     found = {entry: (int(registers), int(stack or 0)) for entry, registers, stack in USED.findall(said)}
     if kernel not in found:
         sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")
@@ -76,8 +76,8 @@ def used(said: str, kernel: str) -> tuple[int, int, int]:
 
 
 def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
-    """Returns, for each partition of a kernel, the number of instructions, and the bytes that it moves between
-    registers and the thread's local memory."""
+    """Returns, for each partition of a kernel, the number of instructions, and the bytes that the partition moves
+    between registers and the thread's local memory."""
     with NamedTemporaryFile(suffix=".cubin") as file:
         file.write(cubin)
         file.flush()

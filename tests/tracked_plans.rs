@@ -43,8 +43,8 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
     let plan = plan_of(robot, &solution, &times, &touches, 0.02).unwrap();
     let contact_gains = Gains { stiffness: 0.0, damping };
     // The weight of contact forces in the objective is large enough to determine the load of each foot despite rounding
-    // errors. The solver's tolerance is in the solver's own units. With this value, the duality gap is small compared
-    // with 1 in units of the objective.
+    // errors. The solver scales its program, and the tolerance applies to the scaled program. With a tolerance of
+    // 1e-11, the duality gap is small compared with 1 in units of the objective.
     let settings = Settings { contact_gains, force_weight: 1e-5, tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(robot, contacts, tasks, settings).unwrap();
     let x0 = &solution.x(0)[..robot.nq()];

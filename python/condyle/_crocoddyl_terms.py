@@ -75,8 +75,8 @@ class Drives:
         return np.array(data.tau), np.array(data.dtau_du, float).reshape(shape), np.array(data.dtau_dx, float)
 
     def given(self) -> _Array | None:
-        """Returns the argument `actuation` for Condyle's actions: S, or None if each joint except a free-flyer at the
-        root has a control.
+        """Returns the argument `actuation` for Condyle's actions: the actuation matrix S, or None if each joint except
+        a free-flyer at the root has a control.
         """
         return None if self.usual else self.matrix
 

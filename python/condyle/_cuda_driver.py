@@ -284,8 +284,8 @@ class Function:
         return value.value
 
     def launch(self, stream: int, n: int, addresses: Sequence[int]) -> None:
-        """Launches one thread per state; or several threads per state, one for each partition, if all these threads fit
-        on the device at the same time.
+        """Launches the kernel. If one thread for each partition of each state fits on the device at the same time,
+        launches these threads. Otherwise launches one thread per state.
 
         For few states, blocks are smaller than the size that is optimal for many states, so that all multiprocessors
         have work.

@@ -39,7 +39,8 @@ def _number(value: Any) -> HyperDual:
 
 
 def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Computes the value f(x) and the exact Jacobian ∂f(x ⊕ δ)/∂δ, as `(value, J)`: m numbers, and (m, nv + others).
+    """Computes the value f(x), a vector of m numbers, and the exact Jacobian J = ∂f(x ⊕ δ)/∂δ, as `(value, J)`. J has m
+    rows and nv + k columns, where k is the number of entries of x after the position.
 
     x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
     f: a function that takes an array like x, of `HyperDual`s, and returns a vector. f is called once for every two
@@ -64,7 +65,8 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
 
 
 def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64]]:
-    """Computes the value f(x) and the exact gradient ∂f(x ⊕ δ)/∂δ, as `(value, gradient)`: a number, and nv + others.
+    """Computes the value f(x), a number, and the exact gradient ∂f(x ⊕ δ)/∂δ, as `(value, gradient)`. The gradient has
+    nv + k numbers, where k is the number of entries of x after the position.
 
     x: as for `jacobian`. f returns a number, and is called once for every two directions.
 
@@ -81,7 +83,8 @@ def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np
 def hessian(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
     """Computes the value f(x), and exact gradient and Hessian ∂²f(x ⊕ δ)/∂δ∂δ, as `(value, gradient, H)`.
 
-    x: as for `jacobian`. f returns a number, and is called once for every pair of directions, n (n + 1)/2 times.
+    x: as for `jacobian`. f returns a number. f is called once for every pair of the n directions of δ, n (n + 1)/2
+    times.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q = condyle.Data(arm), [0.3] * 7

@@ -72,17 +72,20 @@ class Inertia(NamedTuple):
 
     @classmethod
     def from_ellipsoid(cls, mass: float, radii: ArrayLike) -> "Inertia":
-        """Returns the inertia of a solid ellipsoid about its centre, with half axes `radii`: m/5 (b² + c²)."""
+        """Returns the inertia of a solid ellipsoid with half axes `radii` about its centre. The moment about a half
+        axis is m/5 (b² + c²), where b and c are the other two."""
         return _solid(mass, _others(_lengths("radii", radii, 3) ** 2) / 5.0)
 
     @classmethod
     def from_box(cls, mass: float, size: ArrayLike) -> "Inertia":
-        """Returns the inertia of a solid box about its centre, with edges `size`: m/12 (b² + c²)."""
+        """Returns the inertia of a solid box with edges `size` about its centre. The moment about the axis along an
+        edge is m/12 (b² + c²), where b and c are the other two edges."""
         return _solid(mass, _others(_lengths("size", size, 3) ** 2) / 12.0)
 
     @classmethod
     def from_cylinder(cls, mass: float, radius: float, length: float) -> "Inertia":
-        """Returns the inertia of a solid cylinder along z about its centre: m/12 (3 r² + l²), and m/2 r² about z."""
+        """Returns the inertia of a solid cylinder along z about its centre. With radius r and length l, the moments are
+        m/12 (3 r² + l²) about x and y, and m/2 r² about z."""
         r, l = _lengths("radius", radius, 1), _lengths("length", length, 1)  # noqa: E741
         across = (3.0 * r * r + l * l) / 12.0
         return _solid(mass, np.array([across, across, 0.5 * r * r]))
@@ -101,7 +104,8 @@ class Inertia(NamedTuple):
 
     @property
     def matrix(self) -> _Array:
-        """The matrix [m 1, −m ĉ; m ĉ, Ī], (6, 6), which maps a motion to the momentum, linear parts first."""
+        """The matrix [m 1, −m ĉ; m ĉ, Ī], (6, 6), which maps a motion to the momentum, linear parts first. m is the
+        mass, c the centre of mass, and Ī the rotational inertia about the origin."""
         x, y, z = self.mass * self.com
         h = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         return np.block([[self.mass * np.eye(3), -h], [h, self.rotational]])

@@ -166,8 +166,8 @@ def _motion(joint: Any) -> NDArray[np.float64]:
 
 
 def _follower(S: NDArray[np.float64], name: str) -> Joint:
-    """Returns the kind of a mimic joint that moves along S. The axis of the joint has the length of S, which is the
-    square of the ratio.
+    """Returns the kind of a mimic joint that moves along S. S is the motion without the ratio, multiplied by the square
+    of the ratio, so S has the same direction for every sign of the ratio.
     """
     linear, angular = S[:3], S[3:]
     if not S.any():

@@ -198,7 +198,8 @@ class Constrained(NamedTuple):
     N m).
     """
     residual: float
-    """The largest magnitude in J q̈ + γ (m/s², rad/s²), which is zero if the constraints are satisfied."""
+    """The largest magnitude in J q̈ + γ (m/s², rad/s²), the error of the constraints' accelerations. It is zero if the
+    constraints are satisfied."""
     redundant: float
     """The number of rows of J that depend linearly on earlier rows, up to rounding. These rows have no force."""
 
@@ -226,7 +227,7 @@ class ConstrainedDerivatives(NamedTuple):
     dlambda_dtau: _Array
     """The derivative ∂λ/∂τ of the constraint forces, (rows, nv)."""
     inertia: _Array
-    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along the rows of the constraints."""
+    """The inertia (J M⁻¹ Jᵀ)⁻¹ of the robot along the rows of the constraints, (rows, rows)."""
 
 
 class ConstrainedEquations(NamedTuple):
@@ -286,7 +287,7 @@ class ImpulseDerivatives(NamedTuple):
     dlambda_dv: _Array
     """The derivative ∂Λ/∂v of the impulses, (rows, nv)."""
     inertia: _Array
-    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along the rows of the constraints."""
+    """The inertia (J M⁻¹ Jᵀ)⁻¹ of the robot along the rows of the constraints, (rows, rows)."""
 
 
 class ContactConstraint(NamedTuple):
@@ -351,7 +352,9 @@ class CentroidalMap(NamedTuple):
     Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
     Ig: _Array
-    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī]."""
+    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī] with their
+    mass m and their rotational inertia Ī.
+    """
     com: _Array
     """The centre of mass c in the world's frame (m), 3 numbers."""
     Jcom: _Array
@@ -368,7 +371,9 @@ class CentroidalMapRate(NamedTuple):
     hg: _Array
     """The momentum about the centre of mass, in the axes of the world (kg m/s, kg m²/s), 6 numbers."""
     Ig: _Array
-    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī]."""
+    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī] with their
+    mass m and their rotational inertia Ī.
+    """
     com: _Array
     """The centre of mass c in the world's frame (m), 3 numbers."""
     com_velocity: _Array
@@ -417,12 +422,13 @@ class AssemblySize(NamedTuple):
     longest_run: int
     """The number of bodies in the largest run."""
     joins: int
-    """The number of joins of two pieces of the tree, where one piece is below the other."""
+    """The number of joins: each join connects two parts of the tree, where one part is attached to the last body of the
+    other part."""
     gathers: int
-    """The number of additions of contributions, where two pieces of the tree are on the same body."""
+    """The number of sums of two parts of the tree that are attached to the same body."""
     depth: int
-    """The number of steps that must be computed one after the other: the longest chain of pieces from a run to the
-    whole robot.
+    """The number of steps that must be computed one after the other: the number of parts on the longest path from a run
+    to the whole robot.
     """
 
 
@@ -444,7 +450,8 @@ class Limits(NamedTuple):
 
 
 class Spring(NamedTuple):
-    """A spring of a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest."""
+    """A spring of a joint: τ = −(k₀ + k₁ Δ + k₂ Δ²) Δ with the displacement Δ = q ⊖ rest. For joints with several
+    degrees of freedom, the brackets contain |Δ| instead of Δ."""
 
     joint: str
     """The name of the joint to which the spring belongs."""
@@ -597,8 +604,8 @@ class Evaluation(NamedTuple):
     next_states: _Array
     """The next states φ(x, u), (N, nx)."""
     gaps: _Array
-    """The gaps: first x̂₀ ⊖ x₀ with the problem's initial state x̂₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁ for each knot t, (N + 1,
-    ndx).
+    """The gaps: first x̂₀ ⊖ x₀ with the problem's initial state x̂₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁ with the next state φ(xₜ,
+    uₜ) for each knot t, (N + 1, ndx).
     """
     accelerations: list[_Array]
     """The accelerations of each knot of a robot, nv numbers; empty for other knots and for impacts."""
@@ -805,13 +812,15 @@ class Ground(NamedTuple):
     """A plane on which a simulated robot stands, slides and lands, and the points of the robot that may touch the
     plane.
 
-    Contacts are rigid, with Coulomb friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
-    Anitescu and Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ. Each point satisfies 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0
-    and the exact disc ‖λ_t‖ ≤ μ λ_n. Here u⁺ = J v⁺ is the point's velocity after the step, and φ its distance from the
-    plane. The forces of redundant contacts are not unique, but the sum of these forces is unique. Errors are O(h). Only
-    the points touch the plane: edges of soles, other bodies and joint limits are ignored. With a restitution above 0
-    (Newton's law) and friction, an impact of several points may increase the energy. A point below the plane is moved
-    out by a fifth of its depth per step, at most 0.5 m/s.
+    Contacts are rigid, with Coulomb friction, as conditions on the velocities v⁺ after a step of length h (Moreau 1988;
+    Stewart and Trinkle 1996; Anitescu and Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ. M is the inertia matrix, J
+    the Jacobian of the points, and λ are their impulses, with normal parts λ_n and tangential parts λ_t. Each point
+    satisfies 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0 and the exact disc ‖λ_t‖ ≤ μ λ_n. Here u⁺ = J v⁺ is the point's velocity
+    after the step, u_n⁺ its normal part, and φ the point's distance from the plane. The forces of redundant contacts
+    are not unique, but the sum of these forces is unique. Errors are O(h). Only the points touch the plane: edges of
+    soles, other bodies and joint limits are ignored. With a restitution above 0 (Newton's law) and friction, an impact
+    of several points may increase the energy. A point below the plane is moved out by a fifth of its depth per step, at
+    most 0.5 m/s.
     """
 
     points: Sequence[str | int | tuple[str | int, ArrayLike]]

@@ -81,7 +81,8 @@ class Settings(NamedTuple):
     a sole's wrench counts as equivalent forces at the corners, so that the pressure stays away from the edges.
     """
     contact_gains: Gains = Gains(0.0, 0.0)
-    """Gains of the Baumgarte stabilisation: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0."""
+    """Gains of the Baumgarte stabilisation: a contact with the pose X and the velocity v has the acceleration k (X_ref
+    ⊖ X) − d v instead of 0."""
     max_correction: float = 50.0
     """The maximum acceleration of the stabilisation by `contact_gains` (m/s², rad/s²): a foot that lands fast is
     stopped over some ticks.

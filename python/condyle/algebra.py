@@ -125,7 +125,7 @@ class Motion(_Spatial):
 
     def __rmul__(self, factor: Any) -> Any:
         """Returns the momentum I v = (m v + ω × m c, Ī ω + m c × v) if an inertia I is on the left, else the product
-        with a number.
+        with a number. I has the mass m, the centre of mass c, and the rotational inertia Ī about the origin.
         """
         if not isinstance(factor, Inertia):
             return self * factor
@@ -286,8 +286,8 @@ class SE3:
 
 
 def exp3(w: ArrayLike) -> _Array:
-    """Returns the rotation matrices R = exp ŵ = 1 + sinc θ ŵ + ½ sinc² θ/2 ŵ², (…, 3, 3), for rotation vectors (…,
-    3).
+    """Returns the rotation matrices R = exp ŵ = 1 + sinc θ ŵ + ½ sinc² θ/2 ŵ², (…, 3, 3), for rotation vectors w, (…,
+    3), with the angle θ = |w|.
     """
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
@@ -309,7 +309,8 @@ def log3(R: ArrayLike) -> _Array:
 
 
 def exp6(m: ArrayLike | Motion) -> SE3:
-    """Returns the exponential of motions: (exp ω̂, V v), V = 1 + (1 − cos θ)/θ² ω̂ + (θ − sin θ)/θ³ ω̂²."""
+    """Returns the exponential of motions (v, ω): the pose (exp ω̂, V v) with V = 1 + (1 − cos θ)/θ² ω̂ + (θ − sin θ)/θ³
+    ω̂² and the angle θ = |ω|."""
     x = m.vector if isinstance(m, Motion) else _shaped(m, "m", 6)
     return SE3(exp3(x[..., 3:]), _times(Jexp3(-x[..., 3:]), x[..., :3]))
 
@@ -334,7 +335,8 @@ def Jexp3(w: ArrayLike) -> _Array:
 
 
 def Jlog3(w: ArrayLike) -> _Array:
-    """Returns the inverse of `Jexp3` for a rotation vector w with |w| ≤ π: 1 + ½ ŵ + (1 − ½ θ cot ½ θ)/θ² ŵ²."""
+    """Returns the inverse of `Jexp3` for a rotation vector w with the angle θ = |w| ≤ π: 1 + ½ ŵ + (1 − ½ θ cot ½ θ)/θ²
+    ŵ²."""
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
     t = theta**2

@@ -8,9 +8,10 @@ Function(condyle_0:(q[7],v[7],a[7])->(tau[7]) External)
 >>> q, v = casadi.MX.sym("q", 7), casadi.MX.sym("v", 7)
 >>> damping = casadi.jacobian(rnea(q, v, 0), v)  # ∂τ/∂v, in closed form
 
-Each function computes with Condyle's compiled code: values, Jacobians J with the zeros of the robot's tree, products
-Jᵀλ, and the Hessian of λᵀf. The Hessian is computed by closed formulas for `rnea` and `aba`, and by hyper-dual numbers
-for the other functions. Functions may be called from several threads at a time (`Function.map` with "thread").
+Each function computes with Condyle's compiled code: values f, Jacobians J with the zeros of the robot's tree, products
+Jᵀλ with multipliers λ, and the Hessian of λᵀf. The Hessian is computed by closed formulas for `rnea` and `aba`, and by
+hyper-dual numbers for the other functions. Functions may be called from several threads at a time (`Function.map` with
+"thread").
 
 With `states=N` a function takes N states, one in each column, like `f.map(N)`. But values, Jacobian and Hessian of all
 states are computed in one call, and `rnea` and `aba` compute several states in SIMD lanes. Use `states` for direct
@@ -265,8 +266,8 @@ def action(
 
 
 class _Mapped:
-    """A CasADi function whose arguments are arrays with one row for each knot. The function returns an array (rows, m,
-    n) for each result.
+    """A CasADi function whose arguments are arrays with one row for each knot. For each result of shape (m, n), the
+    function returns an array (rows, m, n).
     """
 
     def __init__(self, kind: Any, arguments: list[Any], results: list[Any]) -> None:

@@ -93,9 +93,9 @@ def rotation(quaternion: ArrayLike) -> _Array:
 def wrench_to_body(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> _Array:
     """Converts forces and moments (linear, angular), in the world's axes about `point`, to the form of `f_ext`.
 
-    f = Rᵀ f_w, n = Rᵀ (n_w + (point − p) × f_w), where (R, p) is the body's pose `oXb`, (…, 4, 4), in the world. For a
-    wrench about the world's origin, omit `point`. Drake's forces and MuJoCo's `xfrc_applied` act at a point of the
-    body: give the position of this point in the world.
+    A force f_w and a moment n_w become f = Rᵀ f_w and n = Rᵀ (n_w + (point − p) × f_w), where (R, p) is the body's pose
+    `oXb`, (…, 4, 4), in the world. For a wrench about the world's origin, omit `point`. Drake's forces and MuJoCo's
+    `xfrc_applied` act at a point of the body: give the position of this point in the world.
     """
     R, p = _pose(oXb)
     f, n = _halves(wrench, "wrench")
@@ -114,8 +114,9 @@ def twist_to_body(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = No
     """Converts velocities (linear, angular), along the world's axes, to the body's frame. The linear part is the
     velocity of the body's point at `point`.
 
-    v = Rᵀ (v_w + ω_w × (p − point)), ω = Rᵀ ω_w. Without a point the linear part is the velocity of the body's origin
-    (Pinocchio's LOCAL_WORLD_ALIGNED); the world's origin as the point gives Pinocchio's WORLD.
+    A velocity (v_w, ω_w) becomes v = Rᵀ (v_w + ω_w × (p − point)) and ω = Rᵀ ω_w, where (R, p) is the body's pose `oXb`
+    in the world. Without a point the linear part is the velocity of the body's origin (Pinocchio's
+    LOCAL_WORLD_ALIGNED); the world's origin as the point gives Pinocchio's WORLD.
     """
     R, p = _pose(oXb)
     v, omega = _halves(twist, "twist")

@@ -58,12 +58,13 @@ _INVERSE = ("DifferentialActionModelFreeInvDynamics", "DifferentialActionModelCo
 def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -> Problem:
     """Converts a `crocoddyl.ShootingProblem` to a `Problem`.
 
-    The following knots are converted: Euler and Runge–Kutta steps, with controls as polynomials, of free and contact
-    dynamics, forward and inverse; impulses; LQR; the unicycle. These knots may contain: actuation models τ = S u with
-    constant S; contacts of 1, 2, 3 and 6 dimensions; all residuals except ResidualModelContactControlGrav (which
-    ignores the forces in version 3.2.1); quadratic, weighted and smooth activations and barriers; and constraints of
-    residuals. A knot with other contents, such as an action or a cost that is written in Python, is computed by
-    Crocoddyl: Condyle's solver calls Crocoddyl for this knot, and a warning names these contents.
+    The following knots are converted: Euler and Runge–Kutta steps of forward or inverse dynamics, with or without
+    contacts; impulses; LQR; the unicycle. The controls of a step may be polynomials in time. These knots may contain:
+    actuation models τ = S u with constant S; contacts of 1, 2, 3 and 6 dimensions; all residuals except
+    ResidualModelContactControlGrav (which ignores the forces in version 3.2.1); quadratic, weighted and smooth
+    activations and barriers; and constraints of residuals. A knot with other contents, such as an action or a cost that
+    is written in Python, is computed by Crocoddyl: Condyle's solver calls Crocoddyl for this knot, and a warning names
+    these contents.
 
     Constraints and the equations of inverse dynamics become limits, which `AugmentedLagrangian` enforces.
 

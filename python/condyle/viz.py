@@ -38,7 +38,8 @@ def pattern(model: Model) -> NDArray[np.bool_]:
     """Returns for each entry of M(q) whether the structure of the tree allows the entry to differ from zero, (nv, nv).
 
     M_ij = 0 unless joint i carries joint j, or joint j carries joint i (Featherstone 2008, section 8.5). With mimic
-    joints, M = Gᵀ M' G, where M' is the inertia matrix of the tree with all joints free.
+    joints, M = Gᵀ M' G. M' is the inertia matrix of the tree with all joints free, and G maps the velocities v to the
+    velocities of all joints.
     """
     widths = [joint.nv if joint else 0 for joint in model.joints]
     related = np.eye(model.nbodies, dtype=bool)

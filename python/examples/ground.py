@@ -49,7 +49,8 @@ class Ground:
         return held, self.sets[held]
 
     def _land(self):
-        """Stops the feet that have come down by an impact: J v⁺ = 0."""
+        """Stops the feet that have come down. An impact changes v to v⁺ with J v⁺ = 0, where J is the Jacobian of these
+        feet."""
         height = [condyle.frame_placement(self.model, self.data, self.q, foot)[2, 3] for foot in self.feet]
         landed = [not standing and z < 0.0 for standing, z in zip(self.standing, height, strict=True)]
         if any(landed):

@@ -7,8 +7,9 @@ A quadruped stands on four point feet and is pushed. Each millisecond the progra
     J_c q̈ + J̇_c v = 0                              the feet stay
     ‖f_t‖ ≤ μ f_n                                  each foot in its cone
 
-is written in Clarabel's form and solved by Clarabel. For comparison, `WholeBodyController` computes a command for the
-same state.
+is written in Clarabel's form and solved by Clarabel. J is the Jacobian of the trunk's task, and J_c the Jacobian of the
+feet. a* are desired accelerations, and f are the forces on the feet, with tangential parts f_t and normal parts f_n.
+For comparison, `WholeBodyController` computes a command for the same state.
 
     pip install clarabel
     python python/examples/wholebody_clarabel.py

@@ -65,9 +65,9 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> One { 
 /// m/s²).
 ///
 /// q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`. method: 'aba', the
-/// articulated-body algorithm, O(n); 'dense', a dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros
-/// of the tree, O(n d²) for depth d; None, the fastest of these: 'sparse' for a robot with mimic joints, else 'aba'.
-/// All methods give the same numbers, up to rounding.
+/// articulated-body algorithm, O(n) for n coordinates; 'dense', a dense factor of M, O(n³); 'sparse', a factor of M
+/// that keeps the zeros of the tree, O(n d²) for depth d of the tree. None selects 'sparse' for a robot with mimic
+/// joints, and 'aba', the fastest method, for all other robots. All methods give the same numbers, up to rounding.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7

@@ -184,8 +184,8 @@ impl Kind {
         }
     }
 
-    /// Returns the caller's arrays in `out`, to which the results are written. Without `out`, the caller gives no
-    /// arrays.
+    /// Returns the caller's arrays in `out`, to which the results are written. Without `out`, no entry of the returned
+    /// list is an array.
     fn places<'py>(self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
         match self {
             Self::One => Ok(vec![out.cloned()]),
@@ -211,8 +211,8 @@ fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
 pub(crate) const MOST_STATES: usize = 2048;
 
 /// Returns the number of states in a part, which is the unit of work of a thread. `numbers` is the size of the results
-/// per state. A part takes up to a millisecond. So the third of a microsecond that its start takes is negligible. A
-/// part fills at least two SIMD registers.
+/// per state. The computation of a part takes up to a millisecond, and its start a third of a microsecond. A part fills
+/// at least two SIMD registers.
 fn part_size(numbers: usize) -> usize {
     const NUMBERS: usize = 1 << 18;
     (NUMBERS / numbers.max(1)).next_multiple_of(16).clamp(16, MOST_STATES)

@@ -272,7 +272,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
+    /// Adds a spring to a joint: τ = −(k₀ + k₁ Δ + k₂ Δ²) Δ with the displacement Δ = q ⊖ rest. For joints with several
+    /// degrees of freedom, the brackets contain |Δ| instead of Δ.
     ///
     /// body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
     /// spring is at rest, with as many numbers as the joint has in q.
@@ -332,8 +333,9 @@ impl ModelBuilder {
     ///
     /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
     /// tendon: the tendon's name, if the actuator drives a tendon.
-    /// gear: one to six numbers; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1 if
-    /// both are 0, as for a motor. control, force: (minimum, maximum); None for no limits.
+    /// gear: one to six numbers; None is 1. gain: the force per unit of control. None means kp if kp is not 0, else kv
+    /// if kv is not 0. If both are 0, None means 1, as for a motor. control, force: (minimum, maximum); None for no
+    /// limits.
     #[pyo3(signature = (
         name, joint, *, tendon=None, gear=None, gain=None, bias=0.0, kp=0.0, kv=0.0, control=None, force=None
     ))]

@@ -116,11 +116,12 @@ fn aim(
 /// Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
 /// set.
 ///
-/// With μ > 0 the forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', where b is the right-hand side without regularisation.
-/// In the first iteration λ' is 0; in each later iteration λ' is the previous λ. Redundant constraints then share the
-/// forces, with the smallest norm of λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration
-/// is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
-/// sparse resolution of constrained dynamic equations (2021).
+/// With a regularisation μ > 0, the constraint forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. J is the Jacobian of the
+/// constraints, M the inertia matrix, and b the right-hand side without regularisation. In the first iteration λ' is 0;
+/// in each later iteration λ' is the previous λ. Redundant constraints then share the forces, with the smallest norm of
+/// λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on
+/// earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained
+/// dynamic equations (2021).
 ///
 /// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
 /// to 10000; all of them are computed.
@@ -300,7 +301,8 @@ impl ConstraintSet {
 
 functions! {
 /// Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
-/// dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
+/// dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`. J is the Jacobian of the
+/// constraints. γ contains J̇ v, the stabilisation, and the constraints' target accelerations with a minus sign.
 ///
 /// constraints: a `ConstraintSet`; q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as
 /// for `rnea`. If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the
@@ -348,9 +350,10 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 ///
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
-/// `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
-/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position, nq numbers; v, tau: velocity and
-/// efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space.
+/// Symbols are as for `constrained_dynamics`. `constrained_dynamics_derivatives` solves these equations; this function
+/// does not solve them. constraints: a `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position,
+/// nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames.
+/// ∂/∂q is taken in the tangent space.
 /// out: one array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
@@ -368,7 +371,7 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 }
 
 /// Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
-/// lambda_, residual, redundant)`.
+/// lambda_, residual, redundant)`. J is the Jacobian of the constraints, and M the inertia matrix.
 ///
 /// constraints: a `ConstraintSet`, whose gains and targets of velocity and acceleration are ignored; q: position, nq
 /// numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.

@@ -197,12 +197,13 @@ Cholesky {
 
 /// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and scratch memory.
 ///
-/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
-/// joining two parts of the robot costs about six times as much as eliminating a body. With two threads and two runs,
-/// the algorithm is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with
-/// mimic joints, the passes run once with all joints free, and once more for each joint that shares a coordinate. The
-/// results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
-/// algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+/// The robot is assembled from runs: groups of at most `grain` adjacent bodies, which are eliminated one after the
+/// other. With `grain` = 1 the algorithm takes O(log n) steps for n bodies. But joining two parts of the robot costs
+/// about six times as much as eliminating a body. With two threads and two runs, the algorithm is faster than `aba`
+/// from about 200 bodies on. With one thread it is always slower. For a robot with mimic joints, the passes run once
+/// with all joints free, and once more for each joint that shares a coordinate. The results are bit-identical for any
+/// number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel O(log(n))
+/// calculation of rigid-body dynamics (1999).
 ///
 /// model: the robot; grain: the maximum number of bodies in a run.
 ///
@@ -245,8 +246,8 @@ impl DivideConquer {
         class!(py, "AssemblySize")?.call1(numbers)
     }
 
-    /// Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
-    /// + grain) steps.
+    /// Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding. For n bodies, the work is
+    /// O(n) and the number of steps O(log n + grain).
     ///
     /// model: the planned model, or another model with the same bodies and joints; q: position, nq numbers; v, tau:
     /// velocity and efforts, nv numbers each;

@@ -52,7 +52,7 @@ pub(crate) trait Argument<'a, 'py> {
     /// Type of the value that the library takes for many states.
     type All;
     /// Reads the argument without running Python code, if the argument has the simplest form for a single state: a
-    /// double array in C order, or a word. Returns `None` if the argument has another form or is invalid.
+    /// float64 array in C order, or a word. Returns `None` if the argument has another form or is invalid.
     fn at_once(_given: &Self::Given, _model: &Model) -> Option<Self::Read<f64>> {
         None
     }
@@ -103,8 +103,9 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
         self.read.is_some()
     }
 
-    /// Returns the argument's doubles for one of many states, or for the single state. `at_once` is true if
-    /// `Argument::at_once` read all arguments of the call.
+    /// Returns the argument's f64 numbers for one of many states, or for the single state. `at_once`: whether
+    /// `Argument::at_once` has read all arguments of the call. If true, returns the numbers that it read; otherwise
+    /// reads the argument again.
     #[inline(always)]
     #[allow(clippy::extra_unused_type_parameters)] // `duals` has the same type parameter
     pub(crate) fn numbers<S>(
@@ -466,8 +467,8 @@ macro_rules! function {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            // Fast path: most calls have one state in arrays of doubles, and these arrays are read by the lines below.
-            // If one argument has another form, all arguments are inspected first.
+            // Fast path: most calls have one state in float64 arrays, and these arrays are read by the lines below. If
+            // one argument has another form, all arguments are inspected first.
             $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
             let at_once = true $(&& $arg.is_read())*;
             let (dual, states) = if at_once { (false, None) } else {
@@ -550,8 +551,8 @@ macro_rules! each {
     };
 }
 
-/// Computes one state with numbers of type `$S`: doubles or hyper-dual numbers. `$read` reads the arguments as numbers
-/// of this type.
+/// Computes one state with numbers of type `$S`: f64 or hyper-dual numbers. `$read` reads the arguments as numbers of
+/// this type.
 macro_rules! one {
     (
         $S:ty, $read:ident, ($py:ident, $model:ident, $state:ident, $out:ident, $at_once:ident)

@@ -23,7 +23,8 @@ fn inertia_of<'py>(
     matrix: impl Fn(Mat3<f64>) -> PyResult<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
-    // Ī = I_c − m [c]ₓ[c]ₓ, so I_c = Ī − (−m [c]ₓ[c]ₓ)
+    // about the centre of mass c: I_c = Ī − (−m [c]ₓ[c]ₓ), the inertia Ī about the origin less the inertia of a point
+    // mass m at c
     let point_mass = Inertia::from_com(I.mass, com, Sym3::zero());
     let about_com = I.rotational - point_mass.rotational;
     let class = class!(py, "condyle._inertia", "Inertia")?;
@@ -65,8 +66,8 @@ pub(crate) fn to_inertia<'py>(pi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
     give_inertia(pi.py(), rust::to_inertia(array("pi", pi)?))
 }
 
-/// Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
-/// kg m and kg.
+/// Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], (4, 4), in kg m², kg m and kg, with the mass m and the centre of
+/// mass c. J is the integral of the products of (x, y, z, 1) over the mass; Σ contains the products of x, y and z.
 ///
 /// J is linear in the parameters. J is positive definite if and only if a body of positive density can have this
 /// inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter

@@ -46,12 +46,12 @@ batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 /// Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
 /// damping coefficient is d = d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 ///
-/// q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 %
-/// of f. The effort of a spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for
-/// joints with several degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's
-/// `qfrc_passive`. The only exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation
-/// among the efforts of actuators. No other function of a model includes passive torques: add passive torques to τ
-/// where needed.
+/// q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0, a speed (rad/s, m/s); at the speed ε, friction
+/// is tanh 1 = 76 % of f. A spring with the coefficients k₀, k₁ and k₂ has the effort −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ
+/// is the displacement from its rest position. For joints with several degrees of freedom, the brackets contain |Δ|
+/// instead of Δ. The equations are the same as for MuJoCo's `qfrc_passive`, with two exceptions. MuJoCo treats friction
+/// as a constraint. For joints with `actuatorgravcomp`, MuJoCo counts gravity compensation among the efforts of
+/// actuators. No other function of a model includes passive torques: add passive torques to τ where needed.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> q, v = np.zeros(7), np.ones(7)

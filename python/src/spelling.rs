@@ -398,7 +398,8 @@ left! {
     "nonLinearEffects" nonLinearEffects(q, v) = algorithms::nonlinear_effects => "nle";
     /// Computes the gravity efforts g, also stored as data.g.
     "computeGeneralizedGravity" computeGeneralizedGravity(q) = algorithms::gravity => "g";
-    /// Computes the Coriolis matrix C, also stored as data.C. C v + g = h, and Ṁ − 2 C is skew-symmetric.
+    /// Computes the Coriolis matrix C, also stored as data.C. C v + g = h, with gravity efforts g and nonlinear effects
+    /// h; Ṁ − 2 C is skew-symmetric, with the inertia matrix M.
     "computeCoriolisMatrix" computeCoriolisMatrix(q, v) = algorithms::coriolis_matrix => "C";
     /// Computes the Jacobian of the centre of mass, (3, nv), also stored as data.Jcom.
     "jacobianCenterOfMass" jacobianCenterOfMass(q) = com_jacobian => "Jcom";

@@ -38,7 +38,8 @@ def test_forward_and_inverse_dynamics(robot: Robot) -> None:
 
 
 def test_external_forces_act_on_their_body(robot: Robot) -> None:
-    """Checks τ(f) = τ(0) − Σ Jᵢᵀ fᵢ, where Jᵢ is the Jacobian of body i in the body's own frame."""
+    """Checks τ(f) = τ(0) − Σ Jᵢᵀ fᵢ for external forces fᵢ, where Jᵢ is the Jacobian of body i in the body's own
+    frame."""
     model, data, q, v, a, _, f_ext = robot
     tau = condyle.rnea(model, data, q, v, a)
     for body in range(1, model.nbodies):
@@ -86,8 +87,8 @@ def test_kinematics(robot: Robot) -> None:
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_motion_of_frames(robot: Robot, reference: Any) -> None:
-    """Checks a frame's velocity V = J v and acceleration A = J a + dJ v, and compares dJ with differences along the
-    motion.
+    """Checks a frame's velocity V = J v and acceleration A = J a + dJ v, with the frame's Jacobian J and its rate dJ.
+    Compares dJ with differences of J along the motion.
     """
     model, data, q, v, a, *_ = robot
     for frame in range(0, len(model.frames), 5):

@@ -174,8 +174,8 @@ def test_first_derivatives(name: str, stretch: float) -> None:
 
 @pytest.mark.parametrize("name", ["arm", "arm, accelerations", "unicycle"])
 def test_first_derivatives_are_those_of_a_problem(name: str) -> None:
-    """Checks that the first derivatives are A, B, q and r of the problem, and that Q, S, R are the Hessian of the cost.
-    Positions must be vectors.
+    """Checks that the function's first derivatives equal A, B, q and r of the problem's `LqKnot`, and that the Hessian
+    of the cost consists of the knot's Q, S and R. The test uses only robots without quaternions.
     """
     model, (x, u) = KNOTS[name][0], arguments(name)
     node = Problem(x, [model], [0], end(name)).derivatives([x, x], [u])[0]

@@ -106,7 +106,8 @@ def test_settings_reach_both_solvers() -> None:
     assert solution.status == "max_iterations" and len(solution.trace) == 2
     threaded = AugmentedLagrangian(problem, inner={"threads": 2, "inverse_dynamics_form": True}, penalty_start=100.0)
     assert threaded.solve(xs, us).status == "converged" and threaded.outcome.penalty >= 100.0
-    # FDDP alone treats limits as costs for leaving the bounds, even after a solve with limits
+    # FDDP without the augmented Lagrangian treats limits as costs for leaving the bounds, even after a solve with
+    # limits
     alone = Fddp(problem).solve(xs, us)
     assert alone.status == "converged" and np.abs(tool(alone.xs[-1]) - TARGET).max() > 1e-3
     with pytest.raises(ValueError, match="there is no setting 'penalty'"):

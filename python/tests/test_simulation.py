@@ -169,7 +169,7 @@ def test_a_robot_lands_and_stands(quadruped: Robot) -> None:
 
 @pytest.mark.parametrize("mu", [0.2, 0.6])
 def test_a_box_slides_to_a_stop(mu: float) -> None:
-    """Checks that the sliding distance of a box is v²/(2 μ g), minus half the distance of one step."""
+    """Checks that a box with the initial speed v slides by v²/(2 μ g), minus half the distance of one step."""
     model = condyle.Model.from_mjcf_str(BOX).with_frame("centre", "box")
     simulation = Simulation(model, ground=Ground([("centre", CORNERS)], friction=mu))
     q, v = condyle.neutral(model), np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])

@@ -103,7 +103,8 @@ CONTACTS: dict[str, list[FrictionContact]] = {
 
 @pytest.mark.parametrize("kind", CONTACTS)
 def test_contacts_of_every_kind(kind: str) -> None:
-    """Checks that M q̈ + h = τ + Σ Jᵀ f and m (c̈ − g) = Σ f, and that contacts are held."""
+    """Checks that M q̈ + h = τ + Σ Jᵀ f and m (c̈ − g) = Σ f for the contact forces f and the centre of mass c, and
+    that contacts are held."""
     contacts = CONTACTS[kind]
     controller = WholeBodyController(HUMANOID, contacts, [Task.com(), Task.posture()])
     q, v = moving(HUMANOID, upright())

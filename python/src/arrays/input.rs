@@ -16,8 +16,8 @@ use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::ops::Deref;
 
-/// The doubles of an argument, in C order. While an `Input` exists, other Rust code that uses NumPy cannot write to the
-/// array.
+/// The f64 numbers of an argument, in C order. While an `Input` exists, other Rust code that uses NumPy cannot write to
+/// the array.
 pub(crate) struct Input<'py, D: Dimension>(PyReadonlyArray<'py, f64, D>);
 
 impl<D: Dimension> Deref for Input<'_, D> {
@@ -35,13 +35,13 @@ impl Input<'_, Ix2> {
     }
 }
 
-/// The doubles of an argument, in C order, for calls that keep the interpreter's lock. The borrow of the array is not
-/// registered with the crate `numpy`, because the registration takes as long as the dynamics of a small robot.
+/// The f64 numbers of an argument, in C order, for calls that keep the interpreter's lock. The borrow of the array is
+/// not registered with the crate `numpy`, because the registration takes as long as the dynamics of a small robot.
 pub(crate) enum InPlace<'py, D: Dimension> {
     /// An array of NumPy, kept alive by this reference.
     Array(Bound<'py, PyArray<f64, D>>),
-    /// The address and the number of an argument's doubles. The call must use the doubles before it runs any Python
-    /// code.
+    /// The address and the count of an argument's f64 numbers. The call must use these numbers before it runs any
+    /// Python code.
     AtOnce(*const f64, usize),
 }
 
@@ -67,7 +67,7 @@ impl<D: Dimension> Deref for InPlace<'_, D> {
     }
 }
 
-/// Returns the numbers of an array of doubles with this shape in C order; `None` for all other objects. Runs no Python
+/// Returns the numbers of a float64 array with this shape in C order; `None` for all other objects. Runs no Python
 /// code.
 #[inline(always)]
 #[allow(unsafe_code)]
@@ -117,8 +117,7 @@ fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[
     Ok(Input(as_it_lies_or_converted(argument, value, shape)?.try_readonly()?))
 }
 
-/// Returns the argument itself if the argument is an array of doubles in C order, else a new array with the same
-/// numbers.
+/// Returns the argument itself if the argument is a float64 array in C order, else a new array with the same numbers.
 #[inline]
 fn as_it_lies_or_converted<'py, D: Dimension>(
     argument: &str,

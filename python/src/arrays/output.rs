@@ -41,7 +41,7 @@ pub(super) fn set<'py>(
     if out.is_some() || !is_small(shape) {
         return output(py, out, shape, fill);
     }
-    // SAFETY: any bit pattern in the memory from NumPy is a valid double, and all numbers are set before the array is
+    // SAFETY: any bit pattern in the memory from NumPy is a valid f64, and all numbers are set before the array is
     // returned.
     #[allow(unsafe_code)]
     let array = unsafe { PyArray::<f64, _>::new(py, shape, false) };
@@ -61,7 +61,7 @@ fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])
 /// `MemoryError`.
 const LARGE: usize = 1 << 24;
 
-/// Returns whether an array of this shape has fewer than `LARGE` elements, so that the allocation of the array is
+/// Returns whether an array of this shape has fewer than `LARGE` elements. The allocation of such a small array is
 /// assumed to succeed.
 fn is_small(shape: &[usize]) -> bool {
     shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE)
@@ -152,8 +152,8 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     }
 }
 
-/// A symmetric matrix. The columns of the matrix are written as rows of the result. The two differ only by rounding
-/// errors.
+/// A symmetric matrix. The columns of the matrix are written as rows of the result. Row k and column k of the matrix
+/// differ only by rounding errors.
 pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::spatial::Matrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {
@@ -267,7 +267,8 @@ impl<S: Number> Array for [Se3<S>] {
     }
 }
 
-/// The inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī].
+/// The inertia of a whole robot about its centre of mass: the 6 × 6 matrix [m 1, 0; 0, Ī] with the mass m and the
+/// rotational inertia Ī.
 impl<S: Number> Array for Inertia<S> {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -334,7 +335,7 @@ impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Give for Computed<S, F, AXES
         if out.is_none() {
             return S::output(py, None, &self.shape, &self.fill);
         }
-        // the numbers are computed in other memory first, because `out` may be an input of the computation
+        // the numbers are first computed in a separate buffer, because `out` may also be an input of the computation
         let mut numbers = vec![S::zero(); self.shape.iter().product()];
         (self.fill)(&mut numbers);
         S::output(py, out, &self.shape, |x| x.copy_from_slice(&numbers))
@@ -437,7 +438,7 @@ pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> 
     out.try_iter().map_or_else(|_| Vec::new(), |members| members.flatten().map(|one| memory(&one)).collect())
 }
 
-/// Returns the range of addresses of a C-contiguous array of doubles. The range is empty for all other objects, which
+/// Returns the range of addresses of a C-contiguous float64 array. The range is empty for all other objects, which
 /// cause an error later.
 fn memory(array: &Bound<'_, PyAny>) -> Range<usize> {
     let Ok(array) = array.cast::<PyArrayDyn<f64>>() else { return 0..0 };

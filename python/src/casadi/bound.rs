@@ -9,7 +9,8 @@ use nalgebra::DMatrix;
 use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 
-/// Indices of a slot's four functions: the value, the Jacobian J, the product Jᵀλ, and the Jacobian of this product.
+/// Indices of a slot's four functions: the value, the Jacobian J, the product Jᵀλ with multipliers λ, and the Jacobian
+/// of this product.
 pub(super) const VALUE: usize = 0;
 pub(super) const JACOBIAN: usize = 1;
 pub(super) const REVERSE: usize = 2;
@@ -121,7 +122,8 @@ pub(super) struct Bound {
     free: Mutex<Vec<Work>>,
 }
 
-/// Work space of a call, with one position, one J and one H for each state that is computed at the same time.
+/// Work space of a call, with one position, one Jacobian J and one Hessian H for each state that is computed at the
+/// same time.
 struct Work {
     calls: Box<dyn Calls>,
     positions: Vec<Position>,
@@ -137,7 +139,8 @@ struct Work {
     Jx: DMatrix<f64>,
     gx: Vec<f64>,
     Hx: DMatrix<f64>,
-    /// `half` is H T, and `turned` its transpose; T maps changes of CasADi's coordinates to tangent vectors.
+    /// `half` is the product H T, and `turned` is the transpose of this product. H is the Hessian with respect to
+    /// tangent coordinates, and T maps changes of CasADi's coordinates to tangent vectors.
     half: DMatrix<f64>,
     turned: DMatrix<f64>,
 }

@@ -2,7 +2,9 @@
 //!
 //! A function f of a robot's position is defined only for quaternions and points of circles of length 1. For an
 //! arbitrary vector q, f is evaluated at q̂: q with quaternions and points of circles divided by their lengths. The
-//! derivatives of f with respect to q follow from its derivatives with respect to the tangent vector δ = q' ⊖ q̂:
+//! derivatives of f with respect to q follow from its derivatives with respect to the tangent vector δ = q' ⊖ q̂, where
+//! q' is the normalised q + dq. T contains the first derivatives of δ with respect to q, and C_k the second derivatives
+//! of entry k of δ; e_k is the unit vector of entry k:
 //!
 //! ```text
 //! δ = T dq + ½ Σ dqᵀ C_k dq e_k + …      ∂f/∂q = ∂f/∂δ T      ∂²f/∂q² = Tᵀ ∂²f/∂δ² T + Σ_k ∂f/∂δ_k C_k
@@ -49,7 +51,8 @@ pub(super) struct Chart {
 pub(super) struct Position {
     /// The normalised position q̂, nq numbers.
     pub(super) q: Vec<f64>,
-    /// The matrix T of each group. T is set only for groups with a quaternion or a point of a circle.
+    /// For each group, the matrix T, which maps changes of the group's numbers in q to tangent vectors. T is set only
+    /// for groups with a quaternion or a point of a circle.
     T: Vec<Block>,
     /// For each group, the length by which the group's quaternion or point of a circle was divided.
     lengths: Vec<f64>,
@@ -70,7 +73,8 @@ impl Chart {
         Self { groups: Vec::new(), nq: 0, nv: 0 }
     }
 
-    /// Returns whether q has neither a quaternion nor a point of a circle: then T is the identity, and q̂ is q.
+    /// Returns whether positions contain neither quaternions nor points of circles. Then the map T from changes of q to
+    /// tangent vectors is the identity, and q needs no normalisation.
     pub(super) fn is_flat(&self) -> bool {
         self.curved().next().is_none()
     }
@@ -107,8 +111,8 @@ impl Chart {
         }
     }
 
-    /// Computes Y = X T. X is the nv columns of the matrix `X` that begin at column `from`; the result is written to
-    /// `Y`, beginning at column `first`.
+    /// Computes Y = X T, where T maps changes of q to tangent vectors. X is the nv columns of the matrix `X` that begin
+    /// at column `from`. The result is written to the nq columns of `Y` that begin at column `first`.
     pub(super) fn multiply(&self, at: &Position, X: &DMatrix<f64>, from: usize, Y: &mut DMatrix<f64>, first: usize) {
         for (group, T) in self.groups.iter().zip(&at.T) {
             if group.unit().is_none() {
@@ -134,7 +138,8 @@ impl Chart {
             let Some(unit) = group.unit() else { continue };
             let (T, q, start) = (&at.T[k], &at.q[unit.clone()], unit.start - group.q.start);
             let turns = group.v.len() - if q.len() == 4 { 3 } else { 1 }; // index of the first rotation in δ
-            // for rotations δ = T dq (1 − q̂ᵀ dq / length), so C = −(q̂ Tᵀ + T q̂ᵀ) / length
+            // for a rotation, δ = T dq (1 − q̂ᵀ dq / length) to second order, so its second derivatives are C = −(q̂ Tᵀ
+            // + T q̂ᵀ) / length
             for i in 0..unit.len() {
                 for j in 0..unit.len() {
                     let mut sum = 0.0;
@@ -212,8 +217,9 @@ impl Chart {
 }
 
 impl Group {
-    /// Returns Eᵀ at a normalised position, with E = ∂(q ⊕ δ)/∂δ. E follows from T E = 1. In T, the block of a
-    /// translation is a rotation matrix, the row of a circle has length 1, and the rows of a quaternion have length 2.
+    /// Returns Eᵀ at a normalised position, with E = ∂(q ⊕ δ)/∂δ. Let T = ∂δ/∂q, so T E = 1. The rows of T are
+    /// orthogonal: they have length 1 for a translation and a circle, and length 2 for a quaternion. So Eᵀ is T with
+    /// the rows of a quaternion divided by 4.
     fn retraction(&self, q: &[f64]) -> Block {
         let mut E = tangent_map(self.joint, &q[self.q.clone()], 1.0);
         let turns = self.unit().expect("a group that is none of numbers");
@@ -223,8 +229,10 @@ impl Group {
         E
     }
 
-    /// Returns λᵀ ∂²(q ⊕ δ)/∂δ². The expansions are p ⊕ δ = p + R (δ_v + ½ δ_ω × δ_v + …) and q ⊕ δ_ω = q (1 − ½ (|δ_ω|
-    /// / n)²) + E δ_ω + …; n is 1 for a point of a circle and 2 for a quaternion.
+    /// Returns λᵀ ∂²(q ⊕ δ)/∂δ² for multipliers λ, where δ has a linear part δ_v and an angular part δ_ω. For a
+    /// translation p and the body's rotation R, p ⊕ δ = p + R (δ_v + ½ δ_ω × δ_v + …). For a point of a circle or a
+    /// quaternion q, q ⊕ δ_ω = q (1 − ½ (|δ_ω| / n)²) + E δ_ω + …, with n = 1 for the point and n = 2 for the
+    /// quaternion.
     fn curvature(&self, q: &[f64], lambda: &[f64]) -> SMatrix<f64, 6, 6> {
         let mut C = SMatrix::zeros();
         let start = self.unit().map_or(0, |unit| unit.start - self.q.start);

@@ -35,7 +35,8 @@ pub(super) trait Computation: Send + Sync {
     /// numbers of all results, with respect to tangent coordinate j.
     fn depends(&self, row: usize, j: usize) -> bool;
 
-    /// Returns whether the second derivative of λᵀf with respect to tangent coordinates i and j may differ from zero.
+    /// Returns whether the second derivative of λᵀf with respect to tangent coordinates i and j may differ from zero,
+    /// for results f and multipliers λ.
     fn curves(&self, i: usize, j: usize) -> bool;
 
     /// Returns a work space for calls with this number of states. Each of several simultaneous calls needs its own work
@@ -57,7 +58,8 @@ pub(super) trait Calls: Send {
     /// Computes the first derivatives of all results with respect to all tangent coordinates.
     fn jacobian(&mut self, x: &[Vec<f64>], J: &mut [DMatrix<f64>]);
 
-    /// Computes the Hessian of λᵀf with respect to all tangent coordinates, and the first derivatives if J is given.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates, for results f and multipliers λ. Also
+    /// computes the first derivatives if J is given.
     fn hessian(
         &mut self,
         x: &[Vec<f64>],

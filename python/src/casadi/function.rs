@@ -93,7 +93,8 @@ impl Kind {
         }
     }
 
-    /// Returns the pattern of the second derivatives of λᵀf with respect to arguments i and k.
+    /// Returns the pattern of the second derivatives of λᵀf with respect to arguments i and k, for results f and
+    /// multipliers λ.
     pub(super) fn second_derivatives(&self, i: usize, k: usize) -> Pattern {
         match (self, i.min(k), i.max(k)) {
             (Self::Rnea, 0, _) | (Self::Rnea, 1, 1) | (Self::Crba, ..) => Pattern::Related,
@@ -220,8 +221,9 @@ impl Kind {
         }
     }
 
-    /// Computes the Hessian of λᵀf with respect to all tangent coordinates, and the Jacobian if J is given, if the
-    /// library has closed formulas for these derivatives. Returns whether the library has such formulas.
+    /// If the library has closed formulas for the second derivatives, computes the Hessian of λᵀf with respect to all
+    /// tangent coordinates, for results f and multipliers λ. Then also computes the Jacobian if J is given. Returns
+    /// whether the library has such formulas.
     pub(super) fn closed_hessian(
         &self,
         model: &Model,
@@ -263,9 +265,10 @@ impl Kind {
         }
     }
 
-    /// Computes the Hessian of λᵀf with respect to all tangent coordinates as derivatives of Jᵀλ, with hyper-dual
-    /// numbers in two directions at a time. J is taken in the tangent space at q ⊕ δ, which differs from the tangent
-    /// space at q. The Hessian is the symmetric part of these derivatives.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates, for results f with the Jacobian J and
+    /// multipliers λ. Hyper-dual numbers give the derivatives of Jᵀλ in two directions at a time. At q ⊕ δ, J is taken
+    /// in the tangent space at q ⊕ δ, not in the tangent space at q. Therefore the matrix of these derivatives is not
+    /// symmetric; the Hessian is its symmetric part.
     pub(super) fn hessian(
         &self,
         model: &Model,

@@ -68,8 +68,8 @@ impl Slot {
         self.users.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Counts one more object of CasADi. A newly created object queries its inputs next; an object loaded from a file
-    /// does not.
+    /// Adds one to the number of CasADi's objects that use the function. A newly created object queries its inputs
+    /// next; an object loaded from a file does not.
     fn enter(&self, function: usize) {
         self.users().functions[function] += 1;
         self.loaded[function].fetch_add(1, Ordering::AcqRel);
@@ -81,7 +81,8 @@ impl Slot {
         let _ = self.loaded[function].fetch_update(Ordering::AcqRel, Ordering::Acquire, less);
     }
 
-    /// Counts one object of CasADi less, or one hold less if `function` is `None`.
+    /// Subtracts one from the number of CasADi's objects that use the function. If `function` is `None`, subtracts one
+    /// from the number of holds.
     fn leave(&self, function: Option<usize>) {
         let mut users = self.users();
         match function {

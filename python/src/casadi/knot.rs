@@ -1,8 +1,9 @@
 //! The computation of a slot for a knot of an optimal control problem: next state and cost as functions of state and
 //! controls.
 //!
-//! Let ψ(z) = φ(x ⊕ δx, u + δu) ⊖ φ(x, u) be the change of the next state with z = (δx, δu). A problem's actions
-//! provide ∂ψ = [A B] and ∂²(μᵀψ). The next state is x⁺ = φ ⊕ ψ. With E = ∂(φ ⊕ δ)/∂δ
+//! Let φ(x, u) be the next state, and ψ(z) = φ(x ⊕ δx, u + δu) ⊖ φ(x, u) its change with z = (δx, δu). A problem's
+//! actions provide ∂ψ = [A B] and ∂²(μᵀψ) for multipliers μ. The next state at x ⊕ δx and u + δu is x⁺ = φ ⊕ ψ. With E
+//! = ∂(φ ⊕ δ)/∂δ and multipliers λ of x⁺:
 //!
 //! ```text
 //! ∂x⁺ = E [A B]      ∂²(λᵀx⁺) = ∂²(μᵀψ) + [A B]ᵀ ∂²(λᵀ(φ ⊕ δ)) [A B],   μ = Eᵀ λ
@@ -18,7 +19,8 @@ use rand::{RngExt, SeedableRng};
 use std::sync::{Mutex, PoisonError};
 
 /// Number of random states at which the derivatives of the next state are evaluated. A derivative that is zero at all
-/// of these states is taken as zero everywhere. Since derivatives are analytic functions, one state would suffice.
+/// of these states is taken as zero everywhere. Derivatives are analytic functions: a derivative that is not zero
+/// everywhere is zero at a random state with probability 0. So one state would suffice.
 const STATES: u64 = 3;
 
 /// A knot of an optimal control problem.

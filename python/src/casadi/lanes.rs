@@ -68,7 +68,8 @@ impl Lanes {
         blocks.into_iter().enumerate().for_each(|(k, block)| place(J, 0, k * n, block));
     }
 
-    /// Computes the Hessian of λᵀf for each state, and the first derivatives if J is given.
+    /// Computes the Hessian of λᵀf for each state, for results f and multipliers λ, and the first derivatives if J is
+    /// given.
     pub(super) fn hessian(
         &mut self,
         model: &Model,

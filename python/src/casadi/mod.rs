@@ -3,8 +3,8 @@
 //! `chart` handles positions in CasADi's coordinates. `computation` defines the interface of a function. `function` and
 //! `robot` contain the functions of a robot; `lanes` computes inverse and forward dynamics for several states. `knot`
 //! contains the knots of optimal control problems. `bound` converts numbers to CasADi's coordinates. `interface` is
-//! CasADi's C interface: numbered slots. Each slot has the symbols of a function, its Jacobian, its product Jᵀλ and the
-//! Jacobian of this product.
+//! CasADi's C interface: numbered slots. Each slot has four symbols: a function, its Jacobian J, the product Jᵀλ with
+//! multipliers λ, and the Jacobian of this product.
 
 mod bound;
 mod chart;

@@ -74,7 +74,8 @@ impl Computation for RobotFunction {
 
     fn curves(&self, i: usize, j: usize) -> bool {
         let nv = self.of.0.nv();
-        // in τ = M(q) a + c(q, v) v + g(q), only g depends on the position of a whole tree
+        // in τ = M(q) a + C(q, v) v + g(q), only the gravity efforts g depend on the position and rotation of a whole
+        // tree
         let stands = |i: usize| i < nv && self.moves_a_tree[i];
         let other_than_gravity = match self.of.1 {
             Kind::Rnea | Kind::Aba => i >= nv || j >= nv,

@@ -89,8 +89,8 @@ pub(super) fn knot(
 /// model: the robot.
 /// dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
 /// costs: a list of `Cost`.
-/// costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve several
-///     knots of a phase.
+/// costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve all
+///     knots of a contact phase.
 /// actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
@@ -143,8 +143,8 @@ methods! {
     }
 }
 
-/// A knot of a robot in contact, with contact forces λ: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as
-/// for `FreeDynamics`.
+/// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ and J q̈ + γ = 0, with the contact forces λ, the Jacobian J of
+/// the contacts, and γ as for `constrained_dynamics`. Integrator and cost are as for `FreeDynamics`.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name, which may be empty. Residuals refer to a contact by this name.
@@ -198,8 +198,8 @@ methods! {
     }
 }
 
-/// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
-/// w a(r), as for `FreeDynamics` without Δt.
+/// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, with the
+/// inertia matrix M and the Jacobian J of the contacts. The cost is Σ w a(r), as for `FreeDynamics` without Δt.
 ///
 /// An impact has no controls.
 ///

@@ -6,8 +6,8 @@ use condyle::optimal::robot;
 use condyle::spatial::Mat3;
 use pyo3::prelude::*;
 
-/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper for a force
-/// f.
+/// Coulomb's friction cone ‖f_t‖ ≤ μ f_n of a force f with tangential part f_t and normal component f_n, as a pyramid.
+/// The pyramid and the bounds on the normal force are the rows lower ≤ A f ≤ upper.
 ///
 /// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
 /// rotation: the surface's axes in the contact's axes, (3, 3), with the surface's normal as z axis; least, greatest:

@@ -149,7 +149,8 @@ impl Cost {
 
 /// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// Limits apply at the beginning of a knot. `Fddp` alone treats limits as costs of values outside the bounds.
+/// Limits apply at the beginning of a knot. `Fddp` without `AugmentedLagrangian` treats limits as costs of values
+/// outside the bounds.
 ///
 /// name: the name of the limit in error messages.
 /// residual: a `Residual`.

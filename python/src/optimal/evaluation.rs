@@ -94,7 +94,7 @@ pub(super) fn evaluate<'py>(
 }
 
 /// Returns the gaps: first x̂₀ ⊖ x₀ with the problem's initial state x̂₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁ for each knot t. `next`
-/// contains φ(xₜ, uₜ).
+/// contains the next states φ(xₜ, uₜ).
 pub(super) fn gaps(problem: &rust::Problem, xs: &[f64], next: &[f64]) -> Vec<f64> {
     let (nx, ndx) = (problem.nx(), problem.ndx());
     let mut gaps = vec![0.0; (problem.horizon() + 1) * ndx];

@@ -33,14 +33,14 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
 ///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
 /// knot_models: for each knot, the index of the knot's model; None if knot t has model t. Consecutive knots are
-/// computed
-///     as a group if they have the same model, or if their models belong to one robot and differ only in their
-///     costs and limits.
+///     computed as a group in two cases: they have the same model, or their models belong to one robot and differ only
+///     in costs and limits.
 /// terminal: the model of the terminal knot, without controls.
 ///
 /// Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
 /// is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, more than 4096 numbers in a state or in
-/// the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together.
+/// the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together, which are the
+/// derivatives of the next states.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
@@ -279,8 +279,8 @@ impl Problem {
     /// between solves. The solver's next iterations do not allocate.
     ///
     /// knot: the index of the knot, 0 to N − 1.
-    /// model: the new model, with as many states and controls as the old one. Costs that the model has for single
-    ///     knots belong to the knots of this problem with the same index.
+    /// model: the new model, whose state and controls have the same sizes as in the old model. Costs that the model has
+    ///     for single knots belong to the knots of this problem with the same index.
     ///
     /// Raises `ProblemError` if the model does not fit.
     fn set_knot(&self, py: Python<'_>, knot: usize, model: &Bound<'_, PyAny>) -> PyResult<()> {

@@ -67,8 +67,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::Control { reference: numbers("reference", reference)? }))
     }
 
-    /// Returns r = τ − g(q) + Jᵀλ, nv numbers: the excess of the actual efforts and forces over the efforts and forces
-    /// that hold the robot still.
+    /// Returns r = τ − g(q) + Jᵀλ, nv numbers, with joint efforts τ, gravity efforts g, contact forces λ and their
+    /// Jacobian J. r is zero if efforts and contact forces hold the robot still.
     #[staticmethod]
     fn control_gravity() -> Self {
         Self::from(robot::Residual::ControlGravity)
@@ -80,15 +80,17 @@ impl Residual {
         Ok(Self::from(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
     }
 
-    /// Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base,
-    /// 6 numbers: the force on the base. These efforts are 0 in a feasible motion.
+    /// Returns the efforts of inverse dynamics in the directions without actuators: r = Nᵀτ, where Nᵀ S = 0 with the
+    /// actuation matrix S. For a floating base, these are 6 numbers, the force on the base. The efforts are 0 in a
+    /// feasible motion.
     #[staticmethod]
     fn undriven_effort() -> Self {
         Self::from(robot::Residual::UndrivenEffort)
     }
 
-    /// Returns the acceleration of a contact, r = J q̈ + γ, for actions whose controls include the accelerations: 1, 2,
-    /// 3 or 6 numbers along the axes of the contact's rows. The acceleration is 0 while the contact holds.
+    /// Returns the acceleration of a contact, r = J q̈ + γ as in `constrained_dynamics`: 1, 2, 3 or 6 numbers along the
+    /// axes of the contact's rows. Only actions whose controls include the accelerations have this residual. The
+    /// acceleration is 0 while the contact holds.
     #[staticmethod]
     fn contact_acceleration(contact: String) -> Self {
         Self::from(robot::Residual::ContactAcceleration { contact })
@@ -114,8 +116,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::CentroidalMomentum { target: Force::from(six(target)?) }))
     }
 
-    /// Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is
-    /// a homogeneous 4 × 4 matrix.
+    /// Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf) with the pose oMf of the frame in
+    /// the world, 6 numbers, linear first; target is a homogeneous 4 × 4 matrix.
     #[staticmethod]
     fn frame_placement(
         model: &Bound<'_, Model>,
@@ -137,7 +139,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameTranslation { frame, target }))
     }
 
-    /// Returns the deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
+    /// Returns the deviation of a frame's rotation R from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3
+    /// matrix.
     #[staticmethod]
     fn frame_rotation(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (frame, target) = (frame_name(model, frame)?, rotation("target", target)?);
@@ -190,7 +193,8 @@ impl Residual {
         Ok(Self::from(robot::Residual::CenterOfPressure { contact, rotation: surface(rotation)?, size }))
     }
 
-    /// Returns the jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s).
+    /// Returns the jump of the centre of mass's velocity at an impact: r = J_c (v⁺ − v), 3 numbers (m/s), with the
+    /// Jacobian J_c of the centre of mass and the velocity v⁺ after the impact.
     #[staticmethod]
     fn impulse_center_of_mass() -> Self {
         Self::from(robot::Residual::ImpulseCenterOfMass)

@@ -167,9 +167,10 @@ macro_rules! solver {
 
             /// Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
             ///
-            /// Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-            /// an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
-            /// Then `solution` is the best iterate, from which `resume` continues.
+            /// Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+            /// phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+            /// KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+            /// `resume` continues.
             ///
             /// xs: states, (N + 1, nx), which need not satisfy the dynamics.
             /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
@@ -301,16 +302,16 @@ solver! {
 ///     `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
 ///     yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
 ///     has used up the budget returns its current result, with the status "time_limit". The first iteration always
-///     runs, unless the budget is 0. A later phase of an iteration runs only if the median of its last five durations
-///     fits into the budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the
-///     number of segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep
-///     uses as many threads as are available. The number of segments changes the results by rounding errors; the number
-///     of threads does not change them. `threads`: the number of threads that share an iteration on a robot
-///     (derivatives and gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical for
-///     any number of these threads. `max_iterations`, `tolerance`, `tolerance_bounded` (if controls are bounded),
-///     `step_lengths`, `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`,
-///     `regularisation_max`, `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`:
-///     the thresholds of the method.
+///     runs, unless the budget is 0. In later iterations, each phase (derivatives, backward sweep, rollout) runs only
+///     if the median of its last five durations fits into the budget. If a solve takes longer than the budget,
+///     `timings.overrun` is the excess. `segments`: the number of segments of the horizon on which a sweep works at the
+///     same time, at most 1024, default 1. The sweep uses as many threads as are available. The number of segments
+///     changes the results by rounding errors; the number of threads does not change them. `threads`: the number of
+///     threads that share an iteration on a robot (derivatives and gains, in parallel with the sweep), at most 1024,
+///     default 1. The results are bit-identical for any number of these threads. `max_iterations`, `tolerance`,
+///     `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
+///     `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
 Fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]

@@ -63,7 +63,8 @@ impl Sweep {
 
     /// Computes the feedback and the value functions, as a `SweepResult`.
     ///
-    /// regularisation: the number added to the diagonals of Quu and Vxx, at least 0.
+    /// regularisation: the number added to the diagonals of Quu and Vxx, at least 0. Quu is the Hessian of the
+    /// cost-to-go with respect to the controls, and Vxx the Hessian of the value function.
     ///
     /// Raises `ProblemError` if Quu of a knot is not positive definite.
     #[pyo3(signature = (regularisation=0.0))]

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use rust::{Normal, Shape, SurfaceForces};
 
 /// A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
-/// ‖f_t‖ ≤ μ f_n.
+/// ‖f_t‖ ≤ μ f_n, with the tangential part f_t and the normal component f_n of the force.
 ///
 /// `ContactTarget.activation` defines at each tick whether the contact touches, and which fraction of the full load the
 /// contact carries. The constructor of `WholeBodyController` checks the numbers.
@@ -72,9 +72,10 @@ impl FrictionContact {
     /// forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
     ///     about the normal; or 'corners', a force with a friction cone at each corner.
     /// normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
-    ///     None is the z axis. yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔
-    /// μ r, where r is the radius of the largest circle in the polygon about the mean of the corners; for an edge of
-    /// length 2 l it is ½ μ l.
+    ///     None is the z axis.
+    /// yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n, with the normal force f_n. For a
+    ///     polygon, None means ⅔ μ r, where r is the radius of the largest circle in the polygon about the mean of the
+    ///     corners. For an edge of length 2 l, None means ½ μ l.
     #[staticmethod]
     #[pyo3(signature = (
         frame, friction, corners, forces="wrench", normal=None, yaw_friction=None, min_force=0.0, max_force=f64::INFINITY

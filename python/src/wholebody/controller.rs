@@ -29,8 +29,12 @@ use std::sync::Mutex;
 ///                  −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
 ///                  bounds on q̈                         from limits of position and velocity: `JointLimits`
 ///
-/// Positions, velocities and accelerations of tasks and contacts are in the world's axes; accelerations are classical.
-/// All memory is allocated in the constructor.
+/// J and J_c are the Jacobians of tasks and contacts; in Jᵀ f, J belongs to the contact forces. a* is the desired
+/// acceleration of a task, and w are weights. f are the contact forces: f_n is the normal component of a force, f₁ and
+/// f₂ the tangential components. p is the centre of pressure, τ_n the moment about the normal, and X the pose of a
+/// contact. Sᵤ selects the coordinates without motors, S the coordinates with motors. Positions, velocities and
+/// accelerations of tasks and contacts are in the world's axes; accelerations are classical. All memory is allocated in
+/// the constructor.
 ///
 /// model: the robot.
 /// contacts: a list of `FrictionContact`, each of a different frame; empty for a robot in free fall.

@@ -8,7 +8,8 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rust::{Axes, TaskKind};
 
-/// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+/// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v), where
+/// J is the Jacobian of the quantity x.
 ///
 /// The `References` contain the target of the task. Tasks of priority 0 come first. Tasks of priority 1 only use the
 /// freedom that tasks of priority 0 leave, and so on. Within a priority, only the ratios of the weights matter. The

@@ -150,8 +150,8 @@ def test_step_and_costs(name, axes):
 
 @pytest.mark.parametrize(("name", "axes"), CASES)
 def test_equations(name, axes):
-    """Compares the equations h and their derivatives Hx and Hu row by row. A cost ½ h² of one row has the gradient h ∂h
-    and the Hessian ∂hᵀ ∂h."""
+    """Compares the equality constraints h = 0 and their derivatives Hx and Hu by state and controls, row by row. A cost
+    ½ h² of one row has the gradient h ∂h and the Hessian ∂hᵀ ∂h."""
     robot = Robot(name, axes)
     dynamics, ours = robot.dynamics()
     data = dynamics.createData()

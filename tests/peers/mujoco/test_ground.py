@@ -77,7 +77,7 @@ def test_a_quadruped_stands(lean: float) -> None:
 
 @pytest.mark.parametrize(("mu", "speed"), [(0.2, 1.0), (0.5, 2.0)])
 def test_a_box_slides_to_a_stop(mu: float, speed: float) -> None:
-    """Tests that a sliding box stops after the distance v²/(2 μ g) in both libraries."""
+    """Tests that a box with the initial speed v stops after the distance v²/(2 μ g) in both libraries."""
     x, y, z, dt = 0.2, 0.15, 0.05, 5e-4
     text = f"""<mujoco>
       <option timestep="{dt}" cone="elliptic" impratio="100" integrator="implicitfast"/>

@@ -1,9 +1,10 @@
 """Tests mimic joints that share a coordinate. The tests compare rnea, crba and nle with Pinocchio's functions, and all
 other functions with projections of Pinocchio's results.
 
-A robot with mimic joints moves like the same robot with free joints along q_free = G q + offset. So its efforts are Gᵀ
-τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G. Pinocchio computes τ_free, M_free and
-∂τ_free for the free robot. The tests check results of forward dynamics by inserting them into the equations of motion.
+A robot with mimic joints moves like the same robot with free joints along q_free = G q + offset, where G contains the
+ratios of the mimic joints. So the efforts of the robot with mimic joints are Gᵀ τ_free, its inertia is Gᵀ M_free G, and
+its derivatives are Gᵀ (∂τ_free/∂·) G. Pinocchio computes τ_free, M_free and ∂τ_free for the free robot. The tests check
+results of forward dynamics by inserting them into the equations of motion.
 """
 
 from pathlib import Path

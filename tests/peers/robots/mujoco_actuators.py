@@ -1,8 +1,8 @@
 """Computes the limits of joint efforts from the actuators of MuJoCo's compiled model.
 
-An actuator gives the force f = gain · a + bias with the activation a. If gain and bias are constant, the range of a
-bounds f. `forcerange` always bounds f. The effort of a joint is the sum of moment · f over its actuators, clipped to
-the joint's `actuatorfrcrange`.
+An actuator gives the force f = gain · a + bias with the activation a. If gain and bias are constant, the range of the
+activation bounds f. `forcerange` always bounds f. The effort of a joint is the sum of moment · f over its actuators,
+clipped to the joint's `actuatorfrcrange`.
 """
 
 import mujoco

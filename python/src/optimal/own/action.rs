@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// An action written in Python.
 ///
 /// nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the next state and the cost; the next state may be None only at the
+/// calc: a function of (t, x, u) that returns the next state x⁺ and the cost ℓ; the next state may be None only at the
 ///     terminal knot.
 /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
 ///     ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without calc_diff, calc is called with arrays of

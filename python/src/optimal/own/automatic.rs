@@ -82,8 +82,9 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of the accelerations at a knot to `slopes`, nv × n, row by row, and the derivatives of
-    /// the cost to `knot`. Returns false if no method works.
+    /// Writes the derivatives of the accelerations at a knot to `slopes`, row by row: nv rows, and a column for each
+    /// direction of the state and the controls. Writes the derivatives of the cost to `knot`. Returns false if no
+    /// method works.
     pub(super) fn dynamics(
         &self,
         py: Python<'_>,
@@ -126,7 +127,8 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of a vector of m numbers at a knot, m × n, row by row. Returns false if no method works.
+    /// Writes the derivatives of a vector at a knot, row by row: a row for each number of the vector, and a column for
+    /// each direction of the state and the controls. Returns false if no method works.
     pub(super) fn vector(
         &self,
         py: Python<'_>,
@@ -183,9 +185,9 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of the accelerations a at a knot, as `dynamics` does, and the second derivatives of μᵀ a.
-    /// The second derivatives are stored in the fields of `knot` that otherwise contain the Hessian of a cost. Returns
-    /// false if no method works.
+    /// Writes the derivatives of the accelerations a at a knot, as `dynamics` does, and the second derivatives of μᵀ a
+    /// for multipliers μ. The second derivatives are stored in the fields of `knot` that otherwise contain the Hessian
+    /// of a cost. Returns false if no method works.
     pub(super) fn curvature(
         &self,
         py: Python<'_>,
@@ -268,7 +270,8 @@ impl Differentiated<'_> {
         Ok(())
     }
 
-    /// Calls the function with pairs of directions, so that each direction occurs at least once.
+    /// Calls the function with hyper-dual numbers, each call for a pair of directions. Each direction occurs in at
+    /// least one pair.
     fn hyper(
         &self,
         py: Python<'_>,
@@ -305,7 +308,8 @@ impl Differentiated<'_> {
         self.functions.call(py, 0, (t, x, u))
     }
 
-    /// Calls the function with each pair of directions, and passes both results of the function to `read`.
+    /// Calls the function with hyper-dual numbers for each pair of directions. Passes both results of each call to
+    /// `read`.
     fn hyper_pairs(
         &self,
         py: Python<'_>,

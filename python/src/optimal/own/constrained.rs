@@ -12,8 +12,8 @@ use rust::ActionModel;
 
 /// An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// `Fddp` alone treats the constraint as a cost of values outside the bounds. For residuals of a robot, `Limit` is
-/// faster.
+/// `Fddp` without `AugmentedLagrangian` treats the constraint as a cost of values outside the bounds. For residuals of
+/// a robot, `Limit` is faster.
 ///
 /// action: the action.
 /// size: the number of entries of g, at most 4096.

@@ -1,5 +1,6 @@
 //! Numbers that carry their first and second derivatives in all directions, at several knots at a time. With such
-//! numbers, one call of a Python function computes the function's derivatives at all knots of a horizon.
+//! numbers, one call of a Python function computes the function's derivatives at all knots of a horizon. A number x
+//! carries its gradient gₓ and its Hessian Hₓ. The gradient g and the Hessian H of a function follow by the chain rule:
 //!
 //! ```text
 //! f(x):      g = f′ gₓ,                 H = f′ Hₓ + f″ gₓ gₓᵀ

@@ -12,10 +12,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::any::Any;
 
-/// Step of central differences: about ε^⅓, with the rounding error ε of doubles.
+/// Step of central differences: about ε^⅓, with the rounding error ε of f64.
 const STEP: f64 = 6e-6;
 
-/// Step of second central differences: about ε^¼, with the rounding error ε of doubles.
+/// Step of second central differences: about ε^¼, with the rounding error ε of f64.
 const SECOND_STEP: f64 = 1e-4;
 
 /// A residual of a robot that is written in Python.

@@ -142,8 +142,8 @@ impl Space {
         }
     }
 
-    /// Returns the derivatives of x ⊖ x̄ in all directions at each of several knots, ndx × n numbers row by row. `next`
-    /// contains the numbers of x with their derivatives; x̄ is the value of x.
+    /// Returns the derivatives of x ⊖ x̄ at each of several knots, row by row: ndx rows, and a column for each
+    /// direction. `next` contains the numbers of x with their derivatives; x̄ is the value of x.
     pub(super) fn slopes(&self, py: Python<'_>, d: Directions, next: &[Expansion], knots: usize) -> PyResult<Vec<f64>> {
         let row = |y: &Expansion, k: usize| y.knot(k)[1..=d.n].to_vec();
         match self {
