@@ -352,8 +352,8 @@ class CentroidalMap(NamedTuple):
     Ag: _Array
     """The centroidal momentum matrix, (6, nv), linear rows first: hg = Ag v."""
     Ig: _Array
-    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī] with their
-    mass m and their rotational inertia Ī.
+    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī] with
+    the mass m and the rotational inertia Ī of all these bodies.
     """
     com: _Array
     """The centre of mass c in the world's frame (m), 3 numbers."""
@@ -371,8 +371,8 @@ class CentroidalMapRate(NamedTuple):
     hg: _Array
     """The momentum about the centre of mass, in the axes of the world (kg m/s, kg m²/s), 6 numbers."""
     Ig: _Array
-    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī] with their
-    mass m and their rotational inertia Ī.
+    """The inertia of all moving bodies, as one rigid body, about their centre of mass, (6, 6): [m 1, 0; 0, Ī] with
+    the mass m and the rotational inertia Ī of all these bodies.
     """
     com: _Array
     """The centre of mass c in the world's frame (m), 3 numbers."""

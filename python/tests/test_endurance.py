@@ -18,8 +18,9 @@ import pytest
 import condyle
 
 CALLS = 10**7 if "CONDYLE_FULL" in os.environ else 10**5
-# Maximum growth of memory: allocators may keep some memory; losing a pointer in each call would cost twice as much.
-# Maximum growth of the number of Python objects: losing an object in every fourth call of a kind exceeds the maximum.
+# BYTES: maximum growth of memory, because allocators may keep some memory. A leak of one pointer per call would be
+# twice as large. BLOCKS: maximum growth of the number of Python objects. A leak of one object in every fourth call of a
+# kind would be larger.
 BYTES = 400_000
 BLOCKS = 2000
 

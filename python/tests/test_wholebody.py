@@ -33,7 +33,8 @@ SOLES = ["left_sole", "right_sole"]
 CHEST = "chest"
 STANDING = np.r_[0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2]
 TASKS = [Task.com(), Task.orientation("trunk"), Task.posture()]
-# Violations are at most 1e-6 of 1 and the weight; efforts and sums of forces agree up to a few of these violations.
+# Tolerance: constraints are violated by at most 1e-6, relative to 1 and to the weight. Efforts and sums of forces have
+# errors of a few times this violation.
 SOLVED = 1e-3
 
 

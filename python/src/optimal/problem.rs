@@ -38,9 +38,9 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 /// terminal: the model of the terminal knot, without controls.
 ///
 /// Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
-/// is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, more than 4096 numbers in a state or in
-/// the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together, which are the
-/// derivatives of the next states.
+/// is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, and for more than 4096 numbers in a state
+/// or in the controls of a knot. The matrices [A B], the derivatives of the next states, may have at most 2²⁸ numbers
+/// in all knots together.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
