@@ -29,7 +29,9 @@ FRICTION = 0.4
 EFFORT = 60.0  # maximum effort τ_max (N m)
 STIFFNESS, DAMPING = 60.0, 15.5  # gains of the tasks (1/s², 1/s)
 TRUNK, POSTURE, SMALL_A, SMALL_F = 10.0, 0.1, 1e-6, 1e-4  # weights w, w_p, ε_a, ε_f
-TOLERANCE = 1e-11  # tolerance of both solvers; torques have errors of its square root if a foot just reaches its cone
+# Tolerance of both solvers. If the force on a foot just reaches its friction cone, torques have errors up to the square
+# root of this tolerance.
+TOLERANCE = 1e-11
 DT = 1e-3  # time step (s)
 PUSH = 60.0  # force to the left (N), from 0.1 s to 0.3 s
 ALIGNED = "local_world_aligned"

@@ -21,8 +21,8 @@ divided by STEP; M⁻¹ of light bodies amplifies rounding errors.
 """
 BY_HAND = 1e-11
 VALUE = 1e-12
-"""Tolerance for values. Doubles are computed by other code than hyper-dual numbers, with limbs in parallel lanes; M⁻¹
-amplifies the difference.
+"""Tolerance for values. Floats are computed by other code than hyper-dual numbers, with limbs in parallel lanes, so the
+rounding errors differ. M⁻¹ amplifies the difference.
 """
 
 Case = Callable[[Robot, Any, Any], Any]

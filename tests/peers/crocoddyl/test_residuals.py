@@ -379,7 +379,8 @@ def test_control_polynomial(robot, integrator, controls):
         else crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, held, total, 0.0, True)
     )
     # In Crocoddyl, controls that are quadratic in time need a Runge-Kutta integrator of three or four stages.
-    # For other integrators, the test gives the quadratic the time points of four stages.
+    # For other integrators, the test defines the quadratic polynomial at the time points of an integrator of four
+    # stages.
     of = kind if kind == crocoddyl.RKType.three else crocoddyl.RKType.four
     polynomial = POLYNOMIALS[controls](r.nu, of)
     if kind is None:

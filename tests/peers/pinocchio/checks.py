@@ -12,8 +12,8 @@ METHODS = (None, "aba", "dense", "sparse")
 GRAINS = (1, 4)
 """Tested numbers of bodies that divide and conquer does not divide further. 1 gives the largest number of cuts."""
 CUTS = 10.0
-"""Factor by which the tolerance of divide and conquer is larger, because the pieces of a robot have larger condition
-numbers than the whole robot."""
+"""Factor by which the tolerance of divide and conquer is larger, because the parts into which the algorithm divides a
+robot have larger condition numbers than the whole robot."""
 FRAMES = {
     "local": pin.ReferenceFrame.LOCAL,
     "world": pin.ReferenceFrame.WORLD,

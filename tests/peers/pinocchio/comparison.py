@@ -29,8 +29,8 @@ ROOT_JOINTS = {
 }
 
 BATCH, HERE = 11, 9
-"""Number of states in a batch, and index of the state that is compared. The number is larger than the number of lanes
-of a SIMD vector and not a multiple of it."""
+"""Number of states in a batch, and index of the state that is compared. The number of states is larger than the number
+of lanes of a SIMD vector, and not a multiple of the number of lanes."""
 
 SELF_STATES = 20
 """Number of states in which two methods of Pinocchio for the same result are compared."""
