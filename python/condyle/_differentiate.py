@@ -42,7 +42,8 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
     """Computes the value f(x), a vector of m numbers, and the exact Jacobian J = ∂f(x ⊕ δ)/∂δ, as `(value, J)`. J has m
     rows and nv + k columns, where k is the number of entries of x after the position.
 
-    x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
+    x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position, and addition for the other
+    numbers.
     f: a function that takes an array like x, of `HyperDual`s, and returns a vector. f is called once for every two
         directions.
 
