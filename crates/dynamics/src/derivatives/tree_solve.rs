@@ -2,8 +2,8 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity. The
 //! efforts are the columns of B. The algorithm works in the world's frame with the factors of the articulated-body
-//! algorithm. Each column of B costs O(n), whereas each entry of a product with M⁻¹ costs O(n). Several columns of B
-//! are processed together.
+//! algorithm. For n bodies, each column of B costs O(n), whereas in a product with M⁻¹ each entry costs O(n). Several
+//! columns of B are processed together.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;

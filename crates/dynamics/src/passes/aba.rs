@@ -4,9 +4,9 @@
 //! so the inertia and force of a body are added to the inertia and force of its parent without a change of coordinates.
 //! A joint with several degrees of freedom is treated as a chain of joints with one degree of freedom, between massless
 //! bodies. The columns of such a joint are eliminated one by one, beginning with the last column, so no matrix is
-//! inverted. The dot products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. To
-//! shorten the chain of dependent operations, the linear and the angular half of each product are computed
-//! independently.
+//! inverted. Two dot products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. S is
+//! a joint column, U = Iᴬ S, and a' is the parent's acceleration plus the velocity-dependent acceleration. To shorten
+//! the chain of dependent operations, the linear and the angular half of each product are computed independently.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};
@@ -65,8 +65,8 @@ fn eliminate<L: Layout>(
     Ia
 }
 
-/// Computes U = Iᴬ S and 1/D for all columns S. U and D depend only on q. The placements of the bodies must already be
-/// computed.
+/// Computes U = Iᴬ S and 1/D for all joint columns S, with the articulated inertia Iᴬ and D = Sᵀ U + armature. U and D
+/// depend only on q. The placements of the bodies must already be computed.
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;

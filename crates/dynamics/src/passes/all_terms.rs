@@ -39,8 +39,8 @@ workspace! {
     }
 }
 
-/// Computes M, h, the kinetic energy of the bodies and the columns of the centroidal map. The velocities of the bodies
-/// must already be computed.
+/// Computes the inertia matrix M, the bias efforts h, the kinetic energy of the bodies and the columns of the
+/// centroidal map. The velocities of the bodies must already be computed.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -107,7 +107,7 @@ pub struct AllTerms<'d, S, R = f64> {
     pub centroidal: CentroidalMapRate<'d, S>,
     /// Kinetic energy T = ½ vᵀ M v (J).
     pub kinetic_energy: S,
-    /// Potential energy V = −m gᵀ c (J), with the total mass m and its centre c.
+    /// Potential energy V = −m gᵀ c (J), with the total mass m and the centre of mass c.
     pub potential_energy: S,
     /// Accelerations of the bodies for q̈ = 0. The world's acceleration is −g, which includes gravity.
     pub(crate) a: &'d [Motion<S>],

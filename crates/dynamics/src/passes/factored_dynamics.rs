@@ -13,11 +13,11 @@ use condyle_spatial::{Array, Matrix, Scalar};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ForwardDynamicsMethod {
-    /// Articulated-body algorithm, O(n).
+    /// Articulated-body algorithm, O(n) for n bodies.
     ArticulatedBody,
-    /// Solution of M q̈ = τ − h with the dense factor [`Cholesky`], O(n³).
+    /// Solution of M q̈ = τ − h with the dense factor [`Cholesky`], O(n³) for n coordinates.
     Dense,
-    /// Solution of M q̈ = τ − h with the sparse factor [`Ltdl`], O(n d²) for a tree of depth d.
+    /// Solution of M q̈ = τ − h with the sparse factor [`Ltdl`], O(n d²) for n coordinates and a tree of depth d.
     Sparse,
 }
 

@@ -212,7 +212,8 @@ impl Contacts {
         self.solver.solve(points, friction, tolerance, max_iterations)
     }
 
-    /// Computes v⁺ = v_next + M⁻¹ Jᵀ λ, and stores the forces λ/h.
+    /// Computes the velocity after the contacts, v⁺ = v_next + M⁻¹ Jᵀ λ, and stores the mean forces λ/h, where h is the
+    /// step length.
     fn record(&mut self, h: f64, v_next: &mut [f64]) {
         let nv = v_next.len();
         self.impulses.fill(0.0);

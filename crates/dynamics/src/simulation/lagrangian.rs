@@ -35,9 +35,9 @@ workspace! {
         hC: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Force Fᶜ that holds still all bodies that a joint carries. Written by: `pass`.
         FC: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Motion Ψ̇ of each column. Written by: `pass`.
+        /// Motion Ψ̇ = v_λ × S of each column S, with the velocity v_λ of the joint's parent. Written by: `pass`.
         Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Motion Ψ̈ of each column. Written by: `pass`.
+        /// Motion Ψ̈ = −g × S of each column S, with the gravity g. Written by: `pass`.
         Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Momentum p = M v. Written by: `pass`.
         pub(super) p: Array<S> = filled(S::zero, size.nv),
