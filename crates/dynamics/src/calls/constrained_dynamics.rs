@@ -108,7 +108,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     solve(constraints, &d.factor, &d.effort, &mut d.qdd);
 }
 
-/// Result of [`constrained_dynamics_equations`]. [`ConstraintSet::jacobian`] returns J.
+/// Result of [`constrained_dynamics_equations`]. [`ConstraintSet::jacobian`] returns the constraint Jacobian J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedEquations<'d, S> {
     /// Joint accelerations q̈, nv numbers.

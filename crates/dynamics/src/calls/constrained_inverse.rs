@@ -14,7 +14,7 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// Result of [`constrained_inverse_dynamics`]. [`ConstraintSet::jacobian`] returns J.
+/// Result of [`constrained_inverse_dynamics`]. [`ConstraintSet::jacobian`] returns the constraint Jacobian J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverse<'d, S> {
     /// Joint efforts τ = M q̈ + h − Jᵀ λ − Σ Jᵢᵀ f_ext,i, nv numbers (N m, N).
@@ -70,7 +70,8 @@ pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
     ConstrainedInverse { tau: &data.rnea.tau, acceleration: &constraints.error }
 }
 
-/// Result of [`constrained_inverse_dynamics_derivatives`]. [`ConstraintSet::jacobian`] returns J, and ∂τ/∂λ = −Jᵀ.
+/// Result of [`constrained_inverse_dynamics_derivatives`]. [`ConstraintSet::jacobian`] returns the constraint Jacobian
+/// J. The derivative ∂τ/∂λ with respect to the constraint forces is −Jᵀ.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverseDerivatives<'d, S> {
     /// Joint efforts τ, nv numbers.

@@ -28,7 +28,8 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Sum of all external forces and constraint forces on each body, in the body's frame. Written by: `load`.
         pub forces: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Matrix M⁻¹, which the block P of K⁻¹ overwrites. Written by: `invert`.
+        /// Matrix M⁻¹, which the block P of K⁻¹ overwrites. K is the matrix of the constrained equations of motion.
+        /// Written by: `invert`.
         pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Derivative ∂(M q̈ + h − Jᵀ λ)/∂q of the equations of motion. Written by: `turn`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),

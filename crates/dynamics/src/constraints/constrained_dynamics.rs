@@ -39,7 +39,7 @@ workspace! {
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Inertia matrix M. Written by: `bias`, `inertia`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Sparse factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        /// Sparse factor of the inertia matrix M. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub factor: Ltdl<S> = Ltdl::new(model),
         /// Bias efforts h, which the difference τ − h overwrites. Written by: `bias`, `constrained_dynamics`.
         pub effort: Array<S> = filled(S::zero, size.nv),

@@ -161,7 +161,7 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Computes the constraint's rows of J, in the slots of the constraint.
+    /// Computes the constraint's rows of the Jacobian J, in the slots of the constraint.
     #[inline(always)]
     pub(crate) fn jacobian(&self, plan: &Plan, columns: &[Motion<S>], J: &mut [S]) {
         let (rows, n) = (plan.rows(), plan.places.len());

@@ -70,7 +70,7 @@ pub(crate) struct Plan {
     /// which are rotated to the joint axes (`turned`).
     pub placements: [Se3<f64>; 2],
     pub turned: [Se3<f64>; 2],
-    /// Index of the constraint's first row in J.
+    /// Index of the constraint's first row in the constraint Jacobian J.
     pub row: usize,
     /// Slots of the coordinates that move the constraint's frames, sorted from the root outwards (`places`), and the
     /// coordinate of each slot (`coordinates`).

@@ -13,10 +13,10 @@ use alloc::vec::Vec;
 use condyle_model::tree::Column;
 use condyle_spatial::{Array, Scalar, same_layout};
 
-/// Number of columns of B that are processed together.
+/// Number of columns of B in a product −M⁻¹ B that are processed together.
 const SIDE: usize = 16;
 
-/// Number of columns of B that are processed together if the scalar has lanes.
+/// Number of columns of B in a product −M⁻¹ B that are processed together if the scalar has lanes.
 const SIDE_OF_LANES: usize = 2;
 
 /// Path of joint columns in the tree: each column except the last has exactly one child, the next column. The bias

@@ -61,7 +61,7 @@ impl<S: Scalar> Coriolis<S> {
         Self { momentum: I * v, rate }
     }
 
-    /// Returns the product 2B m.
+    /// Returns the product of the matrix 2B with a motion m, a force.
     #[inline(always)]
     pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);

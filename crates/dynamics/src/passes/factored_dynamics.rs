@@ -23,9 +23,9 @@ pub enum ForwardDynamicsMethod {
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Sparse factor of M. Written by: `forward_dynamics`.
+        /// Sparse factor of the inertia matrix M. Written by: `forward_dynamics`.
         pub sparse: Ltdl<S> = Ltdl::new(model),
-        /// Dense factor of M. Written by: `forward_dynamics`.
+        /// Dense factor of the inertia matrix M. Written by: `forward_dynamics`.
         pub dense: Cholesky<S> = Cholesky::new(size.nv),
         /// Zeros that are never overwritten.
         pub zero: Array<S> = filled(S::zero, model.nv()),

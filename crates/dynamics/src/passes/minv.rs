@@ -31,7 +31,7 @@ workspace! {
         pub A: Array<S> = filled(S::zero, (1 + size.depth) * 6 * size.columns),
         /// Inverse M⁻¹ of the inertia matrix. Written by: `minv`.
         pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Sparse factor of M. Written by: `from_matrix`.
+        /// Sparse factor of the inertia matrix M. Written by: `from_matrix`.
         pub factor: Ltdl<S> = Ltdl::new(model),
     }
 }

@@ -181,13 +181,13 @@ impl<'a> Problem<'a> {
         ((self.entry(r, r) + self.entry(r + 1, r + 1)).max(least), self.entry(r + 2, r + 2).max(least))
     }
 
-    /// Returns entry i of G x + b, for the impulses x.
+    /// Returns entry i of the velocities G x + b, for the impulses x.
     fn velocity(&self, i: usize, x: &[f64]) -> f64 {
         let row = &self.G[i * self.n..][..self.n]; // G is symmetric
         row.iter().zip(x).fold(self.b[i], |sum, (g, x)| sum + g * x)
     }
 
-    /// Computes u = G x + b, for the impulses x.
+    /// Computes the velocities u = G x + b, for the impulses x.
     fn multiply(&self, x: &[f64], u: &mut [f64]) {
         for (i, u) in u.iter_mut().enumerate() {
             *u = self.velocity(i, x);

@@ -11,7 +11,7 @@ workspace! {
     pub(super) struct Workspace<S>(size) {
         /// Efforts, including passive efforts. Written by: `velocity`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// Displacement h v'. Written by: `position`.
+        /// Displacement h v' of a step with length h and velocity v'. Written by: `position`.
         way: Array<S> = filled(S::zero, size.nv),
     }
 }

@@ -45,7 +45,7 @@ workspace! {
         pub(super) L_q: Array<S> = filled(S::zero, size.nv),
         /// Inertia matrix M = ∂p/∂v. Written by: `pass`.
         pub(super) M: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Derivative ∂p/∂q, the transpose of ∂²L/∂q∂v. Written by: `pass`.
+        /// Derivative ∂p/∂q of the momentum p; the transpose of ∂²L/∂q∂v. Written by: `pass`.
         pub(super) p_q: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Second derivatives ∂²L/∂q∂q of the Lagrangian; row i is the derivative of entry i of ∂L/∂q. Written by:
         /// `pass`.

@@ -45,7 +45,7 @@ workspace! {
         p: Array<S> = filled(S::zero, size.nv),
         /// Velocity w during the step.
         w: Array<S> = filled(S::zero, size.nv),
-        /// Displacements −h w, h w/2 and −h w/2. Written by: `set_ways`.
+        /// Displacements −h w, h w/2 and −h w/2 for the step length h and the velocity w. Written by: `set_ways`.
         minus_y: Array<S> = filled(S::zero, size.nv),
         x: Array<S> = filled(S::zero, size.nv),
         minus_x: Array<S> = filled(S::zero, size.nv),

@@ -191,14 +191,15 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
         for j in (0..=k).step_by(LANES) {
             let mut block = [Four::zero(); LANES];
             for r in 0..LANES {
-                // SAFETY: k + r < n, and j + LANES ≤ n.
+                // SAFETY: row k + r and the columns from j are inside the n rows of `rows`: k + r < n, and j + LANES ≤
+                // n ≤ width.
                 block[r] = Four::load(unsafe { rows.get_unchecked((k + r) * width + j..(k + r) * width + j + LANES) });
             }
             // SAFETY: the block's rows are inside X, by the same inequalities.
             unsafe { write(X, k * n + j, n, &block) };
             Four::transpose(&mut block);
             if j < k {
-                // SAFETY: j + r < n, and k + LANES ≤ n.
+                // SAFETY: row j + r and the columns from k are inside the n × n matrix X: j + r < n, and k + LANES ≤ n.
                 unsafe { write(X, j * n + k, n, &block) };
             }
         }
@@ -216,8 +217,8 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
     }
 }
 
-/// Writes the rows of a block to X. The first row begins at entry `at`, and each row begins n entries after the row
-/// before.
+/// Writes the rows of a block to X. The first row begins at entry `at`, and each row begins n entries after the
+/// previous row.
 ///
 /// # Safety
 /// The block's last row must end inside X.
