@@ -97,8 +97,8 @@ pub(crate) fn limbs<S: 'static, R>(model: &Model<R>) -> Option<&Plan> {
     model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)
 }
 
-/// Returns whether M⁻¹ is computed from the factor of M, which has `nonzeros` entries. Joints that share coordinates
-/// always use the factor.
+/// Returns whether M⁻¹ is computed from the sparse factor of M. The factor has `nonzeros` entries. Joints that share
+/// coordinates always use the factor.
 pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }

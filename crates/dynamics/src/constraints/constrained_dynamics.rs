@@ -30,8 +30,8 @@ workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
         /// Velocity of each body. Written by: `bias`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
-        /// `bias`.
+        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which accounts for gravity. Written
+        /// by: `bias`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Composite inertia Iᶜ of each body. Written by: `bias`, `inertia`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),

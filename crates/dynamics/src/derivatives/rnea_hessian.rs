@@ -2,8 +2,9 @@
 //!
 //! φ = λᵀ τ(q, v, a) is the power of the efforts when the joints move with velocity λ. So φ = Σ ⟨w_i, F_i⟩, where w_i
 //! is the velocity of body i for the joint velocity λ. When coordinate e changes, the bodies that the joint of e
-//! carries turn rigidly about S_e. This rigid turn does not change the power. In addition, the motions w, v and a of
-//! each of these bodies change as follows (see `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
+//! carries turn rigidly about the joint column S_e. This rigid turn does not change the power. In addition, the motions
+//! w, v and a of each of these bodies change as follows (see `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e +
+//! Ṡ_e:
 //!
 //! ```text
 //! by q_e:  δw = W_e,  δv = Ψ̇_e,  δa = Ψ̈_e + Ψ̇_e × v        by q̇_e:  δv = S_e,  δa = Y_e + S_e × v

@@ -26,7 +26,8 @@ workspace! {
         pub D_inv: Array<S> = filled(S::zero, size.columns),
         /// Velocity of each body; the world's velocity stays 0. Written by: `inward`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
-        /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `outward`.
+        /// Acceleration of each body; the world's acceleration is −g, which accounts for gravity. Written by:
+        /// `outward`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
         /// Velocity-dependent acceleration v × v_J of each body, with the velocity v_J of the body's joint. Written by:
         /// `inward`.

@@ -41,7 +41,7 @@ workspace! {
         /// Pose λXi of each body in the frame of its parent. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.body_depth),
         /// Angular velocity, angular acceleration and acceleration of the origin of each body. The world's acceleration
-        /// is −g, which includes gravity. Written by: `pass`.
+        /// is −g, which accounts for gravity. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.body_depth),
         /// Force that each joint transmits. Written by: `pass`.

@@ -3,9 +3,9 @@
 //!
 //! All quantities are in the world's frame. Composite quantities are sums over all bodies that a joint carries: inertia
 //! Iᶜ, momentum hᶜ, and the force Fᶜ that holds the bodies still. Ψ̇ = v_λ × S and Ψ̈ = −g × S, where v_λ is the
-//! velocity of the joint's parent. When coordinate e of joint j changes, the bodies that j carries turn about S_e. The
-//! velocity v_i of each such body i also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see `rnea_derivatives.rs`). The
-//! turn does not change the kinetic energy, so
+//! velocity of the joint's parent. When coordinate e of joint j changes, the bodies that j carries turn about the joint
+//! column S_e. The velocity v_i of each such body i also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see
+//! `rnea_derivatives.rs`). The turn does not change the kinetic energy, so
 //!
 //! ```text
 //! p_e = (M v)_e = S_e · hᶜ,   ∂L/∂q_e = Ψ̇_e · hᶜ − S_e · Fᶜ

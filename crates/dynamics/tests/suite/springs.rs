@@ -182,8 +182,8 @@ fn like_mujoco() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// Checks that M, bias and passive efforts equal MuJoCo's results, for a robot from a builder and for the robot read
-/// from the file.
+/// Checks that the inertia matrix M, the bias efforts and the passive efforts equal MuJoCo's results, for a robot from
+/// a builder and for the robot read from the file.
 #[test]
 fn the_numbers_of_mujoco() {
     let text = include_str!("../data/passive_mujoco.json");

@@ -40,7 +40,7 @@ workspace! {
     pub(crate) struct Bodies<S>(size) {
         /// Velocity of each body. Written by: `pass`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `pass`.
+        /// Acceleration of each body; the world's acceleration is −g, which accounts for gravity. Written by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Composite inertia Iᶜ of each joint. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -55,7 +55,7 @@ workspace! {
         pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Sum Ψ̇ + Ṡ of each column S, with the rate Ṡ of the column. Written by: `pass`.
         pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Values of each column d that `vectorized` needs for all pairs (d, e). Written by: `pass`.
+        /// Values of each column d that `vectorized` needs for all pairs of columns (d, e). Written by: `pass`.
         pub rows: Rows<S> = Rows::new(size.columns),
     }
 }
