@@ -45,8 +45,8 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 
 /// Computes f(x) and its exact Jacobian ∂f(x ⊕ δ)/∂δ, in one evaluation of f per direction.
 ///
-/// x: n numbers, the first nq of which are a position. Returns the m numbers of f(x), and a matrix of m × (n − nq +
-/// nv).
+/// x: n numbers, the first nq of which are a position. δ has n − nq + nv numbers. Returns the m numbers of f(x), and
+/// the m × (n − nq + nv) matrix of the Jacobian.
 ///
 /// ```
 /// use condyle_dynamics::{Data, forward_kinematics, jacobian, robots};
@@ -135,8 +135,8 @@ enum Width {
 }
 
 impl LaneJacobian {
-    /// Allocates memory for states of n numbers, which begin with q, and for functions with `results` results. Uses the
-    /// SIMD level that is current at this call.
+    /// Allocates memory for states of n numbers, the first nq of which are a position, and for functions with `results`
+    /// results. Uses the SIMD level that is current at this call.
     ///
     /// # Panics
     /// Panics if n is less than nq.
@@ -151,7 +151,9 @@ impl LaneJacobian {
         Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq() + model.nv()) }
     }
 
-    /// Computes the m numbers of f(x), and the Jacobian ∂f(x ⊕ δ)/∂δ, a matrix of m × (n − nq + nv).
+    /// Computes f(x), m numbers, and the Jacobian ∂f(x ⊕ δ)/∂δ. x has n numbers, the first nq of which are a position.
+    /// δ has n − nq + nv numbers: nv numbers that move the position, and one for each other number of x. So the
+    /// Jacobian is m × (n − nq + nv).
     ///
     /// # Panics
     /// Panics if the number of entries of x or of results of f differs from the number given to [`new`](Self::new), or
@@ -183,7 +185,7 @@ impl LaneJacobian {
     /// ```
     ///
     /// # Panics
-    /// Panics in the same cases as [`of`](Self::of), or if a direction is not below n − nq + nv.
+    /// Panics in the same cases as [`of`](Self::of), or if a direction is not below the number of entries of δ.
     #[track_caller]
     pub fn along<R: Constant<f64>>(
         &mut self,
@@ -309,7 +311,8 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
 
 /// Computes f(x) and its exact gradient ∂f(x ⊕ δ)/∂δ, in one evaluation of f per direction.
 ///
-/// x: n numbers, the first nq of which are a position. Returns f(x), and the n − nq + nv numbers of the gradient.
+/// x: n numbers, the first nq of which are a position. Returns f(x), and the gradient, one number for each of the n −
+/// nq + nv entries of δ.
 ///
 /// ```
 /// use condyle_dynamics::{Data, gradient, rnea, robots};

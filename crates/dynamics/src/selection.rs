@@ -10,18 +10,19 @@ use condyle_model::tree::Column;
 use condyle_spatial::gate::{FusedF64, Level, is, level};
 use condyle_spatial::{Scalar, same_layout};
 
-/// Maximum mean number of entries per row of the factor of M. If the mean is larger, M⁻¹ is not computed from the
-/// factor. Measured by `benches/factorisation.rs`: on a chain of 24 joints, with a mean of 12.5, M⁻¹ takes equally long
-/// with and without the factor. The mean is 9.7 for the humanoid and 4 for the arm.
+/// Maximum mean number of entries per row of the sparse factor of the inertia matrix M. If the mean is larger, M⁻¹ is
+/// not computed from the factor. Measured by `benches/factorisation.rs`: on a chain of 24 joints, with a mean of 12.5,
+/// M⁻¹ takes equally long with and without the factor. The mean is 9.7 for the humanoid and 4 for the arm.
 const SHORT_ROWS: usize = 12;
 
-/// Minimum mean length of the paths from the columns to the root for computing −M⁻¹ B by recursions over the
-/// articulated bodies. If the mean is smaller, −M⁻¹ B is computed as a matrix product. Measured by
+/// Minimum mean length of the paths from the joint columns to the root at which products −M⁻¹ B are computed by
+/// recursions over the articulated bodies. If the mean is smaller, −M⁻¹ B is computed as a matrix product. Measured by
 /// `benches/peers/dynamics.py` on chains.
 const LONG_WAY: usize = 24;
 
-/// Mean length of the paths from the columns to the root. Above this length, the derivatives ∂τ are computed for four
-/// columns at a time instead of one pair of columns at a time. Measured by `benches/peers/dynamics.py`.
+/// Mean length of the paths from the columns to the root. Above this length, the derivatives ∂τ of inverse dynamics are
+/// computed for four columns at a time instead of one pair of columns at a time. Measured by
+/// `benches/peers/dynamics.py`.
 const LONG_SUPPORT: usize = 4;
 
 /// Selected method of each function that has several methods, for one model and one type of scalar.
@@ -68,12 +69,13 @@ impl InverseMethod {
 /// Method by which the derivatives ∂q̈ = −M⁻¹ ∂τ are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AbaDerivativesMethod {
-    /// Product of M⁻¹ and ∂τ, after both matrices are computed with the limbs in parallel lanes. Calls that cannot use
-    /// lanes use `Product` instead.
+    /// Product of M⁻¹ and the derivatives ∂τ of inverse dynamics, after both matrices are computed with the limbs in
+    /// parallel lanes. Calls that cannot use lanes use `Product` instead.
     Limbs,
-    /// Product of M⁻¹ and ∂τ, after both matrices are computed body by body.
+    /// Product of M⁻¹ and the derivatives ∂τ of inverse dynamics, after both matrices are computed body by body.
     Product,
-    /// Computation of ∂τ body by body, and of −M⁻¹ ∂τ by recursions over the articulated bodies.
+    /// Computation of the derivatives ∂τ of inverse dynamics body by body, and of −M⁻¹ ∂τ by recursions over the
+    /// articulated bodies.
     TreeSolve,
 }
 
@@ -95,8 +97,8 @@ pub(crate) fn limbs<S: 'static, R>(model: &Model<R>) -> Option<&Plan> {
     model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)
 }
 
-/// Returns whether M⁻¹ is computed from the factor of M, which has `nonzeros` entries. Joints that share coordinates
-/// always use the factor.
+/// Returns whether M⁻¹ is computed from the sparse factor of M. The factor has `nonzeros` entries. Joints that share
+/// coordinates always use the factor.
 pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
@@ -112,15 +114,15 @@ pub fn is_short_chain<R>(model: &Model<R>) -> bool {
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
 }
 
-/// Returns whether −M⁻¹ B is computed by recursions over the articulated bodies. The result is false if joints share
-/// coordinates.
+/// Returns whether products −M⁻¹ B are computed by recursions over the articulated bodies. The result is false if
+/// joints share coordinates.
 pub(crate) fn solve_by_tree(columns: &[Column], nv: usize) -> bool {
     let depths: usize = columns.iter().map(|c| c.depth).sum();
     columns.len() == nv && depths >= LONG_WAY * nv
 }
 
-/// Returns whether the derivatives ∂τ are computed four columns at a time. The result is true only for single states
-/// and only if the processor has vectors of four numbers.
+/// Returns whether the derivatives ∂τ of inverse dynamics are computed four columns at a time. The result is true only
+/// for single states and only if the processor has vectors of four numbers.
 #[inline(always)]
 pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
     is::<S, FusedF64>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
@@ -130,8 +132,9 @@ pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
 /// support such joints.
 ///
 /// Measured by `benches/factorisation.rs` on the embedded robots, and on chains, binary trees and stars of 6 to 200
-/// joints. Methods with a factor of M are never faster: h and M alone take nearly as long as ABA on an arm with 7
-/// joints, and up to 3 times as long on the other robots. `docs/performance.md` has the table.
+/// joints. Methods with a factor of M are never faster than ABA, because they must compute the bias efforts h and the
+/// inertia matrix M. This computation alone takes nearly as long as ABA on an arm with 7 joints, and up to 3 times as
+/// long on the other robots. `docs/performance.md` has the table.
 pub(crate) fn forward_dynamics<R>(model: &Model<R>) -> ForwardDynamicsMethod {
     if model.has_mimic() { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody }
 }

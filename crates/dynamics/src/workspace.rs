@@ -49,8 +49,9 @@ impl Size {
     }
 }
 
-/// Returns an array of n equal entries. The function is not inlined and calls `entry` itself, because a workspace has
-/// dozens of arrays. The function copies each entry as a whole, whereas `vec!` would clone an entry number by number.
+/// Returns an array of n equal entries. A workspace has dozens of arrays. Therefore the function is not inlined and
+/// calls `entry` itself, which keeps the code of `new` short. The function copies each entry as a whole, whereas `vec!`
+/// would clone an entry number by number.
 #[inline(never)]
 pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Array<T> {
     let entry = entry();

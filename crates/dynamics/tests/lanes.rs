@@ -118,7 +118,7 @@ const CONVERGED: f64 = 1e-12;
 /// Functions that couple the lanes (`in_step`) must give the same numbers up to rounding.
 #[test]
 fn lanes_are_single_calls() {
-    pin(Level::Baseline).unwrap(); // a level without fused operations, like `Lanes2`
+    pin(Level::Baseline).unwrap(); // a SIMD level without fused operations, like `Lanes2`
     for (seed, model) in all_models(15).iter().enumerate() {
         let mut rng = rng(seed as u64);
         let knots = [Input::<f64>::random(model, &mut rng), Input::random(model, &mut rng)];

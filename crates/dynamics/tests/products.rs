@@ -195,7 +195,7 @@ impl States {
     }
 }
 
-/// Returns contacts at the last two frames, if the robot has enough freedom for them.
+/// Returns contacts at the last two frames, if the robot has enough degrees of freedom for them.
 fn contacts(model: &Model) -> Vec<ContactConstraint> {
     let frames = (0..model.frames().len()).rev().take(2);
     if model.nv() < 6 { Vec::new() } else { frames.map(ContactConstraint::point).collect() }

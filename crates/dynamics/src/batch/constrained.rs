@@ -15,11 +15,12 @@ results! {
     BatchConstrained of Constrained {
         /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// Constraint forces λ, one number per row of J, for each state.
+        /// Constraint forces λ, one number per row of the constraint Jacobian J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Error of the constraints, for each state: the largest absolute value in J q̈ + γ.
+        /// Error of the constraints, for each state: the largest absolute value of the constraint accelerations J q̈ +
+        /// γ.
         residual: &'b [T] = [];
-        /// Number of rows of J that depend on earlier rows, for each state.
+        /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, for each state.
         redundant: &'b [T] = [];
     }
 
@@ -28,11 +29,12 @@ results! {
     BatchConstrainedDerivatives of ConstrainedDerivatives {
         /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// Constraint forces λ, one number per row of J, for each state.
+        /// Constraint forces λ, one number per row of the constraint Jacobian J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Error of the constraints, for each state: the largest absolute value in J q̈ + γ.
+        /// Error of the constraints, for each state: the largest absolute value of the constraint accelerations J q̈ +
+        /// γ.
         residual: &'b [T] = [];
-        /// Number of rows of J that depend on earlier rows, for each state.
+        /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, for each state.
         redundant: &'b [T] = [];
         /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space, nv × nv.
         da_dq: Matrices<'b, T> = [NV, NV];
@@ -55,11 +57,12 @@ results! {
     BatchConstrainedEquations of ConstrainedEquations {
         /// Accelerations q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// Constraint forces λ, one number per row of J, for each state.
+        /// Constraint forces λ, one number per row of the constraint Jacobian J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Error of the constraints, for each state: the largest absolute value in J q̈ + γ.
+        /// Error of the constraints, for each state: the largest absolute value of the constraint accelerations J q̈ +
+        /// γ.
         residual: &'b [T] = [];
-        /// Number of rows of J that depend on earlier rows, for each state.
+        /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, for each state.
         redundant: &'b [T] = [];
         /// Inertia matrix M, nv × nv.
         M: Matrices<'b, T> = [NV, NV];
@@ -77,11 +80,12 @@ results! {
     BatchImpulse of Impulse {
         /// Velocities v⁺ after the impact, nv numbers per state.
         v: &'b [T] = [NV];
-        /// Impulses Λ, one number per row of J, for each state.
+        /// Constraint impulses Λ, one number per row of the constraint Jacobian J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Error of the constraints, for each state: the largest absolute value in J (v⁺ + ε v).
+        /// Error of the constraints, for each state: the largest absolute value of J (v⁺ + ε v), for the velocities v
+        /// before and v⁺ after the impact and the restitution ε.
         residual: &'b [T] = [];
-        /// Number of rows of J that depend on earlier rows, for each state.
+        /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, for each state.
         redundant: &'b [T] = [];
     }
 
@@ -89,11 +93,12 @@ results! {
     BatchImpulseDerivatives of ImpulseDerivatives {
         /// Velocities v⁺ after the impact, nv numbers per state.
         v: &'b [T] = [NV];
-        /// Impulses Λ, one number per row of J, for each state.
+        /// Constraint impulses Λ, one number per row of the constraint Jacobian J, for each state.
         lambda: &'b [T] = [ROWS];
-        /// Error of the constraints, for each state: the largest absolute value in J (v⁺ + ε v).
+        /// Error of the constraints, for each state: the largest absolute value of J (v⁺ + ε v), for the velocities v
+        /// before and v⁺ after the impact and the restitution ε.
         residual: &'b [T] = [];
-        /// Number of rows of J that depend on earlier rows, for each state.
+        /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, for each state.
         redundant: &'b [T] = [];
         /// Derivative ∂v⁺/∂q of the velocity after the impact in the tangent space, nv × nv.
         dv_dq: Matrices<'b, T> = [NV, NV];

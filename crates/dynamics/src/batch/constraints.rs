@@ -1,4 +1,4 @@
-//! Constraints of a batch: one set per thread, which holds the targets of all states.
+//! Constraints of a batch: one constraint set per thread. All sets have the same targets, which apply to all states.
 
 use super::{Batch, InLanes};
 use crate::constraints::constraint::{ContactConstraint, Target};
@@ -71,12 +71,12 @@ fn made<S: condyle_spatial::Scalar>(
 }
 
 impl<T: Real> BatchConstraints<T> {
-    /// Returns the number of rows of J, which is also the length of λ of each state.
+    /// Returns the number of rows of the constraint Jacobian J. Each state has this number of constraint forces λ.
     pub fn rows(&self) -> usize {
         each!(Sets, &self.sets, sets => sets[0].rows())
     }
 
-    /// Returns the range of rows of J that belong to constraint k.
+    /// Returns the range of rows of the constraint Jacobian J that belong to constraint k.
     ///
     /// # Panics
     /// Panics if constraint k does not exist.

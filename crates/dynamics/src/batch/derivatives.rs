@@ -69,25 +69,25 @@ results! {
 
     /// Second derivatives of φ = λᵀ rnea(q, v, a), of many states: see [`RneaHessian`](crate::RneaHessian).
     BatchRneaHessian of RneaHessian {
-        /// Second derivatives ∂²φ/∂q∂q, nv × nv.
+        /// Second derivatives ∂²φ/∂q∂q of φ = λᵀ rnea(q, v, a), nv × nv.
         dqdq: Matrices<'b, T> = [NV, NV];
-        /// Second derivatives ∂²φ/∂v∂q, nv × nv.
+        /// Second derivatives ∂²φ/∂v∂q of φ = λᵀ rnea(q, v, a), nv × nv.
         dvdq: Matrices<'b, T> = [NV, NV];
-        /// Second derivatives ∂²φ/∂v∂v, nv × nv.
+        /// Second derivatives ∂²φ/∂v∂v of φ = λᵀ rnea(q, v, a), nv × nv.
         dvdv: Matrices<'b, T> = [NV, NV];
-        /// Second derivatives ∂²φ/∂a∂q, nv × nv.
+        /// Second derivatives ∂²φ/∂a∂q of φ = λᵀ rnea(q, v, a), nv × nv.
         dadq: Matrices<'b, T> = [NV, NV];
     }
 
     /// Second derivatives of ψ = λᵀ aba(q, v, τ), of many states: see [`AbaHessian`](crate::AbaHessian).
     BatchAbaHessian of AbaHessian {
-        /// Second derivatives ∂²ψ/∂q∂q, nv × nv.
+        /// Second derivatives ∂²ψ/∂q∂q of ψ = λᵀ aba(q, v, τ), nv × nv.
         dqdq: Matrices<'b, T> = [NV, NV];
-        /// Second derivatives ∂²ψ/∂v∂q, nv × nv.
+        /// Second derivatives ∂²ψ/∂v∂q of ψ = λᵀ aba(q, v, τ), nv × nv.
         dvdq: Matrices<'b, T> = [NV, NV];
-        /// Second derivatives ∂²ψ/∂v∂v, nv × nv.
+        /// Second derivatives ∂²ψ/∂v∂v of ψ = λᵀ aba(q, v, τ), nv × nv.
         dvdv: Matrices<'b, T> = [NV, NV];
-        /// Second derivatives ∂²ψ/∂τ∂q, nv × nv.
+        /// Second derivatives ∂²ψ/∂τ∂q of ψ = λᵀ aba(q, v, τ), nv × nv.
         dtaudq: Matrices<'b, T> = [NV, NV];
     }
 

@@ -47,7 +47,8 @@ use places::{MOST_RESULTS, Places};
 use results::{Last, Shape};
 use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 
-/// Scratch and results for the computation of up to N states in one call, on one or several threads.
+/// Scratch and results for computing up to a given number of states (the capacity) in one call, on one or several
+/// threads.
 ///
 /// Every function takes the arguments of the function of the same name for a single state, with the numbers of all
 /// states one after the other: q has `states` · nq numbers. The number of states may change from call to call. Results

@@ -9,7 +9,7 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar};
 
 /// Computes the centroidal momentum matrix Ag(q), the centre of mass, the Jacobian of the centre of mass, and the
-/// inertia about the centre of mass, in O(n).
+/// inertia about the centre of mass, in O(n) for n bodies.
 ///
 /// q: nq numbers. Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates nothing.
 /// Source: Orin, Goswami, Lee (2013).
@@ -38,7 +38,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 }
 
 /// Computes Ag(q), the rate dAg/dt for the velocity v, the centroidal momentum hg = Ag v, and all results of
-/// [`centroidal_map`], in O(n).
+/// [`centroidal_map`], in O(n) for n bodies.
 ///
 /// q: nq numbers; v: nv numbers. Bodies fixed to the world are ignored; results are NaN if no moving body has mass.
 /// Allocates nothing. Source: Wensing and Orin (2016).

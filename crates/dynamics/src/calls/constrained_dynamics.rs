@@ -18,23 +18,25 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar};
 pub struct Constrained<'d, S> {
     /// Joint accelerations q̈, nv numbers (rad/s², m/s²).
     pub a: &'d [S],
-    /// Forces λ of the constraints, one number per row of J (N, N m). Each force acts on the body of the constraint's
-    /// frame and is expressed in the axes of the constraint's rows.
+    /// Forces λ of the constraints, one number per row of the constraint Jacobian J (N, N m). Each force acts on the
+    /// body of the constraint's frame and is expressed in the axes of the constraint's rows.
     pub lambda: &'d [S],
-    /// Largest absolute value in J q̈ + γ (m/s², rad/s²). It is 0 if the constraints are satisfied exactly.
+    /// Largest absolute value of the constraint accelerations J q̈ + γ (m/s², rad/s²). It is 0 if the constraints are
+    /// satisfied exactly.
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force. In f64, a row is
-    /// dependent if it makes J M⁻¹ Jᵀ + μ 1 singular to 13 digits. If the number is 0, the solution is unique.
+    /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, up to rounding. These rows get
+    /// no force. In f64, a row is dependent if it makes J M⁻¹ Jᵀ + μ 1 singular to 13 digits, with the regularisation
+    /// μ. If the number is 0, the solution is unique.
     pub redundant: S,
 }
 
-/// Computes forward dynamics under constraints: q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i), with the forces λ that make J
-/// q̈ + γ = 0.
+/// Computes forward dynamics under constraints: q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i), with the forces λ for which
+/// the constraint accelerations J q̈ + γ are 0.
 ///
 /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body, in the body's frame (N, N m), or empty for no
-/// forces; index 0 is the world. The computation uses the sparsity of the tree. It costs O(n d²) for a tree of depth d,
-/// O(d) for each pair of rows, and O(rows³). For robots with limbs ([`Model::with_limbs`]) it uses the articulated-body
-/// algorithm, and O(n) replaces O(n d²). Allocates nothing.
+/// forces; index 0 is the world. The computation uses the sparsity of the tree. For n bodies and a tree of depth d, the
+/// cost is O(n d²), plus O(d) for each pair of rows of J, plus O(rows³). For robots with limbs ([`Model::with_limbs`]),
+/// the articulated-body algorithm is used, and the term O(n d²) becomes O(n). Allocates nothing.
 ///
 /// If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the result is
 /// finite and `residual` is not zero. [`ProximalSettings`](crate::ProximalSettings) decide how redundant constraints
@@ -106,16 +108,16 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     solve(constraints, &d.factor, &d.effort, &mut d.qdd);
 }
 
-/// Result of [`constrained_dynamics_equations`]. [`ConstraintSet::jacobian`] returns J.
+/// Result of [`constrained_dynamics_equations`]. [`ConstraintSet::jacobian`] returns the constraint Jacobian J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedEquations<'d, S> {
     /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// Forces λ of the constraints, one number per row of J.
+    /// Forces λ of the constraints, one number per row of the constraint Jacobian J.
     pub lambda: &'d [S],
-    /// Largest absolute value in J q̈ + γ (m/s², rad/s²).
+    /// Largest absolute value of the constraint accelerations J q̈ + γ (m/s², rad/s²).
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding.
+    /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, up to rounding.
     pub redundant: S,
     /// Inertia matrix M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
@@ -207,11 +209,11 @@ pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
 pub struct ConstrainedDerivatives<'d, S> {
     /// Joint accelerations q̈, nv numbers.
     pub a: &'d [S],
-    /// Forces λ of the constraints, one number per row of J.
+    /// Forces λ of the constraints, one number per row of the constraint Jacobian J.
     pub lambda: &'d [S],
-    /// Largest absolute value in J q̈ + γ (m/s², rad/s²).
+    /// Largest absolute value of the constraint accelerations J q̈ + γ (m/s², rad/s²).
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding.
+    /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, up to rounding.
     pub redundant: S,
     /// Derivative ∂q̈/∂q of the joint accelerations in the tangent space, nv × nv: the change of q̈ per δ when q moves
     /// to q ⊕ δ.

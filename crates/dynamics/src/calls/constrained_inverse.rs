@@ -14,7 +14,7 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// Result of [`constrained_inverse_dynamics`]. [`ConstraintSet::jacobian`] returns J.
+/// Result of [`constrained_inverse_dynamics`]. [`ConstraintSet::jacobian`] returns the constraint Jacobian J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverse<'d, S> {
     /// Joint efforts τ = M q̈ + h − Jᵀ λ − Σ Jᵢᵀ f_ext,i, nv numbers (N m, N).
@@ -27,10 +27,12 @@ pub struct ConstrainedInverse<'d, S> {
 /// Computes inverse dynamics under constraints for given accelerations q̈ and forces λ: the efforts τ = M q̈ + h − Jᵀ λ
 /// − Σ Jᵢᵀ f_ext,i, and the accelerations J q̈ + γ of the constraints.
 ///
-/// For a feasible motion, τ is 0 at each coordinate without an actuator, and J q̈ + γ is 0.
+/// For a feasible motion, τ is 0 at each coordinate without an actuator, and the constraint accelerations J q̈ + γ are
+/// 0.
 ///
 /// q: nq numbers; v, a: nv numbers each; lambda: one number per row; f_ext: one force per body, in the body's frame, or
-/// empty for no forces; index 0 is the world. Costs O(n) plus the cost of the rows of J. Allocates nothing.
+/// empty for no forces; index 0 is the world. For n bodies, costs O(n) plus the cost of the rows of J. Allocates
+/// nothing.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics, constrained_inverse_dynamics};
@@ -68,7 +70,8 @@ pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
     ConstrainedInverse { tau: &data.rnea.tau, acceleration: &constraints.error }
 }
 
-/// Result of [`constrained_inverse_dynamics_derivatives`]. [`ConstraintSet::jacobian`] returns J, and ∂τ/∂λ = −Jᵀ.
+/// Result of [`constrained_inverse_dynamics_derivatives`]. [`ConstraintSet::jacobian`] returns the constraint Jacobian
+/// J. The derivative ∂τ/∂λ with respect to the constraint forces is −Jᵀ.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverseDerivatives<'d, S> {
     /// Joint efforts τ, nv numbers.

@@ -49,7 +49,7 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     &data.statics.dtau_dq
 }
 
-/// Computes the exact derivatives of kinetic and potential energy with respect to q and v, in O(n).
+/// Computes the exact derivatives of kinetic and potential energy with respect to q and v, in O(n) for n bodies.
 ///
 /// q: nq numbers; v: nv numbers. Returns ∂T/∂q, ∂T/∂v and ∂V/∂q, nv numbers each (J/rad, J s/rad, J/rad; for sliding
 /// joints m instead of rad). Allocates nothing. Source: T = ½ Σ ⟨v, I v⟩ + ½ Σ armature q̇² and V = −Σ m gᵀ c, with
@@ -126,7 +126,8 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     view(model, data)
 }
 
-/// Computes the derivatives body by body and keeps the terms that second derivatives need. The arguments must be valid.
+/// Computes the derivatives of inverse dynamics body by body, and keeps the terms that their second derivatives need.
+/// The arguments must be valid.
 pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -248,7 +249,8 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     view_of_aba(model, data)
 }
 
-/// Computes the derivatives body by body and keeps the terms that second derivatives need. The arguments must be valid.
+/// Computes the derivatives of forward dynamics body by body, and keeps the terms that their second derivatives need.
+/// The arguments must be valid.
 pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -286,7 +288,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 }
 
 /// Computes the exact derivatives of the centroidal momentum, of the rate of this momentum, and of the position,
-/// velocity and acceleration of the centre of mass, in O(n).
+/// velocity and acceleration of the centre of mass, in O(n) for n bodies.
 ///
 /// q: nq numbers; v, a: nv numbers each. Returns derivatives with respect to q, v and a. Accelerations exclude gravity.
 /// Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates nothing. Source:

@@ -13,7 +13,7 @@ use crate::selection::{self, is_short_chain};
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 
-/// Computes forward dynamics, q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), in O(n).
+/// Computes forward dynamics, q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), in O(n) for n bodies.
 ///
 /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body (N, N m), at the body's origin and in the body's
 /// frame, or empty for no forces; index 0 is the world. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
@@ -140,7 +140,8 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
 ) {
     let zero = core::mem::take(&mut data.forward_dynamics.zero);
     if method == ForwardDynamicsMethod::Dense && is_short_chain(model) {
-        // A chain has no limbs, so h and M can share the sines and cosines that `rnea` computes.
+        // A chain has no limbs, so `rnea` runs body by body and stores the sines and cosines of all joints. The
+        // computation of M uses these numbers again.
         rnea::run(model, &mut data.world, &mut data.rnea, q, v, &zero, f_ext);
         positions_after_rnea(model, &mut data.world, q);
         crba::run(model, &data.world, &mut data.crba);

@@ -17,12 +17,13 @@ use condyle_spatial::{Constant, Matrix, Scalar, Vec3};
 pub struct Impulse<'d, S> {
     /// Velocity v⁺ after the impact, nv numbers (rad/s, m/s).
     pub v: &'d [S],
-    /// Impulses Λ of the constraints, one number per row of J (N s, N m s). Each impulse acts on the body of the
-    /// constraint's frame and is expressed in the axes of the constraint's rows.
+    /// Impulses Λ of the constraints, one number per row of the constraint Jacobian J (N s, N m s). Each impulse acts
+    /// on the body of the constraint's frame and is expressed in the axes of the constraint's rows.
     pub lambda: &'d [S],
-    /// Largest absolute value in J (v⁺ + ε v), with the restitution ε (m/s, rad/s).
+    /// Largest absolute value of J (v⁺ + ε v) (m/s, rad/s), for the velocities v before and v⁺ after the impact and the
+    /// restitution ε.
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding.
+    /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, up to rounding.
     pub redundant: S,
 }
 
@@ -104,11 +105,12 @@ fn run<S: Scalar, R: Constant<S>>(
 pub struct ImpulseDerivatives<'d, S> {
     /// Velocity v⁺ after the impact, nv numbers.
     pub v: &'d [S],
-    /// Impulses Λ of the constraints, one number per row of J.
+    /// Impulses Λ of the constraints, one number per row of the constraint Jacobian J.
     pub lambda: &'d [S],
-    /// Largest absolute value in J (v⁺ + ε v), with the restitution ε (m/s, rad/s).
+    /// Largest absolute value of J (v⁺ + ε v) (m/s, rad/s), for the velocities v before and v⁺ after the impact and the
+    /// restitution ε.
     pub residual: S,
-    /// Number of rows of J that depend on earlier rows, up to rounding.
+    /// Number of rows of the constraint Jacobian J that depend linearly on earlier rows, up to rounding.
     pub redundant: S,
     /// Derivative ∂v⁺/∂q of the velocity after the impact in the tangent space, nv × nv: the change of v⁺ per δ when q
     /// moves to q ⊕ δ.

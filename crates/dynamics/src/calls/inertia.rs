@@ -39,10 +39,9 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
 
 /// Computes M(q)⁻¹ in O(n²). Column k of M⁻¹ contains the accelerations for a unit effort at coordinate k.
 ///
-/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Other
-/// methods are used for some models: the factor of Featherstone (2005), [`Ltdl`](crate::Ltdl), for trees with short
-/// branches and for joints that share a coordinate (mimic), and Gauss–Jordan elimination for chains of at most eight
-/// coordinates.
+/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Some models
+/// use other methods. Trees with short branches, and models whose joints share a coordinate (mimic), use the factor of
+/// Featherstone (2005), [`Ltdl`](crate::Ltdl). Chains of at most eight coordinates use Gauss–Jordan elimination.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, minv, robots};

@@ -18,7 +18,8 @@ fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, argument
     }
 }
 
-/// Computes inverse dynamics in O(n): the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i for the acceleration a.
+/// Computes inverse dynamics in O(n) for n bodies: the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i for the
+/// acceleration a.
 ///
 /// q: nq numbers; v, a: nv numbers each; f_ext: one force per body (N, N m), at the body's origin and in the body's
 /// frame, or empty for no forces; index 0 is the world. Returns nv numbers (N m, N). Allocates nothing. Source: Luh,
@@ -62,8 +63,8 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str
     check_forces(f_ext.len(), model.nodes().len());
 }
 
-/// Computes the bias efforts h(q, v) = C(q, v) v + g(q), in O(n). These efforts keep the velocity constant. The result
-/// equals [`rnea`] with a = 0.
+/// Computes the bias efforts h(q, v) = C(q, v) v + g(q), in O(n) for n bodies. These efforts keep the velocity
+/// constant. The result equals [`rnea`] with a = 0.
 ///
 /// q: nq numbers; v: nv numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
@@ -85,8 +86,8 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     &data.rnea.tau
 }
 
-/// Computes the gravity efforts g(q), in O(n). These efforts hold the robot still. The result equals [`rnea`] with v =
-/// a = 0.
+/// Computes the gravity efforts g(q), in O(n) for n bodies. These efforts hold the robot still. The result equals
+/// [`rnea`] with v = a = 0.
 ///
 /// q: nq numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
@@ -111,8 +112,8 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
     &data.rnea.tau
 }
 
-/// Computes the efforts that hold the robot still under external forces, in O(n): τ = g(q) − Σ Jᵢᵀ f_ext,i. The result
-/// equals [`rnea`](crate::rnea) with v = a = 0, at a lower cost.
+/// Computes the efforts that hold the robot still under external forces, in O(n) for n bodies: τ = g(q) − Σ Jᵢᵀ
+/// f_ext,i. The result equals [`rnea`](crate::rnea) with v = a = 0, at a lower cost.
 ///
 /// q: nq numbers; f_ext: one force per body (N, N m), at the body's origin and in the body's frame, or empty for no
 /// forces; index 0 is the world. Returns nv numbers (N m, N). Allocates nothing. Source: Featherstone, *Rigid Body

@@ -54,7 +54,7 @@ fn wrong_geometry(name: &str) -> ! {
     );
 }
 
-/// Computes the placements of all bodies, oXi = oXλ λXi(q), in O(n). λ is the parent of body i.
+/// Computes the placements of all bodies, oXi = oXλ λXi(q), in O(n) for n bodies. λ is the parent of body i.
 ///
 /// q: nq numbers. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 4.1.
 ///
@@ -186,8 +186,8 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
     path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J, strides);
 }
 
-/// Computes the placements and velocities of all bodies, v_i = v_λ + S q̇, in O(n). λ is the parent of body i, and S
-/// the motion subspace of its joint.
+/// Computes the placements and velocities of all bodies, v_i = v_λ + S q̇, in O(n) for n bodies. λ is the parent of
+/// body i, and S the motion subspace of its joint.
 ///
 /// q: nq numbers; v: nv numbers. Allocates nothing. Source: Featherstone (2008), table 5.1, in the world's frame.
 ///
@@ -216,8 +216,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
 }
 
-/// Computes the placements, velocities and accelerations of all bodies, a_i = a_λ + S q̈ + Ṡ q̇, in O(n). λ is the
-/// parent of body i, and S the motion subspace of its joint.
+/// Computes the placements, velocities and accelerations of all bodies, a_i = a_λ + S q̈ + Ṡ q̇, in O(n) for n bodies.
+/// λ is the parent of body i, and S the motion subspace of its joint.
 ///
 /// q: nq numbers; v, a: nv numbers each. Accelerations exclude gravity. Allocates nothing. Source: Featherstone (2008),
 /// table 5.1, in the world's frame.

@@ -25,7 +25,8 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Computes J and J M⁻¹ Jᵀ. Also computes −(J q̈ + γ) for λ = 0 and stores it in `set.lambda`.
+    /// Computes the constraint Jacobian J and the Delassus matrix J M⁻¹ Jᵀ. Also computes −(J q̈ + γ), the negative
+    /// constraint accelerations without constraint forces, and stores them in `set.lambda`.
     fn carry_forces<V>(
         model: &Model,
         plan: &Plan,
@@ -42,7 +43,7 @@ register_kernel! {
 }
 
 kernel! {
-    /// Factorises J M⁻¹ Jᵀ and computes the forces λ.
+    /// Factorises the Delassus matrix J M⁻¹ Jᵀ and computes the constraint forces λ.
     fn decompose<S>(set: &mut ConstraintSet<S>) {
         set.delassus.redundant = S::zero();
         for island in &set.islands {
@@ -52,7 +53,7 @@ kernel! {
 }
 
 register_kernel! {
-    /// Computes q̈ and J q̈ + γ for the forces λ.
+    /// Computes the joint accelerations q̈ and the constraint accelerations J q̈ + γ for the constraint forces λ.
     fn accelerate<V>(
         model: &Model,
         plan: &Plan,

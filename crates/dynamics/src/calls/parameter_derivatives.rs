@@ -11,6 +11,10 @@
 //! ∂τ/∂damping = Rᵀ diag(R v)             ∂τ/∂friction = Rᵀ diag(tanh(R v/ε))             (v of a free joint)
 //! ```
 //!
+//! Here f_b, π_b, v_b and a_b are the external force, inertial parameters, velocity and acceleration of body b, and J_b
+//! is the Jacobian of the body. S_c is joint column c, Iᶜ is the inertia of all bodies that the joint carries, and R is
+//! the rotation of a free joint. `regressor.rs` defines the form y. ε is the smoothing of friction.
+//!
 //! For forward dynamics, M q̈ + h = τ gives the derivative −M⁻¹ B of q̈.
 
 use super::derivatives::{AbaDerivatives, RneaDerivatives};
@@ -68,7 +72,8 @@ impl Input {
     }
 }
 
-/// Destination of the entries of B. The matrix `out` becomes B, or −M⁻¹ B if `Minv` is given.
+/// Destination of the entries of B, the derivative of inverse dynamics with respect to an input. The matrix `out`
+/// becomes B, or −M⁻¹ B if `Minv` is given.
 struct Entries<'e, S> {
     out: &'e mut [S],
     Minv: Option<&'e Matrix<S>>,
@@ -76,7 +81,8 @@ struct Entries<'e, S> {
 }
 
 impl<S: Scalar> Entries<'_, S> {
-    /// Adds x to the entry (row, column) of B, or adds the corresponding column to −M⁻¹ B.
+    /// Adds x to the entry (row, column) of B, the derivative of inverse dynamics. If `Minv` is given, updates the same
+    /// column of −M⁻¹ B instead.
     #[inline(always)]
     fn add(&mut self, row: usize, column: usize, x: S) {
         let out = &mut self.out[column * self.nv..(column + 1) * self.nv];
@@ -102,7 +108,8 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Adds each nonzero entry of B to `to`. An entry may be added in several parts.
+    /// Adds each nonzero entry of B, the derivative of inverse dynamics with respect to `input`, to `to`. An entry may
+    /// be the sum of several additions.
     #[inline(always)]
     fn entries(&self, input: Input, to: &mut Entries<'_, S>) {
         let (model, pass) = (self.model, self.pass);
@@ -159,9 +166,10 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Adds the entries of B for damping, or for friction if a smoothing is given, to `to`. The damping and friction
-    /// efforts x of a free joint act along the axes of its parent. Along the body's axes, B is Rᵀ diag(x(R v)) with the
-    /// rotation R of the joint.
+    /// Adds the entries of B, the derivative of inverse dynamics with respect to damping, to `to`. If a smoothing ε is
+    /// given, B is the derivative with respect to friction instead. The effort x(v) of one unit is v for damping, and
+    /// tanh(v/ε) for friction. For a free joint, this effort acts along the axes of the joint's parent. So along the
+    /// body's axes, B is Rᵀ diag(x(R v)), with the rotation R of the joint.
     #[inline(always)]
     fn losses(&self, smoothing: Option<f64>, to: &mut Entries<'_, S>) {
         let (model, qd) = (self.model, &self.pass.qd[..]);
@@ -224,8 +232,8 @@ impl Input {
 }
 
 impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
-    /// Computes the derivative of τ with respect to another input, nv × [`Input::len`], in at most O(n) operations per
-    /// column. Overwrites dtau.
+    /// Computes the derivative of τ with respect to an input other than q, v and a, nv × [`Input::len`], in at most
+    /// O(n) operations per column. Overwrites dtau.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Input, rnea, rnea_derivatives, robots};
@@ -248,7 +256,7 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
         self.write_input(input, dtau.as_mut_slice());
     }
 
-    /// Computes the derivative of τ with respect to another input, stored by columns.
+    /// Computes the derivative of τ with respect to an input other than q, v and a, stored by columns.
     pub(crate) fn write_input(&self, input: Input, dtau: &mut [S]) {
         let model = self.state.model;
         input.check(model, "dtau", (model.nv(), input.len(model)));
@@ -257,8 +265,8 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
-    /// Computes the derivative of q̈ with respect to another input, nv × [`Input::len`], in at most O(n²) operations
-    /// per column. Overwrites da.
+    /// Computes the derivative of q̈ with respect to an input other than q, v and τ, nv × [`Input::len`], in at most
+    /// O(n²) operations per column. Overwrites da.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Input, aba_derivatives, neutral, robots};
@@ -280,7 +288,7 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
         self.write_input(input, da.as_mut_slice());
     }
 
-    /// Computes the derivative of q̈ with respect to another input, stored by columns.
+    /// Computes the derivative of q̈ with respect to an input other than q, v and τ, stored by columns.
     pub(crate) fn write_input(&self, input: Input, da: &mut [S]) {
         let model = self.state.model;
         input.check(model, "da", (model.nv(), input.len(model)));

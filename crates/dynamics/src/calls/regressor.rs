@@ -42,8 +42,8 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     &data.regressor.torque
 }
 
-/// Computes the regressor y(q, v) of the kinetic energy, T = y · π, in O(n). π are the inertial parameters of all
-/// bodies. The energy ½ armature v² of the rotors is excluded.
+/// Computes the regressor y(q, v) of the kinetic energy, T = y · π, in O(n) for n bodies. π are the inertial parameters
+/// of all bodies. The energy ½ armature v² of the rotors is excluded.
 ///
 /// q: nq numbers; v: nv numbers. Returns 10 (bodies − 1) numbers: ½ y(v_i, v_i) for each body i with velocity v_i, in
 /// the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates
@@ -73,8 +73,8 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     &data.regressor.kinetic
 }
 
-/// Computes the regressor y(q) of the potential energy, V = y · π, in O(n). π are the inertial parameters of all
-/// bodies. V is zero for a mass at the world's origin.
+/// Computes the regressor y(q) of the potential energy, V = y · π, in O(n) for n bodies. π are the inertial parameters
+/// of all bodies. V is zero for a mass at the world's origin.
 ///
 /// q: nq numbers. Returns 10 (bodies − 1) numbers, \[−g · p_i, −R_iᵀ g, 0\] for each body i with pose (R_i, p_i), in
 /// the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates

@@ -18,11 +18,11 @@ use nalgebra::DMatrix;
 /// The matrices are blocks of the Hessian of φ(q ⊕ δ, v + δv, a + δa) at δ = 0, δv = 0 and δa = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaHessian<'d, S, R = f64> {
-    /// Second derivatives ∂²φ/∂q∂q, symmetric.
+    /// Second derivatives ∂²φ/∂q∂q of φ = λᵀ rnea(q, v, a), symmetric.
     pub dqdq: &'d Matrix<S>,
-    /// Second derivatives ∂²φ/∂v∂q: entry (j, k) is ∂²φ/∂v_j∂q_k.
+    /// Second derivatives ∂²φ/∂v∂q of φ = λᵀ rnea(q, v, a): entry (j, k) is ∂²φ/∂v_j∂q_k.
     pub dvdq: &'d Matrix<S>,
-    /// Second derivatives ∂²φ/∂v∂v, symmetric.
+    /// Second derivatives ∂²φ/∂v∂v of φ = λᵀ rnea(q, v, a), symmetric.
     pub dvdv: &'d Matrix<S>,
     /// Second derivatives ∂²φ/∂a∂q, the derivative of M λ with respect to q: entry (j, k) is ∂²φ/∂a_j∂q_k.
     pub dadq: &'d Matrix<S>,
@@ -163,11 +163,11 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
 /// The matrices are blocks of the Hessian of ψ(q ⊕ δ, v + δv, τ + δτ) at δ = 0, δv = 0 and δτ = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct AbaHessian<'d, S, R = f64> {
-    /// Second derivatives ∂²ψ/∂q∂q, symmetric.
+    /// Second derivatives ∂²ψ/∂q∂q of ψ = λᵀ aba(q, v, τ), symmetric.
     pub dqdq: &'d Matrix<S>,
-    /// Second derivatives ∂²ψ/∂v∂q: entry (j, k) is ∂²ψ/∂v_j∂q_k.
+    /// Second derivatives ∂²ψ/∂v∂q of ψ = λᵀ aba(q, v, τ): entry (j, k) is ∂²ψ/∂v_j∂q_k.
     pub dvdq: &'d Matrix<S>,
-    /// Second derivatives ∂²ψ/∂v∂v, symmetric.
+    /// Second derivatives ∂²ψ/∂v∂v of ψ = λᵀ aba(q, v, τ), symmetric.
     pub dvdv: &'d Matrix<S>,
     /// Second derivatives ∂²ψ/∂τ∂q, the derivative of M⁻¹ λ with respect to q: entry (j, k) is ∂²ψ/∂τ_j∂q_k.
     pub dtaudq: &'d Matrix<S>,

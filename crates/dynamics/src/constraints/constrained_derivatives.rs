@@ -1,8 +1,9 @@
 //! Analytical derivatives of forward dynamics under constraints.
 //!
-//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. These two equations are linear in (q̈, −λ), with a
-//! matrix K. The derivatives of the equations are linear equations with the same matrix K. Let r = ∂(M q̈ + h − Jᵀ
-//! λ)/∂x and c = ∂(J q̈ + γ)/∂x at fixed q̈ and λ, for x = q or v. With the blocks of K⁻¹:
+//! The equations of motion M q̈ + h − Jᵀ λ = τ and the constraints J q̈ + γ = 0 hold for every q, v and τ. These
+//! equations are linear in (q̈, −λ), with a matrix K. The derivatives of the equations are linear equations with the
+//! same matrix K. Let r = ∂(M q̈ + h − Jᵀ λ)/∂x and c = ∂(J q̈ + γ)/∂x at fixed q̈ and λ, for x = q or v. With the
+//! blocks of K⁻¹:
 //!
 //! ```text
 //! K⁻¹ = [ P    J̄  ]      Λ = (J M⁻¹ Jᵀ)⁻¹,   J̄ = M⁻¹ Jᵀ Λ,   P = M⁻¹ − J̄ J M⁻¹
@@ -10,9 +11,9 @@
 //! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
 //! ```
 //!
-//! `kkt_derivatives.rs` computes r and c. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
-//! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
-//! programming for multi-phase rigid contact dynamics* (2018).
+//! `kkt_derivatives.rs` computes the derivatives r and c of the equations. Source: Carpentier and Mansard, *Analytical
+//! derivatives of rigid body dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard,
+//! *Differential dynamic programming for multi-phase rigid contact dynamics* (2018).
 
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::workspace::{filled, workspace, zero_matrix};
@@ -27,7 +28,8 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Sum of all external forces and constraint forces on each body, in the body's frame. Written by: `load`.
         pub forces: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Matrix M⁻¹, which the block P of K⁻¹ overwrites. Written by: `invert`.
+        /// Matrix M⁻¹, which the block P of K⁻¹ overwrites. K is the matrix of the constrained equations of motion.
+        /// Written by: `invert`.
         pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// Derivative ∂(M q̈ + h − Jᵀ λ)/∂q of the equations of motion. Written by: `turn`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -56,8 +58,9 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Computes the blocks Λ, J̄ and P of K⁻¹ for one island. `P` contains M⁻¹ on entry, and J M⁻¹ Jᵀ must be
-    /// factorised.
+    /// Computes the blocks Λ, J̄ and P of K⁻¹ for one island, where K is the matrix of the constrained equations of
+    /// motion. An island is a group of trees and constraints that is independent of all others. On entry, `P` must
+    /// contain M⁻¹, and J M⁻¹ Jᵀ must be factorised.
     #[inline(always)]
     fn invert_island(&mut self, k: usize, P: &mut Matrix<S>) {
         let Self { U, Jbar, dlambda_dtau, delassus, proximal, .. } = self;
@@ -101,7 +104,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// Computes the blocks Λ, J̄ and P of K⁻¹.
+    /// Computes the blocks Λ, J̄ and P of K⁻¹, where K is the matrix of the constrained equations of motion.
     pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut Matrix<S>) {
         factor.inverse(P); // M⁻¹
         for k in 0..set.islands.len() {
@@ -121,7 +124,8 @@ same_layout!(By);
 
 kernel! {
     /// Computes the derivatives −P r − J̄ c of q̈ and J̄ᵀ r − Λ c of λ, but only the entries that may be nonzero.
-    /// Inputs are the blocks of K⁻¹, r, and the matrix c of the set.
+    /// Inputs are the blocks P, J̄ and Λ of K⁻¹, the derivative r of the equations of motion, and the derivative c of
+    /// the constraint accelerations.
     pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &Matrix<S>, r: &Matrix<S>, da: &mut Matrix<S>) {
         let ConstraintSet { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, .. } = set;
         let (c, dlambda) = match by {

@@ -1,7 +1,8 @@
 //! Forward dynamics under constraints.
 //!
 //! Gauss's principle determines q̈: among all accelerations with J q̈ + γ = 0, the robot has the one nearest to its
-//! acceleration without constraints. The distance is measured in the metric of M. With the forces λ of the constraints,
+//! acceleration without constraints. The distance is measured in the metric of the inertia matrix M. With the forces λ
+//! of the constraints,
 //!
 //! ```text
 //! [ M   Jᵀ ] [  q̈ ]   [ τ − h ]         J M⁻¹ Jᵀ λ = −(γ + J M⁻¹ (τ − h)),
@@ -29,8 +30,8 @@ workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
         /// Velocity of each body. Written by: `bias`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
-        /// `bias`.
+        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which accounts for gravity. Written
+        /// by: `bias`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Composite inertia Iᶜ of each body. Written by: `bias`, `inertia`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -38,7 +39,7 @@ workspace! {
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Inertia matrix M. Written by: `bias`, `inertia`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Sparse factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        /// Sparse factor of the inertia matrix M. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub factor: Ltdl<S> = Ltdl::new(model),
         /// Bias efforts h, which the difference τ − h overwrites. Written by: `bias`, `constrained_dynamics`.
         pub effort: Array<S> = filled(S::zero, size.nv),
@@ -48,8 +49,9 @@ workspace! {
     }
 }
 
-/// Computes M, h and the motion of all bodies for q̈ = 0. `w` must contain the placements of the bodies. The
-/// Newton–Euler algorithm and the composite-rigid-body algorithm run together, in one outward and one inward pass.
+/// Computes the inertia matrix M, the bias efforts h, and the motion of all bodies for q̈ = 0. `w` must contain the
+/// placements of the bodies. The Newton–Euler algorithm and the composite-rigid-body algorithm run together, in one
+/// outward and one inward pass.
 #[inline(always)]
 fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let Workspace { v, a, IC, F, M, effort, .. } = d;
@@ -79,7 +81,8 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Adds J x to y, where x has one number per coordinate, and y has one number per row of J.
+    /// Adds J x to y, with the constraint Jacobian J. x has one number per coordinate, and y has one number per row of
+    /// J.
     #[inline(always)]
     pub(crate) fn add_motion(&self, x: &[S], y: &mut [S]) {
         for plan in &self.plans {
@@ -106,7 +109,7 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// Returns the largest absolute value in J q̈ + γ.
+    /// Returns the largest absolute value of the constraint accelerations J q̈ + γ.
     pub(crate) fn residual(&self) -> S {
         let mut residual = S::zero();
         largest(&self.error, &mut residual);
@@ -173,8 +176,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes J and J q̈ + γ from the velocities v and accelerations a of the bodies. If a are the accelerations of
-    /// the bodies for q̈ = 0, the result J q̈ + γ is γ.
+    /// Computes the constraint Jacobian J and the constraint accelerations J q̈ + γ from the velocities v and
+    /// accelerations a of the bodies. If a are the accelerations of the bodies for q̈ = 0, the result J q̈ + γ is γ.
     pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
         for (i, plan) in set.plans.iter().enumerate() {
             let target = &set.targets[i];

@@ -91,7 +91,7 @@ impl<S: Scalar> Target<S> {
 /// other body; v* and a* are the target's velocity and acceleration. The constraint requires
 ///
 /// ```text
-/// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), the axes of frame 1 applied to p₁ − p₂ (point)
+/// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), p₁ − p₂ (point)
 /// ```
 ///
 /// The equation above is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0.
@@ -100,11 +100,11 @@ impl<S: Scalar> Target<S> {
 /// same axes. λ acts on the body of `frame`, and −λ acts on the other body or the world.
 ///
 /// The acceleration of a point is its classical acceleration, and the acceleration of a rigid frame is its spatial
-/// acceleration. For a rigid loop in `Local`, a is the rate of the six numbers of v. For a rigid loop in
-/// `LocalWorldAligned`, a is the difference of the two spatial accelerations; both definitions agree if v = 0. Signs,
-/// gains and axes agree with Pinocchio's `RigidConstraintModel`, whose second placement is the other frame's placement
-/// times the target. For contacts, signs, gains and axes also agree with Crocoddyl's `ContactModel3D` and
-/// `ContactModel6D`.
+/// acceleration. For a rigid loop in `Local`, the acceleration a is the rate of the six numbers of the relative
+/// velocity v. For a rigid loop in `LocalWorldAligned`, a is the difference of the two spatial accelerations; both
+/// definitions agree if v = 0. Signs, gains and axes agree with Pinocchio's `RigidConstraintModel`, whose second
+/// placement is the other frame's placement times the target. For contacts, signs, gains and axes also agree with
+/// Crocoddyl's `ContactModel3D` and `ContactModel6D`.
 ///
 /// A line or plane contact holds a point only along some columns of `axes`: along e₃ (line), or along e₁ and e₃
 /// (plane). The columns e₁, e₂, e₃ are expressed in the axes of `reference`. The other directions are free. Crocoddyl's
@@ -172,8 +172,8 @@ impl ContactConstraint {
         Self { kind: ConstraintKind::Rigid, ..Self::point(frame) }
     }
 
-    /// Converts a constraint from a model's file, in `Local`, without stabilisation. Returns `None` for a coupling of
-    /// joints, which does not hold a frame.
+    /// Converts a constraint of a model's file to a contact constraint in `Local`, without stabilisation. Returns
+    /// `None` for a coupling of joints, which does not hold a frame.
     ///
     /// [`Model::constraints`] lists the loops of the model's file. The algorithms for trees ignore these loops, and
     /// [`constrained_dynamics`](crate::constrained_dynamics()) closes them. A position error, for example in the

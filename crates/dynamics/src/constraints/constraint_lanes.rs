@@ -35,7 +35,8 @@ pub(crate) struct Rows {
     pub beside: Vec<(usize, Vec<[usize; 3]>)>,
     /// Unit forces of the constraint's rows on the bodies of both frames, in the world's frame. Written by: `begin`.
     pub forces: [[[f64; WIDE]; 6]; 2],
-    /// γ', the terms of γ other than the accelerations of the bodies for q̈ = 0. Written by: `begin`.
+    /// Terms γ' of the constraint accelerations γ: all terms except the terms of the bodies' accelerations. Written by:
+    /// `begin`.
     pub gamma: [f64; WIDE],
 }
 
@@ -52,10 +53,11 @@ pub(crate) struct All {
     /// this sum that the joints of these bodies transmit to the root (`rest`). Shape: 6 × stride. Written by: `carry`.
     pub whole: Vec<f64>,
     pub rest: Vec<f64>,
-    /// Value of J q̈ + γ for λ = 0, which λ overwrites. Shape: stride. Written by: `carry`, `carry_on`,
-    /// `constrained.rs`.
+    /// Constraint accelerations J q̈ + γ for λ = 0, which the constraint forces λ overwrite. Shape: stride. Written by:
+    /// `carry`, `carry_on`, `constrained.rs`.
     pub x: Vec<f64>,
-    /// Matrices J, Y and Y D⁻¹ in the columns of the root's joint. Shape: nv × stride. Written by: `carry_on`.
+    /// Columns of the root's joint in three matrices (see `lanes/limbs/constrained.rs`): the constraint Jacobian J, the
+    /// joint efforts Y of the rows' unit forces, and Y D⁻¹. Shape: nv × stride. Written by: `carry_on`.
     pub J: Vec<f64>,
     pub Y: Vec<f64>,
     pub YD: Vec<f64>,
@@ -65,8 +67,8 @@ pub(crate) struct All {
 #[derive(Clone, Debug)]
 pub(crate) struct ConstraintLanes {
     pub(crate) rows: Vec<Rows>,
-    /// Matrices Y and Y D⁻¹ in the slots of all constraints. Shape: for each constraint, its number of slots × `wide`.
-    /// Written by: `carry`.
+    /// Joint efforts Y of the rows' unit forces, and Y D⁻¹ (see `lanes/limbs/constrained.rs`), in the slots of all
+    /// constraints. Shape: for each constraint, its number of slots × `wide`. Written by: `carry`.
     pub(crate) Y: Vec<f64>,
     pub(crate) YD: Vec<f64>,
     pub(crate) all: All,

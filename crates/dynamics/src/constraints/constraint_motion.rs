@@ -2,26 +2,28 @@
 //! derivatives of both.
 //!
 //! Body 1 carries frame 1, whose pose in the world is ₀X₁. Body 2 carries frame 2, the target, whose pose in the world
-//! is ₀X₂. With Δv = v₁ − v₂, the following acceleration must vanish:
+//! is ₀X₂. v₁, v₂, a₁ and a₂ are the velocities and spatial accelerations of the two bodies. v* and a* are the target's
+//! velocity and acceleration, and kp and kd are the gains. With Δv = v₁ − v₂, the following acceleration must vanish:
 //!
 //! ```text
 //! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)     (no Δv × v₂ along the world's axes)
 //! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)          u, α: velocity, acceleration of points
 //! ```
 //!
-//! For a line or a plane, the rows are components of the point's row above: e₃ᵀ (…) for a line, [e₁ e₃]ᵀ (…) for a
-//! plane.
+//! p, u and α are the position, velocity and acceleration of a frame's origin, and R₁ is the rotation of frame 1. For a
+//! line or a plane, the rows are components of the point's row above: e₃ᵀ (…) for a line, [e₁ e₃]ᵀ (…) for a plane.
 //!
 //! When coordinate e moves a body, the derivatives ∂v and ∂a of the body's motion are the same as in
-//! `rnea_derivatives`. A point p of the body has the velocity u and the acceleration α. With s = S_e, and Ψ̇ and Ψ̈
-//! evaluated at p,
+//! `rnea_derivatives`. A point p of the body has the velocity u and the acceleration α. s = S_e is the joint column of
+//! e. With the motions Ψ̇ and Ψ̈ of `rnea_derivatives`, evaluated at p,
 //!
 //! ```text
 //! ∂u/∂q_e = s_ω × u + Ψ̇     ∂α/∂q_e = s_ω × α + Ψ̈ + 2 Ψ̇_ω × u     ∂α/∂q̇_e = Ψ̇ + Ṡ + 2 s_ω × u
 //! ```
 //!
-//! If e moves frame 1, a motion ₀X₁⁻¹ m that is expressed in frame 1 changes by ₀X₁⁻¹ (∂m − S_e × m). Gravity is
-//! included as an acceleration −g of the world, and it cancels in all differences of accelerations.
+//! Let m be a motion in the world's frame; expressed in frame 1, the motion is ₀X₁⁻¹ m. If coordinate e with joint
+//! column S_e moves frame 1, the derivative of ₀X₁⁻¹ m is ₀X₁⁻¹ (∂m − S_e × m). Gravity is included as an acceleration
+//! −g of the world, and it cancels in all differences of accelerations.
 
 use crate::constraints::constraint::{ConstraintKind, Target};
 use crate::constraints::plan::Plan;
@@ -159,7 +161,7 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Computes the constraint's rows of J, in the slots of the constraint.
+    /// Computes the constraint's rows of the Jacobian J, in the slots of the constraint.
     #[inline(always)]
     pub(crate) fn jacobian(&self, plan: &Plan, columns: &[Motion<S>], J: &mut [S]) {
         let (rows, n) = (plan.rows(), plan.places.len());
@@ -191,8 +193,8 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Returns a₁ − a₂ + Δv × v₂ + kd Δv with Δv = v₁ − v₂. The term Δv × v₂ is left out if the rows are along the
-    /// world's axes.
+    /// Returns a₁ − a₂ + Δv × v₂ + kd Δv, with the accelerations a₁, a₂ and velocities v₁, v₂ of the two bodies, and Δv
+    /// = v₁ − v₂. The term Δv × v₂ is left out if the rows are along the world's axes.
     #[inline(always)]
     fn rigid(&self, plan: &Plan, kd: S) -> Motion<S> {
         let [v1, v2] = self.v;
@@ -210,7 +212,8 @@ impl<S: Scalar> FramePair<S> {
         [[u1, alpha1], [u2, alpha2]]
     }
 
-    /// Returns α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂) for the origins of both frames.
+    /// Returns α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂), with the classical accelerations α, velocities u and positions p
+    /// of the origins of the two frames.
     #[inline(always)]
     fn point(&self, kp: S, kd: S) -> Vec3<S> {
         let [[u1, alpha1], [u2, alpha2]] = self.points();
@@ -327,8 +330,9 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// Adds the derivative of the relative velocity J w with respect to q, for fixed w, to the constraint's rows of dq.
-    /// The velocities in this pair and Ψ̇ must be computed for w. `value` is J w.
+    /// Adds the derivative of the relative velocity J w with respect to q, for a fixed joint velocity w, to the
+    /// constraint's rows of dq. The velocities in this pair, and the motions Ψ̇ (`Psid`), must be computed for w.
+    /// `value` is J w.
     #[inline(always)]
     pub(crate) fn velocity_derivative(
         &self,

@@ -54,8 +54,8 @@ pub struct ConstraintSet<S> {
     /// Rows of J, each in the slots of its constraint. Shape: number of entries of all rows. Written by: `jacobian` of
     /// `constraint_motion.rs`.
     pub(crate) J: Array<S>,
-    /// Accelerations γ of the constraints for q̈ = 0, including the corrections by kp and kd. For impacts, γ is (1 + ε)
-    /// J v. Shape: rows. Written by: `constrained_dynamics`, `impulse_dynamics`.
+    /// Accelerations γ of the constraints for q̈ = 0, including the corrections by kp and kd. For impacts with the
+    /// restitution ε, γ is (1 + ε) J v. Shape: rows. Written by: `constrained_dynamics`, `impulse_dynamics`.
     pub(crate) gamma: Array<S>,
     pub(crate) delassus: Delassus<S>,
     /// Forces λ, or impulses, of the constraints. Shape: rows. Written by: the algorithms.
@@ -66,7 +66,8 @@ pub struct ConstraintSet<S> {
     /// algorithms' derivatives.
     pub(crate) dgamma_dq: Matrix<S>,
     pub(crate) dgamma_dv: Matrix<S>,
-    /// Matrices U = M⁻¹ Jᵀ and J̄ = M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
+    /// Matrices U = M⁻¹ Jᵀ and J̄ = M⁻¹ Jᵀ Λ, with Λ = (J M⁻¹ Jᵀ)⁻¹. Shape: nv × rows. Written by: the algorithms'
+    /// derivatives.
     pub(crate) U: Matrix<S>,
     pub(crate) Jbar: Matrix<S>,
     /// Derivatives of the forces λ with respect to q, v and τ. Shape: rows × nv. Written by: the algorithms'
@@ -137,12 +138,12 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans.is_empty()
     }
 
-    /// Returns the number of rows of J, which is also the length of λ.
+    /// Returns the number of rows of the constraint Jacobian J, which is also the number of constraint forces λ.
     pub fn rows(&self) -> usize {
         self.lambda.len()
     }
 
-    /// Returns the range of the rows of constraint k in J and λ.
+    /// Returns the range of the rows of constraint k in the constraint Jacobian J and in the constraint forces λ.
     ///
     /// # Panics
     /// Panics if constraint k does not exist.
@@ -152,9 +153,10 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
-    /// Returns the islands, which are independent of each other, as pairs (coordinates, rows). Constraints that share
-    /// no body, or only bodies that do not move, are in different islands. The ranges of coordinates are sorted and
-    /// cover all coordinates of the model. A tree without constraints is an island without rows.
+    /// Returns the islands: groups of trees and constraints that are independent of each other. Each island is a pair
+    /// of a range of coordinates and a range of rows. Constraints on different trees are in different islands, unless
+    /// other constraints connect the trees. Islands with overlapping ranges are merged. The ranges of coordinates are
+    /// sorted and cover all coordinates of the model. A tree without constraints is an island without rows.
     pub fn islands(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
         self.islands.iter().map(|island| (island.coordinates.clone(), island.rows.clone()))
     }

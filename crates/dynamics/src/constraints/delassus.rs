@@ -1,12 +1,14 @@
 //! Delassus matrix J M⁻¹ Jᵀ of a robot's constraints. The inverse Λ of this matrix is the inertia of the robot along
 //! the constraints.
 //!
-//! With M = Lᵀ D L, a row of Y = J L⁻¹ has entries only in the slots of the same row of J and in slots between these
-//! slots and the root. An entry of J M⁻¹ Jᵀ = Y D⁻¹ Yᵀ needs only the slots that two constraints share. J M⁻¹ Jᵀ is
-//! factorised as C E Cᵀ with unit lower triangular C. If a row depends on earlier rows, its pivot is only a rounding
-//! error, and its force is set to zero. Each [island](Island) is factorised separately, in its own columns and rows of
-//! the common arrays. Source: Featherstone, *Exploiting sparsity in operational-space dynamics* (2010); Golub and Van
-//! Loan, *Matrix Computations* (4th edition), section 4.1.
+//! A slot is the index of a coordinate in the order of the sparse factor M = Lᵀ D L. A row of Y = J L⁻¹ has entries
+//! only in the slots of the same row of J, and in the slots between these slots and the root. The entries of J M⁻¹ Jᵀ =
+//! Y D⁻¹ Yᵀ for two constraints need only the slots that the two constraints share. J M⁻¹ Jᵀ is factorised as C E Cᵀ,
+//! with a unit lower triangular matrix C and a diagonal matrix E. If a row depends on earlier rows, its pivot is only a
+//! rounding error, and its force is set to zero. An [island](Island) is a group of trees and constraints that is
+//! independent of all others. Each island is factorised separately, in its own columns and rows of the common arrays.
+//! Source: Featherstone, *Exploiting sparsity in operational-space dynamics* (2010); Golub and Van Loan, *Matrix
+//! Computations* (4th edition), section 4.1.
 
 use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, ProximalSettings};
@@ -32,17 +34,19 @@ const STEP: usize = 8;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Delassus<S> {
-    /// Matrices Y = J L⁻¹ and Z = J L⁻¹ D⁻¹, in the slots of each constraint. Shape: number of entries in all rows of
-    /// J. Written by: `multiply`.
+    /// Matrices Y = J L⁻¹ and Z = J L⁻¹ D⁻¹, with the factors M = Lᵀ D L, in the slots of each constraint. Shape:
+    /// number of entries in all rows of J. Written by: `multiply`.
     Y: Array<S>,
     Z: Array<S>,
     /// Distance between the columns of `CE` and between the rows of `rows`: the number of rows plus 1, rounded up to a
     /// multiple of `step`.
     pub stride: usize,
-    /// Lower triangle of J M⁻¹ Jᵀ, which `decompose` overwrites by the lower triangle of C E. Stored by columns. Shape:
-    /// stride × rows, plus one step. Written by: `multiply`, or in lanes by `limbs`; then by `decompose`.
+    /// Lower triangle of J M⁻¹ Jᵀ, which `decompose` overwrites by the lower triangle of C E (J M⁻¹ Jᵀ + μ 1 = C E Cᵀ).
+    /// Stored by columns. Shape: stride × rows, plus one step. Written by: `multiply`, or in lanes by `limbs`; then by
+    /// `decompose`.
     pub CE: Array<S>,
-    /// Lower triangle of C E, stored by rows. Shape: stride × rows, plus one step. Written by: `decompose`.
+    /// Lower triangle of C E, where J M⁻¹ Jᵀ + μ 1 = C E Cᵀ, stored by rows. Shape: stride × rows, plus one step.
+    /// Written by: `decompose`.
     rows: Array<S>,
     /// Reciprocal 1/E of the pivot of each row, or 0 if the pivot counts as zero. Shape: rows. Written by: `decompose`.
     E_inv: Array<S>,
@@ -50,7 +54,8 @@ pub(crate) struct Delassus<S> {
     pub redundant: S,
     /// Right-hand side b, which the solution overwrites. Shape: stride. Written by: `decompose`, `solve`, `invert`.
     x: Array<S>,
-    /// Vector y = C⁻¹ b, the result of the forward substitution. Shape: rows. Written by: `substitute`.
+    /// Vector y = C⁻¹ b, the result of the forward substitution with the factor C for the right-hand side b. Shape:
+    /// rows. Written by: `substitute`.
     y: Array<S>,
     /// Matrix Λ, the inverse of J M⁻¹ Jᵀ. Shape: rows × rows. Written by: `invert`.
     pub inverse: Matrix<S>,
@@ -83,7 +88,8 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Computes J M⁻¹ Jᵀ of an island from the rows of J. Each row is stored in the slots of its constraint.
+    /// Computes the Delassus matrix J M⁻¹ Jᵀ of one island (trees and constraints that are independent of all others)
+    /// from the rows of J. Each row is stored in the slots of its constraint.
     #[inline(always)]
     pub(crate) fn multiply(&mut self, plans: &[Plan], island: &Island, J: &[S], M: &Ltdl<S>) {
         let D_inv = M.inverse_diagonal();
@@ -122,7 +128,8 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Sets J M⁻¹ Jᵀ of an island to zero, and also the extra row after the island's last row.
+    /// Sets the Delassus matrix J M⁻¹ Jᵀ of one island (trees and constraints that are independent of all others) to
+    /// zero, and also the extra row after the island's last row.
     #[inline(always)]
     pub(crate) fn clear(&mut self, Island { rows, .. }: &Island) {
         for j in rows.clone() {
@@ -130,9 +137,11 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island and solves J M⁻¹ Jᵀ λ = b, as `solve` does. On entry `CE`
-    /// contains J M⁻¹ Jᵀ, and `lambda` contains b. The elimination treats b as an additional row of the matrix. Adds
-    /// the number of rows whose pivot counts as zero to `redundant`.
+    /// For one island (trees and constraints that are independent of all others), factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ,
+    /// with a unit lower triangular C and a diagonal E. With this factor, the function solves the equation without μ, J
+    /// M⁻¹ Jᵀ λ = b, by the proximal iterations of `solve`. On entry, `CE` contains J M⁻¹ Jᵀ, and `lambda` contains b.
+    /// The elimination treats b as an additional row of the matrix. Adds the number of rows whose pivot counts as zero
+    /// to `redundant`.
     #[inline(always)]
     pub(crate) fn decompose(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let Self { CE, rows, E_inv, stride, .. } = self;
@@ -162,7 +171,9 @@ impl<S: Scalar> Delassus<S> {
         self.repeat(island, proximal, lambda);
     }
 
-    /// Solves J M⁻¹ Jᵀ λ = b of an island, by proximal iterations if μ > 0. `lambda` contains b on entry.
+    /// Solves J M⁻¹ Jᵀ λ = b for the constraint forces λ of one island (trees and constraints that are independent of
+    /// all others). If the regularisation μ is positive, the solution uses proximal iterations. On entry, `lambda`
+    /// contains b.
     #[inline(always)]
     pub(crate) fn solve(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         self.x[island.rows.clone()].copy_from_slice(&lambda[island.rows.clone()]);
@@ -171,8 +182,8 @@ impl<S: Scalar> Delassus<S> {
         self.repeat(island, proximal, lambda);
     }
 
-    /// Runs all proximal iterations except the first. On entry `lambda` contains b, and `x` contains the solution of
-    /// the first iteration.
+    /// Runs all proximal iterations except the first. On entry, `lambda` contains the right-hand side b, and `x`
+    /// contains the solution of the first iteration.
     #[inline(always)]
     fn repeat(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let mu = S::splat(proximal.mu);
@@ -186,7 +197,8 @@ impl<S: Scalar> Delassus<S> {
         lambda[rows.clone()].copy_from_slice(&self.x[rows.clone()]);
     }
 
-    /// Computes the matrix Λ of an island, which maps the right-hand side b to λ. Entries outside the island stay zero.
+    /// Computes the matrix Λ = (J M⁻¹ Jᵀ)⁻¹ of one island, which maps the right-hand side b to the constraint forces λ.
+    /// Entries outside the island stay zero.
     #[inline(always)]
     pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings) {
         let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
@@ -208,7 +220,8 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Replaces x = b by y = C⁻¹ b in the given rows. b is zero before the row `start`.
+    /// Replaces x = b by y = C⁻¹ b in the given rows, by forward substitution with the factor C. b is zero before the
+    /// row `start`.
     #[inline(always)]
     fn substitute(&mut self, rows: &Range<usize>, start: usize) {
         let Self { CE, E_inv, x, y, stride, .. } = self;
@@ -222,7 +235,7 @@ impl<S: Scalar> Delassus<S> {
         x[rows.clone()].copy_from_slice(&y[rows.clone()]);
     }
 
-    /// Replaces x = y by C⁻ᵀ E⁻¹ y in the given rows.
+    /// Replaces x = y by C⁻ᵀ E⁻¹ y in the given rows, by backward substitution with the factors C and E.
     #[inline(always)]
     fn back_substitute(&mut self, range: &Range<usize>) {
         let Self { rows, E_inv, x, stride, .. } = self;
@@ -235,8 +248,8 @@ impl<S: Scalar> Delassus<S> {
     }
 }
 
-/// Returns the length of column j in whole steps. The column begins with the step that contains its diagonal entry and
-/// ends with the step that contains the row after the last row.
+/// Returns the length of column j, a multiple of `step`. The column begins with the step that contains its diagonal
+/// entry and ends with the step that contains the row after the last row.
 #[inline(always)]
 fn room<S: Scalar>(rows: &Range<usize>, j: usize) -> usize {
     (rows.end + 1).next_multiple_of(step::<S>()) - (j - j % step::<S>())
@@ -255,8 +268,8 @@ fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// Computes y −= Σ xₖ sₖ Eₖ⁻¹, where xₖ is column k of a matrix, beginning at row `first`. Loops over whole steps,
-/// including the padding.
+/// Computes y −= Σ xₖ sₖ Eₖ⁻¹, where xₖ is column k of a matrix, beginning at row `first`, and Eₖ⁻¹ is `E_inv[k]`.
+/// Loops over whole steps, including the padding.
 #[inline(always)]
 fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_inv: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -277,7 +290,8 @@ fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_in
     }
 }
 
-/// Returns the number of proximal iterations. The number is 1 if μ is 0, because one solution is then exact.
+/// Returns the number of proximal iterations. The number is 1 if the regularisation μ is 0, because one iteration is
+/// then exact.
 fn rounds(proximal: ProximalSettings) -> usize {
     if proximal.mu > 0.0 { proximal.iterations.max(1) } else { 1 }
 }

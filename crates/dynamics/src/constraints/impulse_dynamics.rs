@@ -9,9 +9,9 @@
 //! ```
 //!
 //! The equations of an impact are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ
-//! = (1 + ε) J v. The derivatives follow from the same equations as for constrained dynamics, with r = ∂(M Δ − Jᵀ
-//! Λ)/∂q, w = v⁺ + ε v and c = ∂(J w)/∂q. Here r is the derivative of inverse dynamics for a robot at rest without
-//! gravity, with acceleration Δ:
+//! = (1 + ε) J v. The derivatives follow from the equations in `constrained_derivatives.rs`, which defines P and J̄,
+//! with r = ∂(M Δ − Jᵀ Λ)/∂q, w = v⁺ + ε v and c = ∂(J w)/∂q. Here r is the derivative of inverse dynamics for a robot
+//! at rest without gravity, with acceleration Δ:
 //!
 //! ```text
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
@@ -32,7 +32,8 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Velocity v⁺ after the impact. Written by: `part`.
         pub v_after: Array<S> = filled(S::zero, size.nv),
-        /// Velocity w = v⁺ + ε v, where v is the velocity before the impact. Written by: `approach`, `part`.
+        /// Velocity w = v⁺ + ε v, with the velocities v before and v⁺ after the impact and the restitution ε. Written
+        /// by: `approach`, `part`.
         pub w: Array<S> = filled(S::zero, size.nv),
         /// Velocities of the bodies when the joints move with velocity w, in the world's frame. Written by: `spread`.
         pub velocity: Array<Motion<S>> = filled(Motion::zero, size.bodies),
@@ -45,7 +46,8 @@ workspace! {
 }
 
 kernel! {
-    /// Computes J and γ = (1 + ε) J v with the restitution ε. `world` must contain the placements of the bodies.
+    /// Computes the constraint Jacobian J and γ = (1 + ε) J v, with the velocity v before the impact and the
+    /// restitution ε. `world` must contain the placements of the bodies.
     pub(crate) fn approach<S>(
         world: &World<S>,
         set: &mut ConstraintSet<S>,
@@ -67,7 +69,7 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the velocity after the impact, v⁺ = v + Δ, and w = v⁺ + ε v.
+    /// Computes the velocity after the impact, v⁺ = v + Δ with the change Δ, and w = v⁺ + ε v with the restitution ε.
     pub(crate) fn part<S>(d: &mut Workspace<S>, v: &[S], change: &[S], restitution: S) {
         for k in 0..v.len() {
             d.v_after[k] = v[k] + change[k];
@@ -77,7 +79,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c = ∂(J w)/∂q. `world` must contain the placements of the bodies.
+    /// Computes c = ∂(J w)/∂q, with the constraint Jacobian J and the joint velocity w = v⁺ + ε v. `world` must contain
+    /// the placements of the bodies.
     pub(crate) fn differentiate_motion<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -96,7 +99,7 @@ kernel! {
 
 kernel! {
     /// Computes the derivatives with respect to the velocity v before the impact: ∂v⁺/∂v is 1 − (1 + ε) J̄ J, and ∂Λ/∂v
-    /// is −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
+    /// is −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J, with the restitution ε and J̄ = M⁻¹ Jᵀ (J M⁻¹ Jᵀ)⁻¹.
     pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut Matrix<S>) {
         let (n, rows) = (set.nv, set.lambda.len());
         let (Jbar, inertia) = (set.Jbar.as_slice(), set.delassus.inverse.as_slice());

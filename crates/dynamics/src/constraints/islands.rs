@@ -1,10 +1,10 @@
 //! Islands: groups of trees and constraints that are independent of each other.
 //!
-//! M has one block for each tree that is attached to the world. J M⁻¹ Jᵀ has an entry for two constraints only if both
-//! act on the same tree. An island consists of trees that constraints connect, and of these constraints. Each island is
-//! factorised separately. Entries of a row in one island and a column in another island are zero. An island has a range
-//! of coordinates and a range of rows. The range of rows is empty for a tree without constraints. Islands with
-//! overlapping ranges are merged.
+//! The inertia matrix M has one block for each tree that is attached to the world. The Delassus matrix J M⁻¹ Jᵀ has a
+//! nonzero entry for two constraints only if both act on the same tree. An island consists of trees that constraints
+//! connect, and of these constraints. Each island is factorised separately. Entries of a row in one island and a column
+//! in another island are zero. An island has a range of coordinates and a range of rows. The range of rows is empty for
+//! a tree without constraints. Islands with overlapping ranges are merged.
 
 use crate::constraints::plan::Plan;
 use alloc::vec;

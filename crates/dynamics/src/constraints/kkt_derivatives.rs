@@ -1,17 +1,18 @@
 //! Linearised equations of motion under constraints.
 //!
-//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. So small changes of q, v, τ, q̈ and λ satisfy
+//! The equations of motion M q̈ + h − Jᵀ λ = τ and the constraints J q̈ + γ = 0 hold for every q, v and τ. So small
+//! changes of q, v, τ, q̈ and λ satisfy
 //!
 //! ```text
 //! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at fixed q̈ and λ
 //! J δq̈         + c_q δq + c_v δv = 0,         c = ∂(J q̈ + γ)
 //! ```
 //!
-//! r follows from the derivatives of inverse dynamics. There, the constraint forces are external forces that move with
-//! the bodies on which they act. Two corrections are added. First, a force expressed in the world's axes does not turn
-//! with frame 1. Second, the force on body 2 moves with frame 1, not with body 2. For a point constraint, this force
-//! turns with frame 1, but its point of action moves with body 2. Source: Carpentier and Mansard, *Analytical
-//! derivatives of rigid body dynamics algorithms* (2018).
+//! The derivative r of the equations of motion follows from the derivatives of inverse dynamics. There, the constraint
+//! forces are external forces that move with the bodies on which they act. Two corrections are added. First, a force
+//! expressed in the world's axes does not turn with frame 1. Second, the force on body 2 moves with frame 1, not with
+//! body 2. For a point constraint, this force turns with frame 1, but its point of action moves with body 2. Source:
+//! Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
 
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::{Columns, FramePair};
@@ -114,8 +115,8 @@ kernel! {
                         continue;
                     }
                     let w = world.S[e.column].angular.scale(S::splat(e.ratio));
-                    // After the turn, the force of a line or plane is not along the held axes, so all three rows of the
-                    // point are needed.
+                    // For a line or plane constraint, the correction ω × λ is not along the held axes. So the
+                    // correction needs all three rows of the point's Jacobian.
                     if let Some(ends) = &ends {
                         let turned = w.cross(f.linear); // ω × λ
                         for j in &plan.touches {
@@ -138,8 +139,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes c_q and c_v, the derivatives of J q̈ + γ. The velocities and accelerations of the bodies must already
-    /// be computed.
+    /// Computes c_q and c_v, the derivatives of the constraint accelerations J q̈ + γ with respect to q and v. The
+    /// velocities and accelerations of the bodies must already be computed.
     pub(crate) fn differentiate_motion<S>(
         set: &mut ConstraintSet<S>,
         world: &World<S>,

@@ -1,9 +1,9 @@
 //! Plan of a constraint in a model: the coordinates that move the constraint's frames, and the index of the
 //! constraint's first row.
 //!
-//! In the elimination tree of M's factor, the coordinates that move a constraint's frames are on the paths from the two
-//! frames to the root. A slot is the index of a coordinate in the order of this factor. The sorted slots of a
-//! constraint form at most three runs: the slots that both paths share, then the other slots of one path, then the
+//! In the elimination tree of the sparse factor of M, the coordinates that move a constraint's frames are on the paths
+//! from the two frames to the root. A slot is the index of a coordinate in the order of this factor. The sorted slots
+//! of a constraint form at most three runs: the slots that both paths share, then the other slots of one path, then the
 //! other slots of the second path. Rows of J are stored for the coordinates of these slots only.
 
 use crate::constraints::constraint::{ConstraintKind, ContactConstraint};
@@ -18,12 +18,13 @@ use core::ops::Range;
 
 /// Regularisation of the Delassus matrix J M⁻¹ Jᵀ. The regularisation distributes the force over redundant constraints.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with the last solution as λ'.
-/// Each iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
-/// If several vectors λ give the same motion, the iterations converge to the λ with the smallest norm. With μ = 0 one
-/// iteration is exact, and rows that depend on earlier rows get no force. The number of iterations is fixed, so that
-/// all lanes and dual numbers run the same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse
-/// resolution of constrained dynamic equations* (2021).
+/// The constraint forces λ solve J M⁻¹ Jᵀ λ = b. With μ > 0, each iteration solves (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', where
+/// λ' is the solution of the previous iteration, or 0 in the first iteration. Each iteration multiplies the error of
+/// the motion by μ/(σ + μ), where σ is the smallest nonzero singular value of J M⁻¹ Jᵀ. If several vectors λ give the
+/// same motion, the iterations converge to the λ with the smallest norm. With μ = 0 one iteration is exact, and rows
+/// that depend on earlier rows get no force. The number of iterations is fixed, so that all lanes and dual numbers run
+/// the same operations. Source: Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic
+/// equations* (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProximalSettings {
     /// Regularisation μ (1/kg). It should be small compared with the entries of the Delassus matrix, but large compared
@@ -34,7 +35,7 @@ pub struct ProximalSettings {
 }
 
 impl Default for ProximalSettings {
-    /// Returns μ = 0 and one iteration.
+    /// Returns the settings without regularisation: μ = 0 and one iteration.
     fn default() -> Self {
         Self { mu: 0.0, iterations: 1 }
     }
@@ -69,7 +70,7 @@ pub(crate) struct Plan {
     /// which are rotated to the joint axes (`turned`).
     pub placements: [Se3<f64>; 2],
     pub turned: [Se3<f64>; 2],
-    /// Index of the constraint's first row in J.
+    /// Index of the constraint's first row in the constraint Jacobian J.
     pub row: usize,
     /// Slots of the coordinates that move the constraint's frames, sorted from the root outwards (`places`), and the
     /// coordinate of each slot (`coordinates`).

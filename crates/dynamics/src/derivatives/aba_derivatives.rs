@@ -38,14 +38,14 @@ workspace! {
     } same {
         /// Index of the first coordinate of each floating body. Written by: `new`.
         pub floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect(),
-        /// Rows of ∂τ that may be nonzero, one list per column. The product with M⁻¹ uses only these rows. The list is
-        /// empty for the linear coordinates of floating bodies. Written by: `new`.
+        /// Rows of ∂τ/∂q and ∂τ/∂v that may be nonzero, one list per column. The product with M⁻¹ uses only these rows.
+        /// The list is empty for the linear coordinates of floating bodies. Written by: `new`.
         pub nonzero_rows: Vec<NonzeroRows> = NonzeroRows::of_columns(rows_that_count(model, &floating)),
     }
 }
 
-/// Returns for each column of ∂τ the rows that the product with M⁻¹ uses: the rows that may be nonzero. The list is
-/// empty for the linear coordinates of floating bodies, because their columns of the result are known.
+/// Returns for each column of ∂τ/∂q and ∂τ/∂v the rows that the product with M⁻¹ uses: the rows that may be nonzero.
+/// The list is empty for the linear coordinates of floating bodies, because their columns of the result are known.
 fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
     let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
     for &first in floating {

@@ -35,7 +35,7 @@ workspace! {
         pub mu: Array<S> = filled(S::zero, size.nv),
         /// Scratch for the transpose of ∂q̈/∂q, then of ∂q̈/∂v. Written by: `run`.
         pub transpose: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Scratch for the product −(∂q̈/∂q)ᵀ G. Written by: `run`.
+        /// Scratch for the product −(∂q̈/∂q)ᵀ G, with G = ∂²φ/∂a∂q and φ = μᵀ rnea(q, v, a). Written by: `run`.
         pub product: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Matrix λᵀ ∂²q̈/∂q∂q of contracted second derivatives. Written by: `run`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
@@ -64,8 +64,8 @@ kernel! {
 }
 
 kernel! {
-    /// Computes the four matrices λᵀ ∂²q̈/∂x∂y, for x and y among q, v and τ. Runs after `aba_derivatives` and the
-    /// Hessian of φ.
+    /// Computes the four matrices λᵀ ∂²q̈/∂x∂y, for x and y among q, v and τ. Runs after `aba_derivatives`, and after
+    /// the Hessian of φ = λᵀ M⁻¹ rnea(q, v, a).
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,

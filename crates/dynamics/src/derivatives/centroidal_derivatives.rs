@@ -10,7 +10,7 @@
 //! ```
 //!
 //! Shifted to the centre of mass c, a force [f; n] becomes [f; n − c × f], and the derivative of the moment has the
-//! additional term −∂c × f. The linear rows, divided by the mass, are the derivatives of ċ and c̈.
+//! additional term −∂c × f. The linear rows of the derivatives, divided by the mass, are the derivatives of ċ and c̈.
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the
 //! root of the tree.
@@ -24,8 +24,8 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, same_layout};
 
-/// Derivatives of h and F, about the world's origin, with respect to the position q, velocity v and acceleration a of
-/// one joint column.
+/// Derivatives of the momentum h and its rate F, about the world's origin, with respect to the position q, velocity v
+/// and acceleration a of one joint column.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 struct Column<S> {
@@ -51,13 +51,14 @@ workspace! {
         /// Composite inertia Iᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
         /// Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Momentum hᶜ and 2Bᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
-        /// Written by: `pass`.
+        /// Momentum hᶜ, and the matrix 2Bᶜ as in `rnea_derivatives`, of all bodies that a joint carries. Index 0 holds
+        /// the sum over all moving bodies. Written by: `pass`.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
         /// Rate of momentum Fᶜ of all bodies that a joint carries. Index 0 holds the sum over all moving bodies.
         /// Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Derivatives of h and F with respect to each joint column. Written by: `pass`.
+        /// Derivatives of the momentum h and its rate F with respect to the coordinate of each joint column. Written
+        /// by: `pass`.
         columns: Array<Column<S>> = filled(Column::zero, size.columns),
         /// Derivatives of the centroidal momentum and of its rate, about the centre of mass. Written by: `shift`.
         pub dh_dq: Matrix<S> = zero_matrix(6, size.nv),
@@ -89,8 +90,8 @@ impl<S> Workspace<S> {
     }
 }
 
-/// Computes the derivatives of h and F about the world's origin. The velocities and accelerations of the bodies must
-/// already be computed.
+/// Computes the derivatives of the momentum h and its rate F, both about the world's origin. The velocities and
+/// accelerations of the bodies must already be computed.
 #[inline(always)]
 fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, columns, .. } = d;
@@ -178,8 +179,8 @@ pub struct CentroidalDerivatives<'d, S> {
 }
 
 kernel! {
-    /// Computes all derivatives of hg, dhg and c. The velocities and accelerations of the bodies must already be
-    /// computed.
+    /// Computes all derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. The velocities
+    /// and accelerations of the bodies must already be computed.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         shift(model, d);

@@ -1,7 +1,8 @@
 //! Derivatives of the velocity and the acceleration of bodies and frames with respect to position and velocity.
 //!
-//! When coordinate e changes, the bodies that the joint of e carries turn rigidly about S_e. The velocities and
-//! accelerations of these bodies also change because the joint's parent λ moves (see `rnea_derivatives`):
+//! When coordinate e changes, the bodies that the joint of e carries turn rigidly about the joint column S_e. The
+//! velocities and accelerations of these bodies also change because the joint's parent λ moves (see
+//! `rnea_derivatives`):
 //!
 //! ```text
 //! Ψ̇_e = v_λ × S_e                          ∂v/∂q_e = S_e × v + Ψ̇_e                ∂v/∂q̇_e = S_e
@@ -94,7 +95,8 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     }
 }
 
-/// Derivatives ∂v/∂q_e, ∂v/∂q̇_e, ∂a/∂q_e and ∂a/∂q̇_e of the motion of a body, in a reference frame.
+/// Derivatives ∂v/∂q_e, ∂v/∂q̇_e, ∂a/∂q_e and ∂a/∂q̇_e of a body's velocity v and acceleration a with respect to one
+/// coordinate e, in a reference frame.
 struct Column<S> {
     v_q: Motion<S>,
     v_v: Motion<S>,

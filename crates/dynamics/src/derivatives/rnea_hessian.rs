@@ -2,8 +2,9 @@
 //!
 //! φ = λᵀ τ(q, v, a) is the power of the efforts when the joints move with velocity λ. So φ = Σ ⟨w_i, F_i⟩, where w_i
 //! is the velocity of body i for the joint velocity λ. When coordinate e changes, the bodies that the joint of e
-//! carries turn rigidly about S_e. This rigid turn does not change the power. In addition, the motions w, v and a of
-//! each of these bodies change as follows (see `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
+//! carries turn rigidly about the joint column S_e. This rigid turn does not change the power. In addition, the motions
+//! w, v and a of each of these bodies change as follows (see `rnea_derivatives`), with W_e = w_λ × S_e and Y_e = Ψ̇_e +
+//! Ṡ_e:
 //!
 //! ```text
 //! by q_e:  δw = W_e,  δv = Ψ̇_e,  δa = Ψ̈_e + Ψ̇_e × v        by q̇_e:  δv = S_e,  δa = Y_e + S_e × v
@@ -44,24 +45,25 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// Scratch for the second derivatives of φ, in the world's frame.
+    /// Scratch for the second derivatives of φ = λᵀ τ, in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Velocity w of each body when the joints move with velocity λ. Written by: `pass`.
         pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Motion W = w_λ × S of each column S, with the velocity w_λ of the parent. Written by: `pass`.
         pub W: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Momentum P = Σ I w and rate of inertia D, over all bodies that a joint carries. Written by: `pass`.
+        /// Momentum P = Σ I w for the body velocities w, and rate of inertia D, over all bodies that a joint carries.
+        /// Written by: `pass`.
         pub PD: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Angular part of the sum Q = Σ 2Bᵀ w over all bodies that a joint carries; the linear part is zero. Written
-        /// by: `pass`.
+        /// Angular part of the sum Q = Σ 2Bᵀ w over all bodies that a joint carries, with the velocity w of each body.
+        /// The linear part of Q is zero. Written by: `pass`.
         pub Q: Array<Vec3<S>> = filled(Vec3::zero, size.bodies),
-        /// Second derivatives ∂²φ/∂q∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂q∂q of φ = λᵀ τ. Written by: `pass`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Second derivatives ∂²φ/∂v∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂v∂q of φ = λᵀ τ. Written by: `pass`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Second derivatives ∂²φ/∂v∂v. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂v∂v of φ = λᵀ τ. Written by: `pass`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Second derivatives ∂²φ/∂a∂q. Written by: `pass`.
+        /// Second derivatives ∂²φ/∂a∂q of φ = λᵀ τ. Written by: `pass`.
         pub dadq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }

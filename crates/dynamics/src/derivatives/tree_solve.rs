@@ -2,8 +2,8 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity. The
 //! efforts are the columns of B. The algorithm works in the world's frame with the factors of the articulated-body
-//! algorithm. Each column of B costs O(n), whereas each entry of a product with M⁻¹ costs O(n). Several columns of B
-//! are processed together.
+//! algorithm. For n bodies, each column of B costs O(n), whereas in a product with M⁻¹ each entry costs O(n). Several
+//! columns of B are processed together.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
@@ -13,10 +13,10 @@ use alloc::vec::Vec;
 use condyle_model::tree::Column;
 use condyle_spatial::{Array, Scalar, same_layout};
 
-/// Number of columns of B that are processed together.
+/// Number of columns of B in a product −M⁻¹ B that are processed together.
 const SIDE: usize = 16;
 
-/// Number of columns of B that are processed together if the scalar has lanes.
+/// Number of columns of B in a product −M⁻¹ B that are processed together if the scalar has lanes.
 const SIDE_OF_LANES: usize = 2;
 
 /// Path of joint columns in the tree: each column except the last has exactly one child, the next column. The bias

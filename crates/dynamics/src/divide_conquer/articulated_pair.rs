@@ -1,5 +1,6 @@
-//! Relation between forces and accelerations of a piece of a robot. A piece has two handles. The upper handle is the
-//! body to which the piece is attached; the lower handle is the last body of the piece.
+//! Relation between forces and accelerations of a piece of a robot. A piece is a group of connected bodies and has two
+//! handles. The upper handle is the body to which the piece is attached; the lower handle is the last body of the
+//! piece.
 //!
 //! Source: Featherstone (1999), part 1, describes an articulated body with two handles by inverse inertias, so that
 //! forces determine accelerations. Here the inputs are the acceleration a of the upper handle and the force f on the
@@ -21,13 +22,14 @@
 //! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
 //! ```
 //!
-//! 1 + Y₁ K₂ has no eigenvalue below 1, because Y₁ and K₂ have no negative eigenvalues. Gaussian elimination is applied
-//! to this unsymmetric matrix. A symmetric form would need a square root of Y₁. But the rank of Y₁ is at most the
-//! number of degrees of freedom of piece 1, so some pivots of the square root may be zero up to rounding. These
-//! rounding errors would falsify the result.
+//! The matrix 1 + Y₁ K₂, with the compliance Y₁ of piece 1 and the inertia K₂ of piece 2, has no eigenvalue below 1,
+//! because Y₁ and K₂ have no negative eigenvalues. Gaussian elimination is applied to this unsymmetric matrix. A
+//! symmetric form would need a square root of Y₁. But the rank of Y₁ is at most the number of degrees of freedom of
+//! piece 1, so some pivots of the square root may be zero up to rounding. These rounding errors would falsify the
+//! result.
 //!
 //! Forces and accelerations of a handle are expressed at the handle's own origin, along the world's axes. So the lever
-//! arms in Y are distances within the piece, not distances from the world's origin.
+//! arms in the compliance Y of a piece are distances within the piece, not distances from the world's origin.
 
 use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
@@ -82,8 +84,9 @@ impl<S: Scalar> ArticulatedPair<S> {
         }
     }
 
-    /// Resets the relation to a piece without joints between the handles: Y = 0, b = 0, and L converts a motion at the
-    /// origin to a motion at the point r of the lower handle.
+    /// Makes this the relation of a piece that has no joints between its two handles. The compliance Y and the bias
+    /// acceleration b are then 0, and L converts a motion at the origin to the motion at the point r of the lower
+    /// handle.
     #[inline(always)]
     pub(crate) fn begin(&mut self, r: Vec3<S>) {
         let skew = r.skew(); // a' = [v + ω × r; ω]
@@ -95,8 +98,9 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b = Motion::zero();
     }
 
-    /// Adds a degree of freedom above the piece, with column S (`axis`), U = Iᴬ S and 1/D. x = u/D is the acceleration
-    /// of the degree of freedom when the upper handle has no acceleration.
+    /// Adds a degree of freedom above the piece, with joint column S (`axis`) and the quantities U = Iᴬ S, 1/D and u of
+    /// the articulated-body algorithm. x = u/D is the acceleration of the degree of freedom when the upper handle has
+    /// no acceleration.
     #[inline(always)]
     pub(crate) fn extend(&mut self, axis: Motion<S>, U: Force<S>, D_inv: S, x: S) {
         let s = times(&self.L, &axis.to_array()); // s = L S
@@ -114,8 +118,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b += Motion::from(times(&self.L, &c.to_array())); // b ← b + L c
     }
 
-    /// Joins `upper` and `lower`; `lower` is attached to the last body of `upper`. L, b and Y are computed only if the
-    /// joined piece is `open`.
+    /// Joins `upper` and `lower`; `lower` is attached to the last body of `upper`. The quantities L, b and Y of the
+    /// lower handle are computed only if the joined piece is `open`, which means that it has a lower handle.
     #[inline(always)]
     pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
         let (L1, Y1, K2, p2) = (&upper.L, &upper.Y, full(lower.K), lower.p);

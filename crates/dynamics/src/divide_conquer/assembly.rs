@@ -30,7 +30,7 @@ pub(crate) enum Kind {
     /// Run: bodies that are eliminated one after the other. Each body is attached to another body of the run or to the
     /// body above the run.
     Run,
-    /// Hub: one body and the next piece in the list. This piece assembles the subtrees that are attached to the body.
+    /// Hub: one body, and the next piece in the list, which consists of all subtrees that are attached to the body.
     Hub,
     /// Join of the next two pieces in the list. The second piece is attached to the last body of the first piece.
     Join,
@@ -48,7 +48,7 @@ pub(crate) struct Piece {
     pub links: usize,
     /// Number of degrees of freedom of the joints in this piece.
     pub dofs: usize,
-    /// Number of pieces in this piece, including the piece itself and its parts at all levels.
+    /// Number of pieces in this piece, including the piece itself and all pieces nested in it.
     pub pieces: usize,
     /// Number of pieces on the longest path from this piece to a run, including this piece and the run.
     depth: usize,
@@ -66,7 +66,8 @@ pub(crate) struct Link {
     pub spine: bool,
 }
 
-/// Numbers of bodies, pieces and levels in an assembly, which determine its cost.
+/// Numbers of bodies and pieces in an assembly, and the nesting depth of the pieces. These numbers determine the cost
+/// of the algorithm.
 ///
 /// ```
 /// use condyle_dynamics::{AssemblySize, DivideConquer, robots};
@@ -230,8 +231,9 @@ fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> 
     best.map(|(_, cut)| cut)
 }
 
-/// Returns whether the inertia of the body alone resists each degree of freedom of its joint. This is true if all D are
-/// greater than zero. D is computed in the body's frame, in which S is constant.
+/// Returns whether the inertia of the body alone resists each degree of freedom of its joint. This is true if the
+/// inertia D along each degree of freedom is above a minimum. D is computed in the body's frame, in which the joint
+/// columns are constant.
 fn firm(body: &Body) -> bool {
     let inertia = Se3::new(body.joint.axis_rotation(), Vec3::zero()).act_inv(body.inertia);
     let rotational = inertia.rotational;

@@ -14,10 +14,12 @@
 //! q̈ = a + (M_σ⁻¹)_Z w,    w = A⁻¹ (G ÿ − a_Z)
 //! ```
 //!
-//! The columns of (M_σ⁻¹)_Z are the accelerations of the free robot, at rest and without gravity, for a unit effort at
-//! one joint of Z. With the rotors, M_σ is regular if M of the tied robot is regular: a motion in the null space of M_σ
-//! has no velocity in Z, so it would be in the null space of M, too. Without rotors, M_σ may be singular, because the
-//! bodies that a mimic joint moves may have no inertia.
+//! Column z of (M_σ⁻¹)_Z contains the accelerations of the free robot, at rest and without gravity, for a unit effort
+//! at joint z, one of the joints Z that share coordinates. M_σ, the inertia matrix of the free robot with its rotors,
+//! is regular if the inertia matrix M of the tied robot is regular. The reason: a motion in the null space of M_σ has
+//! no kinetic energy, so no rotor turns, and the joints Z have no velocity. Such a motion satisfies the ties, so it
+//! would be in the null space of M, too. Without rotors, M_σ may be singular, because the bodies that a mimic joint
+//! moves may have no inertia.
 
 use crate::calls::inertia::crba;
 use crate::data::Data;
@@ -47,26 +49,31 @@ struct Member {
 pub(crate) struct Ties<S> {
     /// Joints Z that share coordinates, in the order of the assembly.
     members: Vec<Member>,
-    /// Inertias σ of the rotors. Shape: Z. Written by: `choose_rotors`.
+    /// Inertias σ of the rotors, one per joint of Z. Shape: Z. Written by: `choose_rotors`.
     rotors: Vec<S>,
-    /// Matrix G of the ratios. Shape: Z × y. Written by: `prepare`.
+    /// Matrix G of the ratios, which maps the shared coordinates y to positions of the joints Z. Shape: Z × y. Written
+    /// by: `prepare`.
     G: DMatrix<S>,
     /// Accelerations a of the free robot, which the accelerations of the tied robot overwrite. Shape: degrees of
     /// freedom. Written by: `keep_free` and `solve`.
     free: Vec<S>,
-    /// Columns (M_σ⁻¹)_Z of the inverse inertia matrix. Shape: degrees of freedom × Z. Written by: `keep_response`.
+    /// Columns (M_σ⁻¹)_Z of the inverse inertia matrix of the free robot, one per joint of Z. Shape: degrees of freedom
+    /// × Z. Written by: `keep_response`.
     response: DMatrix<S>,
-    /// Matrix A = (M_σ⁻¹)_ZZ. Shape: Z × Z. Written by: `solve`.
+    /// Matrix A = (M_σ⁻¹)_ZZ: the rows and columns of the joints Z in the inverse inertia matrix of the free robot.
+    /// Shape: Z × Z. Written by: `solve`.
     A: DMatrix<S>,
-    /// Matrix A⁻¹ G. Shape: Z × y. Written by: `solve`.
+    /// Matrix A⁻¹ G, with the matrix G of the ratios. Shape: Z × y. Written by: `solve`.
     X: DMatrix<S>,
-    /// Matrix Gᵀ A⁻¹ G − Gᵀ σ G. Shape: y × y. Written by: `solve`.
+    /// Matrix Gᵀ A⁻¹ G − Gᵀ σ G of the equation for the accelerations ÿ of the shared coordinates. Shape: y × y.
+    /// Written by: `solve`.
     H: DMatrix<S>,
     factor_A: Cholesky<S>,
     factor_H: Cholesky<S>,
     /// Accelerations ÿ of the shared coordinates. Shape: y. Written by: `solve`.
     ydd: Vec<S>,
-    /// Vector G ÿ − a_Z, which the tying efforts w overwrite. Shape: Z. Written by: `solve`.
+    /// Difference G ÿ − a_Z between the accelerations of the joints Z in the tied robot and in the free robot. The
+    /// tying efforts w overwrite this difference. Shape: Z. Written by: `solve`.
     w: Vec<S>,
 }
 
@@ -104,8 +111,9 @@ impl<S: Scalar> Ties<S> {
         ties
     }
 
-    /// Chooses rotors with about the same inertia as the bodies that the joints move. Then neither inertia is lost in
-    /// the rounding errors of the other. Gᵀ σ G is the diagonal of M at a random position.
+    /// Chooses the inertias σ of the rotors. They are about as large as the inertias that the joints move, so neither
+    /// inertia is lost in the rounding errors of the other. For each shared coordinate, the total inertia Gᵀ σ G of the
+    /// rotors equals the diagonal entry of M at a random position.
     fn choose_rotors<R: Constant<S>>(&mut self, model: &Model<R>, shared: &[usize]) {
         if shared.is_empty() {
             return;
@@ -134,12 +142,12 @@ impl<S: Scalar> Ties<S> {
         self.members.len()
     }
 
-    /// Returns the index of joint z of Z among the degrees of freedom.
+    /// Returns the index of joint z among the degrees of freedom. z counts only the joints that share coordinates.
     pub(crate) fn dof(&self, z: usize) -> usize {
         self.members[z].dof
     }
 
-    /// Adds the rotors' inertias σ to the degrees of freedom of the joints Z.
+    /// Adds the rotors' inertias σ to the degrees of freedom of the joints that share coordinates.
     pub(crate) fn add_rotors(&self, dofs: &mut [Dof<S>]) {
         for (member, &rotor) in self.members.iter().zip(&self.rotors) {
             dofs[member.dof].rotor += rotor;
@@ -151,7 +159,8 @@ impl<S: Scalar> Ties<S> {
         self.free.iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
     }
 
-    /// Stores the accelerations for a unit effort at joint z of Z.
+    /// Stores the accelerations of the free robot for a unit effort at joint z. z counts only the joints that share
+    /// coordinates.
     pub(crate) fn keep_response(&mut self, z: usize, dofs: &[Dof<S>]) {
         self.response.column_mut(z).iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
     }

@@ -1,4 +1,5 @@
-//! Forward dynamics by the divide-and-conquer articulated-body algorithm, in O(log n) steps on O(n) processors.
+//! Forward dynamics by the divide-and-conquer articulated-body algorithm, in O(log n) steps on O(n) processors for n
+//! bodies.
 //!
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
 //! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999).
@@ -30,13 +31,13 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 
 /// Forward dynamics by divide and conquer: the plan of the assembly for one model, and the scratch of the algorithm.
 ///
-/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
-/// depth of ⌈log₂ n⌉ + 1 for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
-/// of a body. A body in a run with two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with few
-/// processors, `grain` should be large: n divided by the number of threads. On two threads, divide and conquer is
-/// faster than `aba` for more than about 200 bodies. On one thread, it is always slower (`benches/divide_conquer.rs`).
-/// If joints share coordinates (mimic), the passes run once with all joints free, and once more for each joint that
-/// shares a coordinate.
+/// The robot is assembled from runs: groups of at most `grain` bodies, which are eliminated one after the other. With
+/// `grain` = 1 the algorithm takes O(log n) steps: a depth of ⌈log₂ n⌉ + 1 for a chain of n bodies. A join of two
+/// pieces costs about six times as much as the elimination of a body. A body in a run with two handles costs 1.5 times
+/// as much as a body in [`aba`](crate::aba()). So with few processors, `grain` should be large: n divided by the number
+/// of threads. On two threads, divide and conquer is faster than `aba` for more than about 200 bodies. On one thread,
+/// it is always slower (`benches/divide_conquer.rs`). If joints share coordinates (mimic), the passes run once with all
+/// joints free, and once more for each joint that shares a coordinate.
 ///
 /// Runs in the rayon pool of the calling thread, or in the global pool if the calling thread does not belong to a pool.
 /// The bits of the results do not depend on the number of threads. [`new`](Self::new) allocates all memory, except what
@@ -104,13 +105,14 @@ impl<S: Scalar> DivideConquer<S> {
         }
     }
 
-    /// Returns the numbers of bodies, pieces and levels in the assembly, which determine its cost.
+    /// Returns the numbers of bodies and pieces in the assembly, and the nesting depth of the pieces. These numbers
+    /// determine the cost of the algorithm.
     pub fn size(&self) -> AssemblySize {
         self.assembly.size()
     }
 
-    /// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), as [`aba`](crate::aba()) does up to rounding, in O(n) work
-    /// and O(log n + grain) steps.
+    /// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), as [`aba`](crate::aba()) does up to rounding. For n bodies,
+    /// the work is O(n) and the number of steps is O(log n + grain).
     ///
     /// q: nq numbers; v, tau: nv numbers each; f_ext: one force per body in the frame of the body, or an empty slice
     /// for no forces. Returns nv numbers. Allocates nothing, except what rayon allocates. If z joints share coordinates

@@ -4,9 +4,9 @@
 //! so the inertia and force of a body are added to the inertia and force of its parent without a change of coordinates.
 //! A joint with several degrees of freedom is treated as a chain of joints with one degree of freedom, between massless
 //! bodies. The columns of such a joint are eliminated one by one, beginning with the last column, so no matrix is
-//! inverted. The dot products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. To
-//! shorten the chain of dependent operations, the linear and the angular half of each product are computed
-//! independently.
+//! inverted. Two dot products determine the time of a pass: Sᵀ U in the inward pass and Uᵀ a' in the outward pass. S is
+//! a joint column, U = Iᴬ S, and a' is the parent's acceleration plus the velocity-dependent acceleration. To shorten
+//! the chain of dependent operations, the linear and the angular half of each product are computed independently.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};
@@ -26,7 +26,8 @@ workspace! {
         pub D_inv: Array<S> = filled(S::zero, size.columns),
         /// Velocity of each body; the world's velocity stays 0. Written by: `inward`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
-        /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `outward`.
+        /// Acceleration of each body; the world's acceleration is −g, which accounts for gravity. Written by:
+        /// `outward`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
         /// Velocity-dependent acceleration v × v_J of each body, with the velocity v_J of the body's joint. Written by:
         /// `inward`.
@@ -65,8 +66,8 @@ fn eliminate<L: Layout>(
     Ia
 }
 
-/// Computes U = Iᴬ S and 1/D for all columns S. U and D depend only on q. The placements of the bodies must already be
-/// computed.
+/// Computes U = Iᴬ S and 1/D for all joint columns S, with the articulated inertia Iᴬ and D = Sᵀ U + armature. U and D
+/// depend only on q. The placements of the bodies must already be computed.
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;

@@ -22,8 +22,8 @@ workspace! {
     /// Scratch for all terms, in the world's frame. Other intermediate results are in the workspaces of kinematics and
     /// of the centroidal map.
     pub(crate) struct Workspace<S>(size) {
-        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which includes gravity. Written by:
-        /// `pass`.
+        /// Acceleration of each body for q̈ = 0; the world's acceleration is −g, which accounts for gravity. Written
+        /// by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Force that each joint transmits for q̈ = 0. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.bodies),
@@ -39,8 +39,8 @@ workspace! {
     }
 }
 
-/// Computes M, h, the kinetic energy of the bodies and the columns of the centroidal map. The velocities of the bodies
-/// must already be computed.
+/// Computes the inertia matrix M, the bias efforts h, the kinetic energy of the bodies and the columns of the
+/// centroidal map. The velocities of the bodies must already be computed.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -107,9 +107,9 @@ pub struct AllTerms<'d, S, R = f64> {
     pub centroidal: CentroidalMapRate<'d, S>,
     /// Kinetic energy T = ½ vᵀ M v (J).
     pub kinetic_energy: S,
-    /// Potential energy V = −m gᵀ c (J), with the total mass m and its centre c.
+    /// Potential energy V = −m gᵀ c (J), with the total mass m and the centre of mass c.
     pub potential_energy: S,
-    /// Accelerations of the bodies for q̈ = 0. The world's acceleration is −g, which includes gravity.
+    /// Accelerations of the bodies for q̈ = 0. The world's acceleration is −g, which accounts for gravity.
     pub(crate) a: &'d [Motion<S>],
 }
 

@@ -1,9 +1,9 @@
 //! Macro that defines queries on bodies whose placements are already computed. Such a query returns a few numbers, the
 //! answer.
 //!
-//! If the scalar is `f64`, the query runs in a kernel, which uses fused products. So the answer is bit-identical to the
-//! answer for a state in lanes. With other scalars, queries already run inside kernels, so the answer is computed
-//! directly.
+//! If the scalar is `f64`, the query runs in a kernel. Kernels use fused products both for `f64` and for lanes, so the
+//! answer is bit-identical to the answer for a state in lanes. With other scalars, queries already run inside kernels,
+//! so the answer is computed directly.
 
 /// Answer of a query that returns one number.
 pub(crate) type Number<S> = S;

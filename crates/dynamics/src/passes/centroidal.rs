@@ -233,7 +233,7 @@ kernel! {
 
 answers! {
     /// Returns hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, in the axes of the world
-    /// (kg m/s, kg m²/s). Costs O(n).
+    /// (kg m/s, kg m²/s). Costs O(n) for n bodies.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum(of: Velocities) -> Force = Force::zero(); {
@@ -247,8 +247,8 @@ answers! {
     }
 
     /// Returns dhg = Σ (I_i a_i + v_i ×* I_i v_i), the rate of the centroidal momentum, in the axes of the world (N, N
-    /// m). Costs O(n). The rate equals the sum of the weight and the external forces, with moments about the centre of
-    /// mass.
+    /// m). Costs O(n) for n bodies. The rate equals the sum of the weight and the external forces, with moments about
+    /// the centre of mass.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum_rate(of: Accelerations) -> Force = Force::zero(); {

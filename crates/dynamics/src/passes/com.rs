@@ -37,7 +37,8 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
 }
 
 answers! {
-    /// Returns c = Σ m_i c_i / Σ m_i, the centre of mass of the moving bodies in the world's frame (m). Costs O(n).
+    /// Returns c = Σ m_i c_i / Σ m_i, the centre of mass of the moving bodies in the world's frame (m). Costs O(n) for
+    /// n bodies.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     ///
@@ -53,7 +54,8 @@ answers! {
         moment.scale(mass.recip())
     }
 
-    /// Returns ċ, the velocity of the centre of mass of the moving bodies in the world's frame (m/s). Costs O(n).
+    /// Returns ċ, the velocity of the centre of mass of the moving bodies in the world's frame (m/s). Costs O(n) for n
+    /// bodies.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn com_velocity(of: Velocities) -> Vec3 = Vec3::zero(); {
@@ -68,7 +70,7 @@ answers! {
     }
 
     /// Returns c̈, the acceleration of the centre of mass of the moving bodies in the world's frame (m/s²), without
-    /// gravity. Costs O(n).
+    /// gravity. Costs O(n) for n bodies.
     ///
     /// Returns NaN if no moving body has mass. Allocates nothing.
     fn com_acceleration(of: Accelerations) -> Vec3 = Vec3::zero(); {

@@ -21,7 +21,8 @@ use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, Vec3, same_layout};
 
-/// Matrix 2B of one body, or the sum of these matrices over all bodies that a joint carries.
+/// Matrix 2B of one body, or the sum of these matrices over all bodies that a joint carries. For each motion m, 2B m =
+/// v ×* I m − I (v × m) + m ×* I v, with the velocity v and inertia I of the body.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Coriolis<S> {
@@ -60,7 +61,7 @@ impl<S: Scalar> Coriolis<S> {
         Self { momentum: I * v, rate }
     }
 
-    /// Returns the product 2B m.
+    /// Returns the product of the matrix 2B with a motion m, a force.
     #[inline(always)]
     pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
@@ -70,7 +71,7 @@ impl<S: Scalar> Coriolis<S> {
         }
     }
 
-    /// Returns the angular part of 2Bᵀ m. The linear part of 2Bᵀ m is zero.
+    /// Returns the angular part of the force 2Bᵀ m for a motion m. The linear part of this force is zero.
     #[inline(always)]
     pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
@@ -97,7 +98,8 @@ workspace! {
     }
 }
 
-/// Computes C without the terms of free joints' armature. The velocities of the bodies must already be computed.
+/// Computes the Coriolis matrix C without the terms of free joints' armature. The velocities of the bodies must already
+/// be computed.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let (S, dS, half) = (&w.S, &m.dS, L::S::splat(0.5));

@@ -10,8 +10,8 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 answers! {
-    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J). Costs O(n).
-    /// V is zero for a mass at the world's origin.
+    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J). Costs O(n)
+    /// for n bodies. V is zero for a mass at the world's origin.
     ///
     /// Allocates nothing.
     fn potential_energy(of: Placements) -> Number = S::zero(); {
@@ -20,7 +20,7 @@ answers! {
     }
 
     /// Returns T = ½ Σ v_iᵀ I_i v_i + ½ Σ armature q̇² = ½ q̇ᵀ M q̇, the kinetic energy of the moving bodies and the
-    /// rotors (J). Costs O(n).
+    /// rotors (J). Costs O(n) for n bodies.
     ///
     /// Allocates nothing.
     ///
@@ -43,8 +43,8 @@ answers! {
         twice * S::splat(0.5)
     }
 
-    /// Returns E = T + V, the mechanical energy (J). Costs O(n). The rate of E is the power of the joint efforts and
-    /// the external forces.
+    /// Returns E = T + V, the mechanical energy (J). Costs O(n) for n bodies. The rate of E is the power of the joint
+    /// efforts and the external forces.
     ///
     /// Allocates nothing.
     fn mechanical_energy(of: Velocities) -> Number = S::zero(); {

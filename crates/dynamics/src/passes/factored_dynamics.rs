@@ -13,19 +13,19 @@ use condyle_spatial::{Array, Matrix, Scalar};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ForwardDynamicsMethod {
-    /// Articulated-body algorithm, O(n).
+    /// Articulated-body algorithm, O(n) for n bodies.
     ArticulatedBody,
-    /// Solution of M q̈ = τ − h with the dense factor [`Cholesky`], O(n³).
+    /// Solution of M q̈ = τ − h with the dense factor [`Cholesky`], O(n³) for n coordinates.
     Dense,
-    /// Solution of M q̈ = τ − h with the sparse factor [`Ltdl`], O(n d²) for a tree of depth d.
+    /// Solution of M q̈ = τ − h with the sparse factor [`Ltdl`], O(n d²) for n coordinates and a tree of depth d.
     Sparse,
 }
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Sparse factor of M. Written by: `forward_dynamics`.
+        /// Sparse factor of the inertia matrix M. Written by: `forward_dynamics`.
         pub sparse: Ltdl<S> = Ltdl::new(model),
-        /// Dense factor of M. Written by: `forward_dynamics`.
+        /// Dense factor of the inertia matrix M. Written by: `forward_dynamics`.
         pub dense: Cholesky<S> = Cholesky::new(size.nv),
         /// Zeros that are never overwritten.
         pub zero: Array<S> = filled(S::zero, model.nv()),

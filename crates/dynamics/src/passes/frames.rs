@@ -1,7 +1,9 @@
 //! Queries on bodies and frames whose placements are already computed: pose, velocity, acceleration, Jacobian and rate
 //! of the Jacobian.
 //!
-//! All quantities are stored in the world's frame. The same quantities in a frame r with pose oXr and velocity v_r are
+//! All quantities are stored in the world's frame: the joint columns S with their rates Ṡ, and the velocity v_i and
+//! acceleration a_i of each body i. In a reference frame r with pose oXr and velocity v_r, the Jacobian J, the velocity
+//! v and the acceleration a are
 //!
 //! ```text
 //! J = oXr⁻¹ S     dJ/dt = oXr⁻¹ (Ṡ − v_r × S)     v = oXr⁻¹ v_i     a = oXr⁻¹ a_i
@@ -326,9 +328,9 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
 
     /// Computes the rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. Overwrites dJ.
     ///
-    /// dJ v + J a is the derivative of the six numbers of the frame's velocity. In `Local` and `World`, this derivative
-    /// is the spatial acceleration. In `LocalWorldAligned`, the origin moves with the frame, and the derivative is the
-    /// classical acceleration.
+    /// With the Jacobian J and its rate dJ, dJ v + J a is the derivative of the six numbers of the frame's velocity. In
+    /// `Local` and `World`, this derivative is the spatial acceleration. In `LocalWorldAligned`, the origin moves with
+    /// the frame, and the derivative is the classical acceleration.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};

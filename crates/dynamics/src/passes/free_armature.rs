@@ -84,7 +84,8 @@ fn add_block<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Adds the derivative of the bias with respect to velocities to ∂τ/∂v, an nv × nv matrix stored by columns.
+/// Adds the derivative of the armature's bias a (ω × v) with respect to the velocities to ∂τ/∂v, an nv × nv matrix
+/// stored by columns.
 #[inline(always)]
 pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], dtau_dv: &mut [S]) {
     for &first in model.free_armature() {
@@ -94,8 +95,8 @@ pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], d
     }
 }
 
-/// Adds the matrix a ω× of the bias to the Coriolis matrix C (nv × nv, stored by columns), in the rows and columns of
-/// the linear velocity v.
+/// Adds the matrix a ω× of the armature's bias a (ω × v) to the Coriolis matrix C (nv × nv, stored by columns), in the
+/// rows and columns of the linear velocity v.
 #[inline(always)]
 pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], C: &mut [S]) {
     for &first in model.free_armature() {
@@ -103,8 +104,9 @@ pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]
     }
 }
 
-/// Adds the second derivative ∂²(λᵀ τ)/∂v∂v of the bias τ to an nv × nv matrix stored by columns. With μ = a λ_v, where
-/// λ_v are the linear components of λ, λᵀ τ = μ · (ω × v). So the block ∂²/∂v∂ω is μ×, and the block ∂²/∂ω∂v is −μ×.
+/// Adds the second derivative ∂²(λᵀ τ)/∂v∂v of the armature's bias τ = a (ω × v) to an nv × nv matrix stored by
+/// columns. With μ = a λ_v, where λ_v are the linear components of λ, λᵀ τ = μ · (ω × v). So the block ∂²/∂v∂ω is μ×,
+/// and the block ∂²/∂ω∂v is −μ×.
 #[inline(always)]
 pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda: &[S], dvdv: &mut [S]) {
     let nv = model.nv();

@@ -1,8 +1,9 @@
 //! Gravity compensation: efforts that carry a given fraction of the weight of selected bodies.
 //!
 //! For each compensated body, a force −m g acts at a point c, where m is the carried mass. The joint efforts of these
-//! forces are the gradient of the potential energy of the carried masses. a₀ = −g, and body i is a body on the path to
-//! the root. In the frame of body i:
+//! forces are the gradient of the potential energy of the carried masses. Let a₀ = −g, and let body i be a body on the
+//! path to the root, with parent λ and joint column S_i. F is the force −m g with its moment about the origin of body
+//! i. d and e are joint columns on the path. In the frame of body i:
 //!
 //! ```text
 //! F = [m a₀; m c × a₀]     τ_i = S_iᵀ F     λF = λXi F

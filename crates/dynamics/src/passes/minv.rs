@@ -2,8 +2,8 @@
 //!
 //! 1. For short chains: from M by Gauss–Jordan elimination. Because M is positive definite, the elimination needs no
 //!    pivoting.
-//! 2. If the sparse factor ([`Ltdl`]) has short rows: from M by this factor, in O(n d) operations per column for a tree
-//!    of depth d.
+//! 2. If the sparse factor ([`Ltdl`]) has short rows: from M by this factor, in O(n d) operations per column for n
+//!    coordinates and a tree of depth d.
 //! 3. Otherwise, without M: Carpentier, *Analytical inverse of the joint space inertia matrix* (2018), in O(n) per
 //!    column. This is the articulated-body algorithm for all unit efforts at once. In the inward pass, a joint needs
 //!    only the efforts in its subtree. Because quantities are in the world's frame, all bodies can share one array of
@@ -31,7 +31,7 @@ workspace! {
         pub A: Array<S> = filled(S::zero, (1 + size.depth) * 6 * size.columns),
         /// Inverse M⁻¹ of the inertia matrix. Written by: `minv`.
         pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Sparse factor of M. Written by: `from_matrix`.
+        /// Sparse factor of the inertia matrix M. Written by: `from_matrix`.
         pub factor: Ltdl<S> = Ltdl::new(model),
     }
 }

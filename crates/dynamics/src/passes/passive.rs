@@ -4,21 +4,22 @@
 //! τ_k = −(d + d₁ |v_k| + d₂ v_k²) v_k − f tanh(v_k/ε) − (spring of the joint)_k + (gravity compensation)_k
 //! ```
 //!
-//! d is the model's [`damping`](Model::damping), and f is the model's [`friction`](Model::friction) (a URDF's
-//! `<dynamics damping friction>`). d₁ and d₂ are the model's [`damping_polynomial`](Model::damping_polynomial). Springs
-//! are in `springs.rs`, gravity compensation is in `gravity_compensation.rs`. Other algorithms do not include passive
-//! efforts: callers add them to τ.
+//! v_k is the velocity of coordinate k, and ε is the smoothing speed of friction. d is the model's
+//! [`damping`](Model::damping), and f is the model's [`friction`](Model::friction) (a URDF's `<dynamics damping
+//! friction>`). d₁ and d₂ are the model's [`damping_polynomial`](Model::damping_polynomial). Springs are in
+//! `springs.rs`, gravity compensation is in `gravity_compensation.rs`. Other algorithms do not include passive efforts:
+//! callers add them to τ.
 //!
-//! Coulomb friction jumps from −f to f at v = 0. tanh replaces this jump by a slope of f/ε. The relative error of the
-//! friction is below 1 % for |v| ≥ 2.65 ε and below 1e-6 for |v| ≥ 7.25 ε. A loaded joint creeps instead of sticking: a
-//! load below f moves the joint with a speed of at most ε artanh(load/f). An explicit integrator needs steps shorter
-//! than 2 ε m/f, where m is the inertia at the joint.
+//! Coulomb friction of magnitude f jumps from −f to f at the velocity v = 0. The smoothed friction f tanh(v/ε) replaces
+//! this jump by a slope of f/ε. The relative error of the friction is below 1 % for |v| ≥ 2.65 ε and below 1e-6 for |v|
+//! ≥ 7.25 ε. A loaded joint creeps instead of sticking: a load below f moves the joint with a speed of at most ε
+//! artanh(load/f). An explicit integrator needs steps shorter than 2 ε m/f, where m is the inertia at the joint.
 //!
 //! Damping and friction of a free joint's linear coordinates act along the axes of the joint's parent, as in MuJoCo.
 //! With the rotation R of the joint, the velocity along these axes is u = R v. L(u) is the damping and friction effort
 //! of each component of u. The joint's effort is τ = −Rᵀ L(u). For constant damping with three equal coefficients, the
-//! choice of axes has no effect. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With A =
-//! Rᵀ diag(L′) R,
+//! choice of axes has no effect. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With the
+//! slopes L′ of L, and A = Rᵀ diag(L′) R,
 //!
 //! ```text
 //! ∂τ/∂v = −A     ∂τ/∂δ = τ× + A v×
@@ -35,24 +36,24 @@ use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Sc
 /// Computes the passive efforts of a robot: τ = −d v − f tanh(v/ε) + springs + gravity compensation, with damping d,
 /// friction f and smoothing ε.
 ///
-/// q: nq numbers; v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv
-/// numbers (N m, N), overwritten.
+/// q: nq numbers; v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which the friction f tanh(v/ε) is 76 % of
+/// f (tanh 1 = 0.76); tau: nv numbers (N m, N), overwritten.
 ///
 /// - Damping and friction dissipate power. Damping may be a polynomial, d = d₀ + d₁ |v| + d₂ v²
 ///   ([`Model::damping_polynomial`]). The error of the smoothed friction is below 1 % for |v| ≥ 2.65 ε. A loaded joint
 ///   creeps instead of sticking: a load below f moves the joint with a speed of at most ε artanh(load/f). An explicit
 ///   integrator needs steps shorter than 2 ε m/f, where m is the inertia at the joint.
-/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ of the joint from the rest of the spring. Its
-///   effort is −(k₀ + k₁ Δ + k₂ Δ²) Δ on a joint with one degree of freedom, and −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on other
-///   joints. For a spherical joint, Δ is a rotation vector along the body's axes. A free or planar joint has two
-///   displacements, a translation of the origin and a rotation, each with its own |Δ|. The spring of a mimic joint acts
-///   on the coordinate of the joint's leader.
+/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ of the joint from the rest position of the
+///   spring. With the coefficients k₀, k₁ and k₂ of the spring, its effort is −(k₀ + k₁ Δ + k₂ Δ²) Δ on a joint with
+///   one degree of freedom, and −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on other joints. For a spherical joint, Δ is a rotation
+///   vector along the body's axes. A free or planar joint has two displacements, a translation of the origin and a
+///   rotation, each with its own |Δ|. The spring of a mimic joint acts on the coordinate of the joint's leader.
 /// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a fraction of the weight of
 ///   each body with gravity compensation: τ = −Σ Jᵀ m g. m are the carried masses, and J the Jacobians of the points at
 ///   which these masses are carried.
 ///
-/// The cost is O(n), plus O(depth) for each body with gravity compensation. Allocates nothing. The formulas are the
-/// same as in MuJoCo (`mj_passive`).
+/// For n bodies, the cost is O(n), plus O(depth) for each body with gravity compensation. Allocates nothing. The
+/// formulas are the same as in MuJoCo (`mj_passive`).
 ///
 /// ```
 /// use condyle_dynamics::{Joint, JointOptions, ModelBuilder, Inertia, Se3, Sym3, Vec3, WORLD, passive_torque};
@@ -166,8 +167,8 @@ impl Loss {
     }
 }
 
-/// Returns whether the losses of a free joint's linear coordinates are different along the axes of the parent and of
-/// the body.
+/// Returns whether damping and friction of a free joint's linear coordinates differ between two cases: along the axes
+/// of the joint's parent, and along the axes of the body.
 #[inline(always)]
 fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
     let (d, of) = (model.damping(), first..first + 3);

@@ -17,6 +17,9 @@
 //! f_λ += λX*_i f_i                    add_to_parent_on_stack
 //! ```
 //!
+//! In the right column, λ is the parent of body i, R and p are the rotation and translation of λXi, and h is the body's
+//! first moment (mass times centre of mass).
+//!
 //! The two loops of the book are merged into one. When the pass has visited the last body of a subtree, it adds the
 //! force on the root of the subtree to the force on the root's parent. The test `the_book_gives_the_same` compares this
 //! pass with the equations of the book.
@@ -38,7 +41,7 @@ workspace! {
         /// Pose λXi of each body in the frame of its parent. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.body_depth),
         /// Angular velocity, angular acceleration and acceleration of the origin of each body. The world's acceleration
-        /// is −g, which includes gravity. Written by: `pass`.
+        /// is −g, which accounts for gravity. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.body_depth),
         /// Force that each joint transmits. Written by: `pass`.

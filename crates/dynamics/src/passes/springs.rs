@@ -5,11 +5,11 @@
 //! τ = −g(|Δ|) Δ,   g(r) = k₀ + k₁ r + k₂ r²     ∂τ/∂Δ = −(g 1 + (k₁/r + 2 k₂) Δ Δᵀ)     (others)
 //! ```
 //!
-//! Δ is the displacement of the joint from the rest position q₀ or R₀ of its spring. For joints with one degree of
-//! freedom and for translation joints, Δ = q − q₀. For a continuous joint, this angle is mapped to (−π, π]. For a
-//! spherical joint, Δ is the rotation vector log(R₀ᵀ R), and ∂Δ/∂q is the Jacobian J_log(Δ) of the logarithm. A free or
-//! planar joint has two displacements, each with its own r: the displacement u of the origin, along the axes of the
-//! body, and the displacement Δ of the rotation:
+//! k₀, k₁ and k₂ are the coefficients of a spring. Δ is the displacement of the joint from the rest position q₀ or R₀
+//! of the spring. For joints with one degree of freedom and for translation joints, Δ = q − q₀. For a continuous joint,
+//! this angle is mapped to (−π, π]. For a spherical joint, Δ is the rotation vector log(R₀ᵀ R), and ∂Δ/∂q is the
+//! Jacobian J_log(Δ) of the logarithm. A free or planar joint has two displacements, each with its own r: the
+//! displacement u of the origin, along the axes of the body, and the displacement Δ of the rotation:
 //!
 //! ```text
 //! u = Rᵀ (p − p₀),   ∂u/∂(p, θ) = [1, u×]     Δ = log(R₀ᵀ R)
@@ -29,8 +29,8 @@ use condyle_spatial::{Quaternion, Scalar, Vec3};
 /// a division by r = 0.
 const LEAST: f64 = 1e-30;
 
-/// Returns the stiffness g at a displacement Δ, and the coefficient s = k₁/r + 2 k₂ of the term Δ Δᵀ in the derivative
-/// of the force.
+/// Returns the stiffness g at a displacement Δ of length r, and the coefficient s = k₁/r + 2 k₂ of the term Δ Δᵀ in the
+/// derivative of the force.
 #[inline(always)]
 fn stiffness<S: Scalar>([k0, k1, k2]: [f64; 3], displacement: Vec3<S>) -> (S, S) {
     if k1 == 0.0 && k2 == 0.0 {
@@ -48,7 +48,8 @@ fn pull<S: Scalar>(k: [f64; 3], displacement: Vec3<S>) -> Vec3<S> {
     displacement.scale(-stiffness(k, displacement).0)
 }
 
-/// Returns −(g 1 + s Δ Δᵀ) x, the derivative of the spring's force in the direction x.
+/// Returns −(g 1 + s Δ Δᵀ) x, the derivative of the spring's force in the direction x, with the stiffness g and the
+/// coefficient s from `stiffness`.
 #[inline(always)]
 fn slope<S: Scalar>(k: [f64; 3], displacement: Vec3<S>, x: Vec3<S>) -> Vec3<S> {
     let (g, s) = stiffness(k, displacement);
@@ -78,8 +79,8 @@ fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q
     let (node, own) = (&model.nodes()[i], model.bodies()[i].joint);
     let position = l.position(q, i, 0);
     if turns(node.joint) {
-        // The placement of a mimic joint, not its position, includes the joint's offset. So the offset is subtracted
-        // here.
+        // The position of a continuous mimic joint does not include the joint's offset, because the joint's placement
+        // includes this offset. So the offset is subtracted from the rest position.
         let offset = node.mimic.map_or(0.0, |mimic| mimic.offset);
         let (sin0, cos0) = Scalar::sin_cos(rest - offset);
         return angle([position, l.position(q, i, 1)], [L::S::splat(cos0), L::S::splat(sin0)]);

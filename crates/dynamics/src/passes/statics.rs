@@ -1,10 +1,10 @@
 //! Efforts that hold a robot still against gravity and external forces, and the derivatives of these efforts. Weights
 //! and external forces are summed from the tips to the root.
 //!
-//! Coordinate e turns all bodies that the joint of e carries about S_e. The weights of these bodies keep their
-//! direction, whereas external forces turn with the bodies. With the symbols of `rnea_derivatives`, a robot at rest has
-//! a₀ = −g and Ψ̈ = a₀ × S. Iᶜ is the inertia of all bodies that a joint carries, and F is the sum of I a₀ − f_ext over
-//! these bodies. Then
+//! Coordinate e turns all bodies that the joint of e carries about the joint column S_e. The weights of these bodies
+//! keep their direction, whereas external forces turn with the bodies. With the symbols of `rnea_derivatives`, a robot
+//! at rest has a₀ = −g and Ψ̈ = a₀ × S. Iᶜ is the inertia of all bodies that a joint carries, and F is the sum of I a₀
+//! − f_ext over these bodies. For a joint column d and a column e on the path from d to the root,
 //!
 //! ```text
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)

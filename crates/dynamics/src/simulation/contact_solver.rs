@@ -14,29 +14,32 @@
 //! λ_n ← max(0, λ_n − u_n/g_n)        λ_t ← P(λ_t − u_t/g_t),  P the projection on the disc of radius μ λ_n
 //! ```
 //!
-//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the difference between λ and its image, times g. So
-//! the residual has the unit of a velocity. The solver alternates between two methods:
+//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the difference between λ and its image under this
+//! map, times g_n or g_t. So the residual has the unit of a velocity. The solver alternates between two methods:
 //!
 //! - Newton's method for the fixed-point equation. When the state of each point (sticking, sliding or open) is correct,
 //!   each step squares the error. A burst of several steps is discarded if it does not reduce the residual.
 //! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). The sweeps determine from any initial guess
 //!   which points stick, slide or are open.
 //!
-//! If contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the
-//! diagonal of G in the slope matrix, but not in the equation for u. So each step changes the impulses as little as
-//! possible, and the fixed point is not changed (the proximal point algorithm, Rockafellar 1976). The impulses of the
-//! last time step are the initial guess. This keeps the forces on a robot at rest constant.
+//! If contacts are redundant, the Delassus matrix G is singular and the impulses are not unique. Newton's method then
+//! adds ε to the diagonal of G in the slope matrix, but not in the equation for u. So each step changes the impulses as
+//! little as possible, and the fixed point is not changed (the proximal point algorithm, Rockafellar 1976). The
+//! impulses of the last time step are the initial guess. This keeps the forces on a robot at rest constant.
 
 use alloc::vec::Vec;
 use condyle_spatial::Scalar;
 
-/// Minimum and maximum of ε, as a fraction of the largest diagonal entry of G. The minimum is small compared with the
-/// entries that couple contacts, and large compared with rounding errors.
+/// Minimum and maximum of ε, which Newton's method adds to the diagonal of the Delassus matrix G. Both are fractions of
+/// the largest diagonal entry of G. The minimum is small compared with the entries that couple contacts, and large
+/// compared with rounding errors.
 const PROXIMAL: [f64; 2] = [1e-8, 1.0];
-/// Minimum of g_n and g_t, as a fraction of the largest diagonal entry of G. The minimum is needed if the joints
-/// prevent the motion of a point in a direction: the row of G for this direction is then 0.
+/// Minimum of the factors g_n and g_t of the fixed-point equation, as a fraction of the largest diagonal entry of the
+/// Delassus matrix G. The minimum is needed if the joints prevent the motion of a point in a direction: the row of G
+/// for this direction is then 0.
 const LEAST: f64 = 1e-12;
-/// Factor by which ε grows after discarded steps and shrinks after accepted steps.
+/// Factor by which ε, the regularisation of Newton's method, grows after discarded steps and shrinks after accepted
+/// steps.
 const DAMPING: f64 = 30.0;
 /// Maximum number of steps in a burst of Newton's method. The residual must shrink within these steps. It may grow
 /// during the first two or three steps, which determine the points that stick, slide or are open. With random contacts,
@@ -156,7 +159,7 @@ struct Problem<'a> {
     b: &'a [f64],
     n: usize,
     friction: f64,
-    /// Largest diagonal entry of G, or 1 if G is zero because no point can move.
+    /// Largest diagonal entry of the Delassus matrix G, or 1 if G is zero because no point can move.
     scale: f64,
 }
 
@@ -171,20 +174,20 @@ impl<'a> Problem<'a> {
         self.G[j * self.n + i]
     }
 
-    /// Returns g_t and g_n of the point whose rows begin at r. g_t and g_n are upper bounds of the eigenvalues of the
-    /// point's tangential and normal blocks of G.
+    /// Returns the factors g_t and g_n of the fixed-point equation for the point whose rows begin at r. g_t and g_n are
+    /// upper bounds of the eigenvalues of the point's tangential and normal blocks of the Delassus matrix G.
     fn stiffness(&self, r: usize) -> (f64, f64) {
         let least = LEAST * self.scale;
         ((self.entry(r, r) + self.entry(r + 1, r + 1)).max(least), self.entry(r + 2, r + 2).max(least))
     }
 
-    /// Returns entry i of G x + b, for the impulses x.
+    /// Returns entry i of the velocities G x + b, for the impulses x.
     fn velocity(&self, i: usize, x: &[f64]) -> f64 {
         let row = &self.G[i * self.n..][..self.n]; // G is symmetric
         row.iter().zip(x).fold(self.b[i], |sum, (g, x)| sum + g * x)
     }
 
-    /// Computes u = G x + b, for the impulses x.
+    /// Computes the velocities u = G x + b, for the impulses x.
     fn multiply(&self, x: &[f64], u: &mut [f64]) {
         for (i, u) in u.iter_mut().enumerate() {
             *u = self.velocity(i, x);
@@ -200,7 +203,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the residual of the impulses x (m/s): the largest difference between an impulse and its image in the
-    /// fixed-point equation, times g. The result is NaN if an impulse is NaN.
+    /// fixed-point equation, times g_n or g_t. The result is NaN if an impulse is NaN.
     fn residual(&self, x: &[f64], u: &[f64]) -> f64 {
         (0..self.n).step_by(3).fold(0.0, |largest: f64, r| {
             let (g_t, g_n) = self.stiffness(r);
@@ -244,7 +247,8 @@ impl<'a> Problem<'a> {
         x
     }
 
-    /// Computes a step d of Newton's method for F(λ) = 0, with
+    /// Computes a step d of Newton's method for the contact conditions F(λ) = 0, with the impulses λ and the velocities
+    /// u. For each point, F depends on the point's state:
     ///
     /// - open: F = λ;
     /// - closed: F_n = u_n, whose slope is the row of G, plus ε on the diagonal;

@@ -157,13 +157,13 @@ impl Contacts {
         }
     }
 
-    /// Returns row k of J of point i.
+    /// Returns row k of the Jacobian J of point i.
     fn row(&self, i: usize, k: usize) -> &[f64] {
         let nv = self.correction.len();
         &self.J[(3 * i + k) * nv..][..nv]
     }
 
-    /// Activates point i and computes the point's rows of J M⁻¹.
+    /// Activates point i and computes the point's rows of J M⁻¹, with the Jacobian J of all points.
     fn add(&mut self, i: usize) {
         let (nv, at) = (self.correction.len(), 3 * self.active.len());
         for k in 0..3 {
@@ -212,7 +212,8 @@ impl Contacts {
         self.solver.solve(points, friction, tolerance, max_iterations)
     }
 
-    /// Computes v⁺ = v_next + M⁻¹ Jᵀ λ, and stores the forces λ/h.
+    /// Computes the velocity after the contacts, v⁺ = v_next + M⁻¹ Jᵀ λ, and stores the mean forces λ/h, where h is the
+    /// step length.
     fn record(&mut self, h: f64, v_next: &mut [f64]) {
         let nv = v_next.len();
         self.impulses.fill(0.0);

@@ -11,12 +11,12 @@ workspace! {
     pub(super) struct Workspace<S>(size) {
         /// Efforts, including passive efforts. Written by: `velocity`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// Displacement h v'. Written by: `position`.
+        /// Displacement h v' of a step with length h and velocity v'. Written by: `position`.
         way: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// Computes v' = v + h a, the velocity after a step without contacts.
+/// Computes v' = v + h a, the velocity after a step of length h without contacts.
 #[track_caller]
 pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -32,8 +32,8 @@ pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Computes q' = q ⊕ h (v' + w), the position after the step. w corrects penetration of the ground; it has nv numbers,
-/// or is empty.
+/// Computes q' = q ⊕ h (v' + w), the position after a step of length h. w corrects penetration of the ground; it has nv
+/// numbers, or is empty.
 pub(super) fn position<S: Scalar, R>(
     model: &Model<R>,
     d: &mut Workspace<S>,

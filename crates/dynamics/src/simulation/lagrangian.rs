@@ -3,9 +3,9 @@
 //!
 //! All quantities are in the world's frame. Composite quantities are sums over all bodies that a joint carries: inertia
 //! Iᶜ, momentum hᶜ, and the force Fᶜ that holds the bodies still. Ψ̇ = v_λ × S and Ψ̈ = −g × S, where v_λ is the
-//! velocity of the joint's parent. When coordinate e of joint j changes, the bodies that j carries turn about S_e. The
-//! velocity v_i of each such body i also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see `rnea_derivatives.rs`). The
-//! turn does not change the kinetic energy, so
+//! velocity of the joint's parent. When coordinate e of joint j changes, the bodies that j carries turn about the joint
+//! column S_e. The velocity v_i of each such body i also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see
+//! `rnea_derivatives.rs`). The turn does not change the kinetic energy, so
 //!
 //! ```text
 //! p_e = (M v)_e = S_e · hᶜ,   ∂L/∂q_e = Ψ̇_e · hᶜ − S_e · Fᶜ
@@ -35,9 +35,9 @@ workspace! {
         hC: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Force Fᶜ that holds still all bodies that a joint carries. Written by: `pass`.
         FC: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Motion Ψ̇ of each column. Written by: `pass`.
+        /// Motion Ψ̇ = v_λ × S of each column S, with the velocity v_λ of the joint's parent. Written by: `pass`.
         Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Motion Ψ̈ of each column. Written by: `pass`.
+        /// Motion Ψ̈ = −g × S of each column S, with the gravity g. Written by: `pass`.
         Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Momentum p = M v. Written by: `pass`.
         pub(super) p: Array<S> = filled(S::zero, size.nv),
@@ -45,7 +45,7 @@ workspace! {
         pub(super) L_q: Array<S> = filled(S::zero, size.nv),
         /// Inertia matrix M = ∂p/∂v. Written by: `pass`.
         pub(super) M: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Derivative ∂p/∂q, the transpose of ∂²L/∂q∂v. Written by: `pass`.
+        /// Derivative ∂p/∂q of the momentum p; the transpose of ∂²L/∂q∂v. Written by: `pass`.
         pub(super) p_q: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Second derivatives ∂²L/∂q∂q of the Lagrangian; row i is the derivative of entry i of ∂L/∂q. Written by:
         /// `pass`.

@@ -1,8 +1,8 @@
 //! Dense factorisation A = L U for any scalar type, without row exchanges. Matrices are stored by columns.
 //!
-//! The variational integrator factorises matrices M + O(h), which are close to the positive definite matrix M. The
-//! symmetric parts of these matrices are positive definite, so elimination without row exchanges is stable (Golub and
-//! Van Loan, *Matrix Computations*, section 4.3.2).
+//! The variational integrator factorises matrices M + O(h), with the inertia matrix M and the step length h. M is
+//! positive definite, so the symmetric part of M + O(h) is positive definite, too, if the step is short. Then
+//! elimination without row exchanges is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
 
 use condyle_linalg::axpy::axpy;
 use condyle_spatial::Scalar;

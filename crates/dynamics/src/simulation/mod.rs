@@ -55,10 +55,10 @@ pub use status::Status;
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Integrator {
-    /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation of aba per step. If M is
-    /// constant, the method is symplectic. Otherwise, the Coriolis forces are evaluated at the beginning of the step,
-    /// and bodies that spin fast without damping gain energy. The energy of light links can grow without bound.
-    /// Suitable for damped robots and short horizons.
+    /// Semi-implicit Euler with the step length h: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation of
+    /// aba per step. If M is constant, the method is symplectic. Otherwise, the Coriolis forces are evaluated at the
+    /// beginning of the step, and bodies that spin fast without damping gain energy. The energy of light links can grow
+    /// without bound. Suitable for damped robots and short horizons.
     SemiImplicitEuler,
     /// Classical Runge–Kutta method for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta methods on
     /// Lie groups*, 1998). Order 4, four evaluations of aba per step. The energy drifts by O(h⁴) per second.
@@ -262,9 +262,9 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
 
     /// Computes one step of length `settings.dt` under constant efforts and forces.
     ///
-    /// tau: nv numbers (N m, N); f_ext: one force per body as in [`aba`](crate::aba()), or empty for none. Costs O(n)
-    /// for the explicit integrators. The variational integrator needs about three iterations, each of which costs
-    /// O(n³). Allocates nothing.
+    /// tau: nv numbers (N m, N); f_ext: one force per body as in [`aba`](crate::aba()), or empty for none. For n
+    /// bodies, the explicit integrators cost O(n). The variational integrator needs about three iterations, each of
+    /// which costs O(n³). Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Integrator, Settings, Simulation}};

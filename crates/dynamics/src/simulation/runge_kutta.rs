@@ -21,10 +21,11 @@ workspace! {
     pub(super) struct Workspace<S>(size) {
         /// Efforts, including passive efforts. Written by: `step`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// State (ξ, v) at which a stage is evaluated. Written by: `step`.
+        /// State at which a stage is evaluated: the displacement ξ since the beginning of the step, and the velocity v.
+        /// Written by: `step`.
         xi: Array<S> = filled(S::zero, size.nv),
         v: Array<S> = filled(S::zero, size.nv),
-        /// Rates of ξ and v at a stage. Written by: `step`.
+        /// Rates of the displacement ξ and the velocity v at a stage. Written by: `step`.
         dxi: Array<S> = filled(S::zero, size.nv),
         dv: Array<S> = filled(S::zero, size.nv),
         /// Weighted sums of the rates over all stages. Written by: `step`.

@@ -7,8 +7,8 @@ use core::ops::Range;
 
 /// Maximum size of a block. A free joint has this size.
 const SIX: usize = 6;
-/// Number of terms of a power series in ad_y. The series has full precision if a joint turns by at most 1 rad in a
-/// step, and ten correct digits up to 2.5 rad.
+/// Number of terms of a power series in ad_y, the adjoint matrix of the tangent vector y. The series has full precision
+/// if a joint turns by at most 1 rad in a step, and ten correct digits up to 2.5 rad.
 const TERMS: i32 = 18;
 
 /// Returns each joint that has its own coordinates, with the offset of these coordinates in v.
@@ -61,7 +61,7 @@ pub(super) fn multiply<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: 
     }
 }
 
-/// Replaces A by A J(y). A is a square matrix stored by columns.
+/// Replaces A by A J(y), with the Jacobian `which` of the joints' groups. A is a square matrix stored by columns.
 pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     let nv = model.nv();
     for (own, J) in blocks(model, which, y) {
@@ -77,7 +77,7 @@ pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobia
     }
 }
 
-/// Replaces A by J(y)ᵀ A. A is a vector or a matrix stored by columns.
+/// Replaces A by J(y)ᵀ A, with the Jacobian `which` of the joints' groups. A is a vector or a matrix stored by columns.
 pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     for (own, J) in blocks(model, which, y) {
         for column in A.chunks_exact_mut(model.nv()) {
@@ -114,9 +114,10 @@ fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
 /// Computes f += w ×* (D w) for each joint whose group is not commutative. D is the diagonal matrix of the armature,
 /// and w is the velocity.
 ///
-/// Every algorithm treats armature as D q̈, except along the linear coordinates of free joints (`free_armature.rs`). A
-/// Lagrangian with the term ½ wᵀ D w would turn the momentum D w with the body if the group of the joint is not
-/// commutative. The force w ×* (D w) cancels this effect and does no work.
+/// Every algorithm treats armature as D q̈, with the diagonal matrix D of the armature, except along the linear
+/// coordinates of free joints (`free_armature.rs`). For the velocity w, a Lagrangian with the term ½ wᵀ D w would turn
+/// the momentum D w with the body if the group of the joint is not commutative. The force w ×* (D w) cancels this
+/// effect and does no work.
 pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));

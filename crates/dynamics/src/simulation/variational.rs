@@ -20,10 +20,10 @@
 //!
 //! Passive efforts also depend on q, so ∂τ/∂q is added to ∂²L/∂q∂q.
 //!
-//! The map (q, p) → (q', p') is symplectic. The map for −h is the inverse of the map for h. The momentum of freely
-//! moving bodies is conserved: Ad(y)ᵀ only expresses this momentum in the body's new frame. Source: Marsden and West
-//! (2001), section 2.3, for the midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. The velocity is v =
-//! M(q)⁻¹ p.
+//! The map from the position q and momentum p before a step to q' and p' after the step is symplectic. The map for the
+//! step length −h is the inverse of the map for h. The momentum of freely moving bodies is conserved: Ad(y)ᵀ only
+//! expresses this momentum in the body's new frame. Source: Marsden and West (2001), section 2.3, for the midpoint
+//! rule; Bou-Rabee and Marsden (2009) for momenta on groups. The velocity is v = M(q)⁻¹ p.
 
 use super::{Input, Settings, Status, lagrangian, lu, tangent};
 use crate::calls::inertia::crba;
@@ -45,7 +45,7 @@ workspace! {
         p: Array<S> = filled(S::zero, size.nv),
         /// Velocity w during the step.
         w: Array<S> = filled(S::zero, size.nv),
-        /// Displacements −h w, h w/2 and −h w/2. Written by: `set_ways`.
+        /// Displacements −h w, h w/2 and −h w/2 for the step length h and the velocity w. Written by: `set_ways`.
         minus_y: Array<S> = filled(S::zero, size.nv),
         x: Array<S> = filled(S::zero, size.nv),
         minus_x: Array<S> = filled(S::zero, size.nv),
@@ -55,12 +55,15 @@ workspace! {
         passive: Array<S> = filled(S::zero, size.nv),
         passive_q: Array<S> = filled(S::zero, size.nv * size.nv),
         passive_v: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Products J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
+        /// Products J(−y)ᵀ p and J(−y/2)ᵀ f of the group Jacobian J with the momentum p and the force f. Written by:
+        /// `evaluate`.
         carried: Array<S> = filled(S::zero, size.nv),
         pushed: Array<S> = filled(S::zero, size.nv),
-        /// Residual of the equation for w, which the step of Newton's method overwrites.
+        /// Residual of the equation for w, the velocity during the step. The step of Newton's method overwrites this
+        /// residual.
         residual: Array<S> = filled(S::zero, size.nv),
-        /// Derivative of the equation for w, which the factor of this matrix overwrites. Written by: `slope`.
+        /// Derivative of the equation for w, the velocity during the step. The factor of this matrix overwrites it.
+        /// Written by: `slope`.
         slope: Array<S> = filled(S::zero, size.nv * size.nv),
         /// Momentum ∂L/∂v and slope ∂L/∂q of the Lagrangian L at the midpoint, with derivatives. Written by:
         /// `evaluate`.
@@ -81,7 +84,7 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// Computes f at the midpoint, and the terms of the equation for w.
+/// Computes the force f = ∂L/∂q + τ at the midpoint, and the terms of the equation for w, the velocity during the step.
 fn evaluate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -113,7 +116,8 @@ fn evaluate<S: Scalar, R: Constant<S>>(
     tangent::multiply_left_transposed(model, Exp, &d.minus_x, &mut d.pushed); // J(−y/2)ᵀ f
 }
 
-/// Computes the derivative of the equation for w. Overwrites derivatives in `d` that `evaluate` has computed.
+/// Computes the derivative of the equation for w, the velocity during the step. Overwrites derivatives in `d` that
+/// `evaluate` has computed.
 fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S) {
     let nv = model.nv();
     let half = h * S::splat(0.5);

@@ -8,8 +8,8 @@ use condyle_dynamics::{
 use rand::RngExt;
 use rand::rngs::StdRng;
 
-/// Maximum condition number of Λ. With a larger condition number, rounding errors are too large for a test of the
-/// algorithm.
+/// Maximum condition number of the constraint inertia Λ = (J M⁻¹ Jᵀ)⁻¹. With a larger condition number, rounding errors
+/// are too large for a test of the algorithm.
 const WORST_CONDITION: f64 = 1e4;
 
 const KINDS: [ConstraintKind; 4] =

@@ -69,8 +69,8 @@ pub(crate) struct Part {
     pub(crate) placement: Se3<f64>,
     pub(crate) inertia: Inertia<f64>,
     pub(crate) armature: f64,
-    /// Index of the part with the leading joint, and the relation to its position. It is `None` if the joint follows no
-    /// other joint.
+    /// Index of the part whose joint this joint follows, and the relation between the two positions. `None` if the
+    /// joint follows no other joint.
     pub(crate) mimic: Option<(usize, Mimic)>,
     /// Placement of a frame on the body.
     pub(crate) frame: Se3<f64>,
@@ -248,8 +248,8 @@ pub(crate) fn fixed() -> Model {
     builder.build().expect("a robot need not move")
 }
 
-/// Returns the embedded robots, a copy of an embedded robot with an apparent mass of the base, and random trees with
-/// and without mimic joints.
+/// Returns the embedded robots, a copy of the quadruped with armature in all coordinates, and random trees with and
+/// without mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();
     models.push(robots::quadruped().with_armature(&[0.7; 18]).expect("three equal numbers"));

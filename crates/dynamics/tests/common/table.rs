@@ -113,8 +113,8 @@ impl<S: Scalar> Output<S> {
     }
 }
 
-/// Returns a contact and a loop constraint, with one iteration more than needed. The set is empty if the robot cannot
-/// move, or if its bodies have no frames for these constraints.
+/// Returns a contact and a loop constraint, with two proximal iterations, one more than needed. The set is empty if the
+/// robot cannot move, or if its bodies have no frames for these constraints.
 fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let last = model.bodies().len() - 1;
     let frame = |body: usize| model.frames().iter().position(|f| f.body == body).filter(|_| last > 0);

@@ -110,7 +110,7 @@ fn velocities_and_their_rates() {
     }
 }
 
-/// Checks that dJ is the derivative of J along v, column by column.
+/// Checks that the rate dJ of a Jacobian J is the derivative of J along the velocity v, column by column.
 #[test]
 fn jacobian_rates() {
     let mut worst = Worst::new("dJ = d/dt J", ROUNDING);

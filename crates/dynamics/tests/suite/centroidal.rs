@@ -27,7 +27,8 @@ fn moving(model: &Model, q: &[f64], v: &[f64]) -> Vec<Dual64> {
     moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v))
 }
 
-/// Checks that ċ = Jcom v and c̈ equal time derivatives by dual numbers, and that the linear momentum is m ċ.
+/// Checks that the velocity ċ = Jcom v and the acceleration c̈ of the centre of mass equal time derivatives by dual
+/// numbers. The linear momentum must be m ċ, with the total mass m.
 #[test]
 fn centre_of_mass() {
     let mut place = Worst::new("c = Σ m_i c_i / m", ROUNDING);
@@ -55,8 +56,8 @@ fn centre_of_mass() {
     }
 }
 
-/// Checks the centroidal momentum hg = Ag v and its rate dhg = Ag a + dAg v, where dAg is the rate of Ag. Ig must be
-/// the inertia of all bodies as one rigid body.
+/// Checks the centroidal momentum hg = Ag v and its rate dhg = Ag a + dAg v, where dAg is the rate of the matrix Ag.
+/// The centroidal inertia Ig must be the inertia of all bodies as one rigid body.
 #[test]
 fn momentum() {
     let mut momentum = Worst::new("Ag v = hg", ROUNDING);

@@ -77,8 +77,10 @@ fn two_links() {
     }
 }
 
-/// Checks a planar arm with three links, in absolute angles θ_i = q_1 + … + q_i: T = ½ Σ A_ij cos(θ_i − θ_j) θ̇_i θ̇_j
-/// with A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj. A torque that turns link i also acts on all links before it.
+/// Checks a planar arm with three links against the kinetic energy T = ½ Σ A_ij cos(θ_i − θ_j) θ̇_i θ̇_j, with the
+/// absolute angles θ_i = q_1 + … + q_i. A_ij is I_i δ_ij + Σ_k m_k r_ki r_kj, with the inertia I_i and the mass m_i of
+/// link i. r_ki is the length of link i if link k is after link i. r_ii is the distance from the joint to the centre of
+/// mass of link i, and all other r_ki are 0. A torque that turns link i also acts on all links before it.
 #[test]
 fn three_links() {
     let arm = |k: usize, i: usize| match k.cmp(&i) {
@@ -121,7 +123,8 @@ fn three_links() {
     }
 }
 
-/// Checks a rod that hangs at θ = 0 on a horizontal hinge: (I + m c² + rotor) θ̈ = τ − m g c sin θ.
+/// Checks a rod that hangs at θ = 0 on a horizontal hinge: (I + m c² + rotor) θ̈ = τ − m g c sin θ. m is the mass of
+/// the rod, I the inertia about its centre of mass, and c the distance from the hinge to the centre of mass.
 #[test]
 fn pendulum() {
     let (m, c, I, rotor) = (1.7, 0.6, 0.09, 0.05);
@@ -144,11 +147,11 @@ fn pendulum() {
 }
 
 /// Checks the period of a pendulum released at 2 rad: 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)). K is the complete
-/// elliptic integral, and agm is the arithmetic-geometric mean.
+/// elliptic integral, agm is the arithmetic-geometric mean, and ω₀ is the angular frequency of small oscillations.
 #[test]
 fn period_of_a_pendulum() {
-    /// Number of steps. The error of the Runge–Kutta method is (0.001)⁴ times a fifth derivative, from which the
-    /// tolerance follows.
+    /// Number of steps. The error of the Runge–Kutta method is about (0.001)⁴ times a fifth derivative, with steps of
+    /// about 0.001 s. The tolerance follows from this error.
     const STEPS: u32 = 2000;
     const INTEGRATION: f64 = 1e-10;
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -1.0), Sym3::zero());
@@ -175,7 +178,8 @@ fn period_of_a_pendulum() {
 }
 
 /// Checks a cart on rails that carries a pole, which is upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l
-/// θ̈ + ẍ cos θ = g sin θ.
+/// θ̈ + ẍ cos θ = g sin θ. M and x are the mass and position of the cart, F is the force on it, m is the mass of the
+/// pole, and l the distance from the hinge to this mass.
 #[test]
 fn cart_and_pole() {
     let (M, m, l) = (1.5, 0.4, 0.8);
@@ -195,8 +199,8 @@ fn cart_and_pole() {
     }
 }
 
-/// Checks Euler's equations of a free body, J ω̇ = n − ω × J ω. The centre of mass must fall freely, however the body
-/// rotates.
+/// Checks Euler's equations of a free body, J ω̇ = n − ω × J ω, with the inertia J about the centre of mass and the
+/// torque n. The centre of mass must fall freely, however the body rotates.
 #[test]
 fn free_body() {
     let rng = &mut rng(3);
@@ -228,7 +232,8 @@ fn free_body() {
     }
 }
 
-/// Checks a top that stands on its tip: Ī ω̇ = c × m g − ω × Ī ω, with the inertia Ī about the tip.
+/// Checks a top that stands on its tip: Ī ω̇ = c × m g − ω × Ī ω, with the inertia Ī about the tip, the centre of mass
+/// c and the weight m g.
 #[test]
 fn top() {
     let rng = &mut rng(4);
@@ -251,7 +256,8 @@ fn top() {
     }
 }
 
-/// Checks a puck on ice, m (v̇ + ω × v) = f in body coordinates, and a point mass in the air, m ẍ = f + m g.
+/// Checks a puck on ice, m (v̇ + ω × v) = f in body coordinates, and a point mass in the air, m ẍ = f + m g. m is the
+/// mass, and f is the applied force.
 #[test]
 fn puck_and_point() {
     let rng = &mut rng(5);
@@ -274,7 +280,8 @@ fn puck_and_point() {
 }
 
 /// Checks a motor that drives a wheel, a second wheel with the gear ratio −3, and a rack on the first wheel: (J₁ + 9 J₂
-/// + r² m) θ̈ = τ.
+/// + r² m) θ̈ = τ. J₁ and J₂ are the inertias of the wheels, m is the mass of the rack, and r the radius of the first
+/// wheel.
 #[test]
 fn gears() {
     let (J1, J2, m, r) = (0.2, 0.05, 1.5, 0.1);

@@ -95,7 +95,7 @@ fn work_of_crba_is_the_sum_of_depths() {
         .flat_map(|&(_, parent)| [GROUP, 2 * GROUP, 4 * GROUP].map(|n| hinges(n, parent)))
         .map(|model| (model.nv() as f64, sum_of_depths(&model) as f64, work(&model)[1].flops() as f64))
         .collect();
-    // Compute c from a chain and a star of 4 groups, and a and b from two stars.
+    // For a + b n + c Σ depth, compute c from a chain and a star of 4 groups, and a and b from two stars.
     let [chain, star, short] = [seen[2], seen[8], seen[6]];
     let c = (chain.2 - star.2) / (chain.1 - star.1);
     let b = (star.2 - short.2 - c * (star.1 - short.1)) / (star.0 - short.0);

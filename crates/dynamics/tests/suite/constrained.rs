@@ -15,7 +15,8 @@ use num_dual::Dual64;
 
 /// Tolerance between two exact methods with some thousand rounding errors each.
 const EXACT: f64 = 1e-11;
-/// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
+/// Tolerance after a product with the inertia matrix M, with M⁻¹, or with the constraint inertia Λ = (J M⁻¹ Jᵀ)⁻¹. The
+/// condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
 const TREES: u64 = 15;
 

@@ -16,7 +16,8 @@ use num_dual::Dual64;
 
 /// Tolerance between two exact methods with some thousand rounding errors each.
 const EXACT: f64 = 1e-11;
-/// Tolerance after a product with M, M⁻¹ or Λ. The condition numbers of M and Λ are up to 1e4.
+/// Tolerance after a product with the inertia matrix M, with M⁻¹, or with the constraint inertia Λ = (J M⁻¹ Jᵀ)⁻¹. The
+/// condition numbers of M and Λ are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
 /// Tolerance of central differences. The error of a difference is a rounding error of 1e-16 / step, plus step² times a
 /// third derivative.
@@ -24,7 +25,8 @@ const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
 
-/// Algorithm that computes q̈ and λ, or v⁺ and Λ, as a function of q, v and τ.
+/// Algorithm whose results are functions of q, v and τ: the acceleration q̈ and forces λ of constrained dynamics, or
+/// the velocity v⁺ and impulses Λ of an impact.
 trait Algorithm {
     fn run<S: Scalar>(
         model: &Model,
@@ -170,8 +172,8 @@ fn derivatives_of_constrained_dynamics() {
     }
 }
 
-/// Checks the returned M, J, r and c: the derivatives by dual numbers must satisfy M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c
-/// = 0.
+/// Checks the matrices M, J, r and c of the linearised equations: the derivatives by dual numbers must satisfy M δq̈ −
+/// Jᵀ δλ + r = δτ and J δq̈ + c = 0.
 #[test]
 fn equations_of_constrained_dynamics() {
     let names = ["r, c for q", "r, c for v", "for τ"];

@@ -20,7 +20,7 @@ fn inertia_rate(model: &Model, q: &[f64], v: &[f64]) -> DMatrix<f64> {
     DMatrix::from_column_slice(model.nv(), model.nv(), &rate)
 }
 
-/// Checks that C v + g = h, and that Ṁ = C + Cᵀ. The matrix Ṁ − 2C is then skew-symmetric.
+/// Checks the Coriolis matrix C: C v + g = h, and Ṁ = C + Cᵀ. The matrix Ṁ − 2C is then skew-symmetric.
 #[test]
 fn forces_and_skewness() {
     let mut forces = Worst::new("C v + g = h", ROUNDING);

@@ -21,7 +21,7 @@ fn inertia_matrix(model: &Model, seed: u64) -> DMatrix<f64> {
     crba(model, &mut Data::new(model), &q).clone_owned()
 }
 
-/// Returns L and D, with rows and columns in the order that the factor uses.
+/// Returns the factors L and D of M = Lᵀ D L, with rows and columns in the order that the factor uses.
 fn unpack(factor: &Ltdl<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let D = nalgebra::DVector::from_iterator(factor.order().len(), factor.diagonal());
     let mut L = DMatrix::identity(D.len(), D.len());

@@ -12,7 +12,7 @@ use condyle_dynamics::{
 const G: f64 = 9.81;
 /// Time step of all tests (s).
 const H: f64 = 1e-3;
-/// Half of the box's length, width and height (m). The next constant is the mass of the box (kg).
+/// Half of the box's length, width and height (m). The constant `MASS` is the mass of the box (kg).
 const HALF: [f64; 3] = [0.15, 0.1, 0.05];
 const MASS: f64 = 2.0;
 /// Tolerance for rounding errors and for the errors of the contact solver (1e-9 m/s) over some thousand steps.
@@ -56,8 +56,8 @@ fn energy(model: &Model, simulation: &Simulation<f64>) -> f64 {
 
 fn passive(_: &mut Control<'_, f64>) {}
 
-/// Checks a sliding box along different directions. The box must decelerate with exactly μ g. It must stop after a
-/// distance of v²/(2 μ g), minus half the distance of the first step.
+/// Checks a sliding box with the friction μ and the initial speed v, along different directions. The box must
+/// decelerate with exactly μ g. It must stop after a distance of v²/(2 μ g), minus half the distance of the first step.
 #[test]
 fn a_box_slides_to_a_stop() {
     let model = free_box();
@@ -120,8 +120,8 @@ fn standing_is_still() {
     }
 }
 
-/// Checks a box on a slope α. Below the friction angle the box sticks. On a steeper slope it slides with the
-/// acceleration g (sin α − μ cos α).
+/// Checks a box on a slope of angle α, with the friction μ. Below the friction angle the box sticks. On a steeper slope
+/// it slides with the acceleration g (sin α − μ cos α).
 #[test]
 fn sticks_or_slides_on_a_slope() {
     let model = free_box();
@@ -148,8 +148,8 @@ fn sticks_or_slides_on_a_slope() {
     }
 }
 
-/// Checks a point that falls for √(2 H/g). It must land without penetration, stay, and lift off when pulled up by more
-/// than its weight.
+/// Checks a point that falls from a height H, for a time of √(2 H/g). It must land without penetration, stay, and lift
+/// off when pulled up by more than its weight.
 #[test]
 fn falls_lands_and_lifts_off() {
     let model = free("ball", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01)));
@@ -241,7 +241,8 @@ fn restitution_rebounds() {
 #[test]
 fn energy_never_grows() {
     // Without contacts, the rotational energy of a cube is constant. The energy of the linear velocity has a relative
-    // error of h² ω², because this velocity is expressed in the axes of the turning cube.
+    // error of h² ω² (step length h, angular velocity ω), because this velocity is expressed in the axes of the turning
+    // cube.
     let model = free("cube", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.02)));
     let cube: Vec<_> =
         corners().into_iter().map(|c| Vec3::from([c.x / HALF[0], c.y / HALF[1], c.z / HALF[2]]) * 0.1).collect();

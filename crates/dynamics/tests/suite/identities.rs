@@ -112,8 +112,8 @@ fn inertia_matrix_is_positive() {
     }
 }
 
-/// Checks that a robot with mimic joints equals the same robot without mimics under the constraint v_joint = G v: τ =
-/// Gᵀ τ_joint and M = Gᵀ M_joint G.
+/// Checks that a robot with mimic joints equals the same robot without mimics under the constraint v_joint = G v, with
+/// the matrix G of the ratios: τ = Gᵀ τ_joint and M = Gᵀ M_joint G.
 #[test]
 fn mimics_are_a_projection() {
     let mut efforts = Worst::new("τ = Gᵀ rnea(G q + o, G v, G a)", ROUNDING);

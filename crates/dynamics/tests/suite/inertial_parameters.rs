@@ -26,7 +26,7 @@ fn ten_numbers_there_and_back() {
     }
 }
 
-/// Checks that the pseudo-inertia J of mass points is Σ m (x, 1)(x, 1)ᵀ.
+/// Checks that the pseudo-inertia J of points with masses m at positions x is Σ m (x, 1)(x, 1)ᵀ.
 #[test]
 fn pseudo_inertia_is_the_second_moment() {
     for seed in 0..CASES {

@@ -62,8 +62,9 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     [eps(&effort), eps(aba(&seeded, &mut data, &q, &v, &tau, &f_ext))]
 }
 
-/// Computes the efforts of coordinate k for one unit of damping or friction. The function `law` gives the loss at a
-/// component of the velocity. The linear losses of a free joint act along the axes of its parent.
+/// Computes the efforts of all coordinates if only coordinate k has damping or friction, with a coefficient of 1. `law`
+/// maps a component of the velocity to the effort along this component. For the linear coordinates of a free joint, the
+/// components are along the axes of the joint's parent.
 fn lost(model: &Model, s: &State, k: usize, law: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut loss = vec![0.0; model.nv()];
     let is_linear = |body: &&Body| body.joint == Joint::FreeFlyer && (body.idx_v..body.idx_v + 3).contains(&k);

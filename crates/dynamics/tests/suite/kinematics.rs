@@ -80,7 +80,8 @@ fn external_forces() {
     }
 }
 
-/// Checks that q ⊕ (q₁ ⊖ q) = q₁, that (q ⊕ v) ⊖ q = v for rotations of less than π, and that q ⊕ 0 = q.
+/// Checks for positions q and q₁ and a tangent vector v that q ⊕ (q₁ ⊖ q) = q₁, that (q ⊕ v) ⊖ q = v for rotations of
+/// less than π, and that q ⊕ 0 = q.
 #[test]
 fn integrate_and_difference() {
     let mut there = Worst::new("q ⊕ (q₁ ⊖ q) = q₁", ROUNDING);

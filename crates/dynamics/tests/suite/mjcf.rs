@@ -73,8 +73,8 @@ fn against_mujoco(name: &str) {
                 close(name, &flat(&placements.frame(i)), &theirs);
             }
         }
-        // MuJoCo's velocity is v = T v_mujoco with T = Rᵀ for the free joint's linear part. So a = T a_mujoco + Ṫ
-        // v_mujoco and τ_mujoco = Tᵀ τ.
+        // MuJoCo's velocity v_mujoco corresponds to v = T v_mujoco here, with T = Rᵀ for the free joint's linear part.
+        // So a = T a_mujoco + Ṫ v_mujoco and τ_mujoco = Tᵀ τ.
         let R = placements.body(1).rotation;
         let mut a = vec![0.0; model.nv()];
         let linear = |x: &[f64]| Vec3::new(x[0], x[1], x[2]);

@@ -15,8 +15,8 @@ fn flat(v: Vec3<f64>) -> [f64; 3] {
     v.to_array()
 }
 
-/// Checks that a point has the linear rows of the Jacobian and of the velocity of a frame at this point. The test uses
-/// every body of all kinds of robots.
+/// Checks the Jacobian and the velocity of a point. They must equal the linear rows of the Jacobian, and the linear
+/// velocity, of a frame at this point. The test uses every body of each robot.
 #[test]
 fn points_are_frames_put_there() {
     for (seed, model) in all_models(4).iter().enumerate() {

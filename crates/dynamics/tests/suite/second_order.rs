@@ -112,7 +112,8 @@ fn tensors() {
     }
 }
 
-/// Checks the expansion ψ(x + h) = ψ + ∇ψ h + ½ hᵀ∇²ψ h + O(h³): its error must fall with the cube of the step.
+/// Checks the Taylor expansion of ψ = λᵀ aba for a step h, ψ(x + h) = ψ + ∇ψ h + ½ hᵀ∇²ψ h + O(h³): the error must fall
+/// with the cube of the step.
 #[test]
 fn expansion() {
     const STEPS: [f64; 2] = [2e-3, 1e-3];

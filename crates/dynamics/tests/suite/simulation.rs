@@ -75,8 +75,9 @@ fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     assert!((observed - order).abs() < ORDER, "{what}: {observed}");
 }
 
-/// Checks the order of each integrator on a free symmetric body. The motion of this body has a closed form: with L = I
-/// ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
+/// Checks the order of each integrator on a free symmetric body. The motion of this body has a closed form: with the
+/// angular momentum L = I ω and the principal moments A, A and C, the attitude at time t is exp(t L/A) exp(t ω₃(1 −
+/// C/A) e₃).
 #[test]
 fn order_on_a_free_body() {
     let model = top();
@@ -137,8 +138,9 @@ fn order_on_trees() {
     }
 }
 
-/// Checks the period of a pendulum with a large angle θ₀, which is 4 K(sin(θ₀/2)) √(I/(m g l)). The
-/// arithmetic-geometric mean gives the elliptic integral K.
+/// Checks the period of a pendulum with a large angle θ₀, which is 4 K(sin(θ₀/2)) √(I/(m g l)). m is the mass, l its
+/// distance from the hinge, and I the inertia about the hinge. The arithmetic-geometric mean gives the elliptic
+/// integral K.
 #[test]
 fn period_of_a_pendulum() {
     let mut builder = ModelBuilder::new("pendulum");

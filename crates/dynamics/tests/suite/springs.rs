@@ -182,8 +182,8 @@ fn like_mujoco() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// Checks that M, bias and passive efforts equal MuJoCo's results, for a robot from a builder and for the robot read
-/// from the file.
+/// Checks that the inertia matrix M, the bias efforts and the passive efforts equal MuJoCo's results, for a robot from
+/// a builder and for the robot read from the file.
 #[test]
 fn the_numbers_of_mujoco() {
     let text = include_str!("../data/passive_mujoco.json");
@@ -208,8 +208,9 @@ fn the_numbers_of_mujoco() {
     }
 }
 
-/// Computes the energy of all springs. Each spring has the energy −∫ τ dr = k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4. For a joint
-/// with one degree of freedom, r is the displacement. For other joints, r is the length of the displacement vector.
+/// Computes the energy of all springs. A spring with the effort τ and the coefficients k₀, k₁ and k₂ has the energy −∫
+/// τ dr = k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4. For a joint with one degree of freedom, r is the displacement. For other joints,
+/// r is the length of the displacement vector.
 fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     let mut energy = 0.0;
     for spring in model.springs() {

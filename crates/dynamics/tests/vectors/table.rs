@@ -251,8 +251,8 @@ fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
         .chain((last > 0).then_some(Inertia(last)))
 }
 
-/// Returns a contact and a loop constraint, with one iteration more than needed. The list is empty for a robot that
-/// cannot move.
+/// Returns a contact and a loop constraint, with two proximal iterations, one more than needed. The list is empty for a
+/// robot that cannot move.
 pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, ProximalSettings) {
     let (bodies, proximal) = (model.bodies().len(), ProximalSettings { mu: 1e-6, iterations: 2 });
     if bodies == 1 {

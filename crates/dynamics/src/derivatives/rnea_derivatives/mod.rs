@@ -2,7 +2,8 @@
 //!
 //! Source: Singh, Russell, Wensing, *Efficient analytical derivatives of rigid-body dynamics using spatial vector
 //! algebra* (2022), in the world's frame. When coordinate e of joint j changes, the bodies that joint j carries turn
-//! rigidly about S_e. The velocities and accelerations of these bodies also change because the parent of joint j moves:
+//! rigidly about the joint column S_e. The velocities and accelerations of these bodies also change because the parent
+//! of joint j moves:
 //!
 //! ```text
 //! Ψ̇_e = v_λ × S_e,   Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e          (λ: the parent of joint j)
@@ -39,7 +40,7 @@ workspace! {
     pub(crate) struct Bodies<S>(size) {
         /// Velocity of each body. Written by: `pass`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration of each body; the world's acceleration is −g, which includes gravity. Written by: `pass`.
+        /// Acceleration of each body; the world's acceleration is −g, which accounts for gravity. Written by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Composite inertia Iᶜ of each joint. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -47,13 +48,14 @@ workspace! {
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
         /// Force F that each joint transmits. Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Motion Ψ̇ of each column. Written by: `pass`.
+        /// Motion Ψ̇ = v_λ × S of each column S, with the velocity v_λ of the joint's parent. Written by: `pass`.
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Motion Ψ̈ of each column. Written by: `pass`.
+        /// Motion Ψ̈ = a_λ × S + v_λ × Ψ̇ of each column S, with the velocity v_λ and acceleration a_λ of the joint's
+        /// parent. Written by: `pass`.
         pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Sum Ψ̇ + Ṡ of each column. Written by: `pass`.
+        /// Sum Ψ̇ + Ṡ of each column S, with the rate Ṡ of the column. Written by: `pass`.
         pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Values of each column d that `vectorized` needs for all pairs (d, e). Written by: `pass`.
+        /// Values of each column d that `vectorized` needs for all pairs of columns (d, e). Written by: `pass`.
         pub rows: Rows<S> = Rows::new(size.columns),
     }
 }

@@ -42,7 +42,8 @@ fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
 }
 
 impl ConstraintLanes {
-    /// Computes J, J M⁻¹ Jᵀ, and the value of J q̈ + γ for λ = 0.
+    /// Computes the constraint Jacobian J, the Delassus matrix J M⁻¹ Jᵀ, and the constraint accelerations J q̈ + γ
+    /// without constraint forces (λ = 0).
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &mut self,
@@ -86,7 +87,7 @@ impl ConstraintLanes {
         }
     }
 
-    /// Replaces u by u + Yᵀ λ, for the columns of all joints.
+    /// Adds Yᵀ λ, the efforts of the constraint forces λ, to the efforts u of all joint columns.
     #[inline(always)]
     pub(crate) fn push(&self, plan: &Plan, constraints: &[ConstraintPlan], u: &mut [f64]) {
         let All { root, nv, stride, Y, x: lambda, .. } = &self.all;

@@ -124,8 +124,9 @@ fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [
     sum
 }
 
-/// Computes and returns Y and Y D⁻¹ of one joint column for the forces f. Replaces f by f − U D⁻¹ Y, the force that the
-/// column transmits. Adds Y D⁻¹ u to x, the partial sum of J q̈ + γ.
+/// Computes and returns Y = Sᵀ f and Y D⁻¹ of one joint column S, for the forces f on the body of its joint. Replaces f
+/// by f − U D⁻¹ Y, the force that the column transmits. Adds Y D⁻¹ u to x, the partial sum of the constraint
+/// accelerations J q̈ + γ. U, D and u are quantities of the articulated-body algorithm.
 #[inline(always)]
 fn take<V: Block<Number = f64>, const N: usize>(
     left: Left<'_>,
@@ -150,7 +151,8 @@ fn take<V: Block<Number = f64>, const N: usize>(
     [Y, YD]
 }
 
-/// Adds the term f_iᵀ c_i of body i to x, the partial sum of J q̈ + γ.
+/// Adds the term f_iᵀ c_i of body i to x, the partial sum of the constraint accelerations J q̈ + γ. f_i is the force
+/// that the body's joint transmits, and c_i is the body's velocity-dependent acceleration.
 #[inline(always)]
 fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64], x: &mut [V; N]) {
     let by_c = dot(f, c);
@@ -159,7 +161,8 @@ fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64],
     }
 }
 
-/// Adds the term f₀ᵀ a₀ of the world to x, the partial sum of J q̈ + γ.
+/// Adds the term f₀ᵀ a₀ of the world to x, the partial sum of the constraint accelerations J q̈ + γ. f₀ is the force on
+/// the world, and a₀ is the acceleration of the world.
 #[inline(always)]
 fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 3], x: &mut [V; N]) {
     for r in 0..3 {
@@ -170,7 +173,8 @@ fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 
 }
 
 impl Rows {
-    /// Computes the unit forces of a constraint's rows, and γ' (γ without the terms of the bodies' accelerations).
+    /// Computes the unit forces of a constraint's rows, and γ': the constraint accelerations γ without the terms of the
+    /// bodies' accelerations.
     #[inline(always)]
     pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<FusedF64>, gamma: [FusedF64; 6]) {
         let rigid = plan.kind == ConstraintKind::Rigid;
@@ -246,9 +250,9 @@ impl Rows {
         write(x, &mut all.x[plan.row..]);
     }
 
-    /// Adds the products Y D⁻¹ Yᵀ of shared slots to a block of J M⁻¹ Jᵀ. The rows of the block are the rows of this
-    /// constraint. Its three columns start at row r of the other constraint. `runs` are the slots that both constraints
-    /// share, without the root's slots.
+    /// Adds the products Y D⁻¹ Yᵀ of shared slots to a block of the Delassus matrix J M⁻¹ Jᵀ. The rows of the block
+    /// belong to the rows of this constraint. The three columns of the block belong to three rows of the other
+    /// constraint, beginning with row r. `runs` are the slots that both constraints share, without the root's slots.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(
         &self,
@@ -278,7 +282,7 @@ impl Rows {
         }
     }
 
-    /// Returns J q̈ + γ of this constraint for the given accelerations of its two bodies.
+    /// Returns the acceleration J q̈ + γ of this constraint for the given accelerations of its two bodies.
     #[inline(always)]
     pub(crate) fn error(&self, [one, other]: [&[f64]; 2]) -> [f64; WIDE] {
         let mut error = [0.0; WIDE];
@@ -340,7 +344,8 @@ impl All {
         }
     }
 
-    /// Sets J M⁻¹ Jᵀ to the sum of Y D⁻¹ Yᵀ over the columns of the root's joint. `rows` must be a multiple of three.
+    /// Sets the Delassus matrix J M⁻¹ Jᵀ to the sum of Y D⁻¹ Yᵀ over the columns of the root's joint. `rows` must be a
+    /// multiple of three.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(&self, rows: usize, G: &mut [f64], stride: usize) {
         for first in (0..self.stride - WIDE).step_by(WIDE) {

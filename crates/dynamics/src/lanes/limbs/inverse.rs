@@ -1,17 +1,17 @@
 //! Inverse M⁻¹ of a robot with limbs, computed without M.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. U = Iᴬ S and D = Sᵀ U are quantities of
-//! the articulated-body algorithm. Column e gets a unit acceleration, and no effort acts at the other columns. The
-//! bodies that the joint of e carries then move by motions T, which start with T = S_e. Column d moves by Z_de = −D_d⁻¹
-//! U_dᵀ T, and the next body moves by T + S_d Z_de. The matrix Z of these numbers is the inverse of L in M = Lᵀ D L.
-//! The diagonal of Z is 1, and Z has the zeros of the tree. So
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. U = Iᴬ S and D = Sᵀ U + armature are
+//! quantities of the articulated-body algorithm. Column e gets a unit acceleration, and no effort acts at the other
+//! columns. The bodies that the joint of e carries then move by motions T, which start with T = S_e. Column d moves by
+//! Z_de = −D_d⁻¹ U_dᵀ T, and the next body moves by T + S_d Z_de. The matrix Z of these numbers is the inverse of L in
+//! M = Lᵀ D L. The diagonal of Z is 1, and Z has the zeros of the tree. With Z = L⁻¹, the inverse is the product
 //!
 //! ```text
 //! M⁻¹ = Z D⁻¹ Zᵀ
 //! ```
 //!
-//! needs one product for each pair of columns and each column e that carries both columns. These products are
-//! independent of each other.
+//! For each pair of columns, the product has one term for each column e whose joint carries the bodies of both columns.
+//! These terms are independent of each other.
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, Limbs};
@@ -31,14 +31,14 @@ const SIDE: usize = 3;
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     sizes: Sizes,
-    /// Motions T, one per pair of a step and a column of the step's support. Shape: sum of the support sizes of all
-    /// steps. Written by: `carry`.
+    /// Motions T, one per pair of a step and a column of the step's support (the columns on the paths from the root to
+    /// the step's joints). Shape: sum of the support sizes of all steps. Written by: `carry`.
     T: Vec<Motion<Four>>,
-    /// Matrix Z D⁻¹, stored by rows. Each row contains only the columns on the path from the root, in this order.
-    /// Shape: see `Sizes`, plus one entry. Written by: `carry`.
+    /// Matrix Z D⁻¹, with Z = L⁻¹ and M = Lᵀ D L, stored by rows. Each row contains only the columns on the path from
+    /// the root, in this order. Shape: see `Sizes`, plus one entry. Written by: `carry`.
     ZD: Vec<f64>,
-    /// Matrix Zᵀ, stored by rows, including zeros and the ones on the diagonal. Shape: see `Sizes`, plus one entry.
-    /// Written by: `carry`, `new`.
+    /// Matrix Zᵀ, with Z = L⁻¹ and M = Lᵀ D L, stored by rows, including zeros and the ones on the diagonal. Shape: see
+    /// `Sizes`, plus one entry. Written by: `carry`, `new`.
     Zt: Vec<f64>,
     /// Lower triangle of M⁻¹, stored by rows. Shape: same as `Zt`. Written by: `multiply`.
     rows: Vec<f64>,
@@ -86,7 +86,7 @@ impl Scratch {
         mirror(&self.rows, self.sizes, Minv);
     }
 
-    /// Computes Z D⁻¹ and Zᵀ in one pass from the root to the tips.
+    /// Computes Z D⁻¹ and Zᵀ, with Z = L⁻¹ and M = Lᵀ D L, in one pass from the root to the tips.
     #[inline(always)]
     fn carry(&mut self, l: &Limbs<'_>, w: &World<Four>, aba: &aba::Workspace<Four>) {
         let Self { T, ZD, Zt, .. } = self;
@@ -114,8 +114,8 @@ impl Scratch {
         }
     }
 
-    /// Computes M rows of M⁻¹, up to the end of the vector that contains the last diagonal entry. The constant
-    /// parameter M is the number of rows.
+    /// Computes a block of rows of the inverse inertia matrix, up to the end of the vector that contains the last
+    /// diagonal entry. The constant parameter M is the number of rows.
     #[inline(always)]
     fn multiply<V: Block<Number = f64>, const M: usize>(&mut self, block: &ColumnBlock) {
         let (mut start, end) = (0, block.first + M);
@@ -130,7 +130,8 @@ impl Scratch {
         }
     }
 
-    /// Computes N vectors of entries in each of M rows of M⁻¹, beginning with column `start`.
+    /// Computes entries of the inverse inertia matrix: N vectors of entries in each of M rows, beginning with column
+    /// `start`. M and N are constant parameters.
     #[inline(always)]
     fn part<V: Block<Number = f64>, const M: usize, const N: usize>(&mut self, block: &ColumnBlock, start: usize) {
         let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, rows: n }, .. } = self;
@@ -190,14 +191,15 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
         for j in (0..=k).step_by(LANES) {
             let mut block = [Four::zero(); LANES];
             for r in 0..LANES {
-                // SAFETY: k + r < n, and j + LANES ≤ n.
+                // SAFETY: row k + r and the columns from j are inside the n rows of `rows`: k + r < n, and j + LANES ≤
+                // n ≤ width.
                 block[r] = Four::load(unsafe { rows.get_unchecked((k + r) * width + j..(k + r) * width + j + LANES) });
             }
             // SAFETY: the block's rows are inside X, by the same inequalities.
             unsafe { write(X, k * n + j, n, &block) };
             Four::transpose(&mut block);
             if j < k {
-                // SAFETY: j + r < n, and k + LANES ≤ n.
+                // SAFETY: row j + r and the columns from k are inside the n × n matrix X: j + r < n, and k + LANES ≤ n.
                 unsafe { write(X, j * n + k, n, &block) };
             }
         }
@@ -215,8 +217,8 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF
     }
 }
 
-/// Writes the rows of a block to X. The first row begins at entry `at`, and each row begins n entries after the row
-/// before.
+/// Writes the rows of a block to X. The first row begins at entry `at`, and each row begins n entries after the
+/// previous row.
 ///
 /// # Safety
 /// The block's last row must end inside X.

@@ -32,8 +32,8 @@ impl<'d> LaneView<'d> {
         motion(&self.scratch.world.S[self.plan.steps[step].idx_v + k], lane)
     }
 
-    /// Returns the velocity and the acceleration of body b. The acceleration includes gravity as a world acceleration
-    /// of −g.
+    /// Returns the velocity and the acceleration of body b. The accelerations are computed with the acceleration −g of
+    /// the world, which accounts for gravity.
     pub(crate) fn moving<S: Scalar>(self, b: usize) -> (Motion<S>, Motion<S>) {
         let (step, lane) = self.plan.place(b);
         (motion(&self.scratch.bodies.v[step], lane), motion(&self.scratch.bodies.a[step], lane))

@@ -230,7 +230,8 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the value that belongs to the predecessor of an entry of the support.
+    /// Returns the value of the predecessor of an entry in a step's support (the columns on the paths from the root to
+    /// the step's joints). The predecessor is the entry for the same column in the parent's step.
     #[inline(always)]
     pub(crate) fn predecessor<T: Copy>(&self, of: &[T], entry: usize) -> T {
         match &self.predecessors[entry] {
@@ -239,8 +240,8 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// Returns the indices of the matrix entries for the pair of the support's column e and column k of the step's
-    /// joint.
+    /// Returns the indices of the matrix entries for a pair of columns: column e of the step's support, and column k of
+    /// the step's joint.
     #[inline(always)]
     pub(crate) fn pair(&self, e: LaneColumn, k: usize) -> &Pair {
         debug_assert!(e.pair + k < self.pairs.len());
