@@ -3,7 +3,7 @@
 
     .venv/pinocchio/bin/python benches/peers/casadi_comparison.py [FILE.json] [--quick]
 
-The functions are RNEA and ABA, their Jacobian, and the Hessian of λᵀf, for the embedded robots. Each function is timed
+The functions are RNEA and ABA, their Jacobian, and the Hessian of λᵀf, for the built-in robots. Each function is timed
 in three forms: Condyle's call from Python, Condyle's function in CasADi, and the same recursion written as CasADi
 expressions.
 

@@ -4,7 +4,7 @@ expressions.
 
     .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
-Without a URDF, the robots are the embedded arm and humanoid. For RNEA and ABA, the program prints times in microseconds
+Without a URDF, the robots are the built-in arm and humanoid. For RNEA and ABA, the program prints times in microseconds
 and the speed-up by condyle.casadi. It prints these for the function, for its Jacobian with respect to all arguments,
 and for the Hessian of λᵀf. Times are medians of alternating rounds on one core. The expressions run in CasADi's own
 virtual machine, as pinocchio.casadi's expressions do.

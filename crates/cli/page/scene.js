@@ -1,5 +1,5 @@
 "use strict";
-// 3-D playback. The world frame is the one of the data: metres, z up.
+// 3-D playback. The world frame is the frame of the data: lengths in metres, z up.
 
 /** Draws `data.scene` into `host`. Returns the functions that the player calls. Throws if the browser has no WebGL. */
 function makeScene(data, host) {

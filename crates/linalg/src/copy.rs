@@ -37,8 +37,8 @@ compiled! {
 
     /// Writes to OUT the symmetric matrix of `size` rows whose lower triangle is in A.
     pub fn copy_symmetric<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
-        // Transposes the lower triangle into the upper one, a block of columns at a time. Entries above the diagonal of
-        // A are transposed, too; `lower` then overwrites them in OUT.
+        // Transposes the lower triangle of A into the upper triangle of OUT, a block of columns at a time. Entries
+        // above the diagonal of A are transposed, too, into the lower triangle of OUT, which `lower` then overwrites.
         let (width, mut j) = (V::N.min(size), 0);
         while j < size {
             let from = j.min(size - width);
@@ -94,7 +94,7 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
     }
 }
 
-/// Copies a register from offset `from` in `x` to offset `at` in `to`.
+/// Copies a register of N numbers from offset `from` in `x` to offset `at` in `to`.
 ///
 /// # Safety
 /// `to` has N numbers from offset `at` on, and `x` has N numbers from offset `from` on.
@@ -105,8 +105,8 @@ unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: u
     unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
 }
 
-/// Copies the transpose of a block of N rows and columns, or minus the transpose, from offset `from` in `x` to offset
-/// `at` in `to`.
+/// Copies the transpose of a block of N rows and N columns (N numbers fill a register), or minus the transpose, from
+/// offset `from` in `x` to offset `at` in `to`.
 ///
 /// # Safety
 /// Both slices have N numbers in each of N columns: `to` from offset `at` on, `x` from offset `from` on.
@@ -143,7 +143,8 @@ fn next_block<V: Vector>(i: usize, size: usize) -> usize {
     if i + V::N >= size { size } else { (i + V::N).min(size - V::N) }
 }
 
-/// Copies a block of N rows and columns to offset `at[0]` in `to`, and the transpose of the block to offset `at[1]`.
+/// Copies a block of N rows and N columns (N numbers fill a register) to offset `at[0]` in `to`, and the transpose of
+/// the block to offset `at[1]`.
 ///
 /// # Safety
 /// Both offsets meet the conditions of [`move_transposed`].
@@ -157,8 +158,9 @@ unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[
     unsafe { move_transposed::<V, false>(to, at[1], ldo, x, from, ldx) };
 }
 
-/// Implements [`copy_symmetric_turned`]. The lower triangle of A is [VV ·; QV QQ], where V has `split` rows and Q has
-/// `turn` rows. The result is the full matrix [QQ QV; VQ VV] with VQ = QVᵀ.
+/// Implements [`copy_symmetric_turned`]. The lower triangle of A is [VV ·; QV QQ]. The block VV has `split` rows, the
+/// block QQ has `turn` rows, and the dot stands for entries that are not used. The result is the full matrix [QQ QV; VQ
+/// VV] with VQ = QVᵀ.
 #[inline(always)]
 fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [usize; 2]) {
     let (size, View { data: x, stride }) = (split + turn, a);

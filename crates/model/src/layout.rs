@@ -35,7 +35,7 @@ pub trait Layout {
     fn joint(&self, i: usize) -> Joint;
     /// Returns the joints that turn about z.
     fn revolute_angles(&self) -> &RevoluteAngles;
-    /// Returns X_T: the pose of the joint's frame in the parent's frame.
+    /// Returns X_T, the placement of joint i: the pose of its frame in the parent's frame.
     fn placement(&self, i: usize) -> Se3<Self::S>;
     /// Returns the inertia of body i in the body's frame.
     fn inertia(&self, i: usize) -> Inertia<Self::S>;

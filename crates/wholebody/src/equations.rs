@@ -30,9 +30,10 @@ pub(crate) struct Equations {
     pub bounds: AccelerationBounds,
     /// Coordinates with limits of position or velocity. Each has a row of G for the bounds on its acceleration.
     bounded: Vec<usize>,
-    /// Eᵀ of the equation τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate.
+    /// Eᵀ of the efforts τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate. M is the inertia matrix, J the
+    /// Jacobian of the contacts, and h the bias efforts.
     pub Et: DMatrix<f64>,
-    /// Constraints of the whole program; the solver fills in P and c.
+    /// Constraints of the whole program; the solver fills in the cost P and c.
     pub program: ConeProgram,
     /// Indices of the unknowns and constraints in the program.
     places: Places,

@@ -1,4 +1,5 @@
-//! Objective of the form ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x.
+//! Objective of the form ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x: rows R with right sides b, and diagonal and linear terms of
+//! the unknowns x.
 
 use crate::cone_program::ConeProgram;
 use nalgebra::DMatrix;
@@ -44,7 +45,7 @@ impl LeastSquares {
         self.single.clear();
     }
 
-    /// Adds the row ½ w (r x − b)²; `fill` writes r into a slice of zeros.
+    /// Adds the term ½ w (r x − b)² with the weight w and the row r; `fill` writes r into a slice of zeros.
     pub(crate) fn add_row(&mut self, weight: f64, b: f64, fill: impl FnOnce(&mut [f64])) {
         let root = weight.sqrt();
         let stride = self.Rt.nrows();

@@ -32,7 +32,7 @@
 //! - An invalid description makes `new` return an [`Error`]; an argument of the wrong length causes a panic.
 //!
 //! # Features
-//! On by default: `loaders` (reads robots from files, and has embedded robots) and `threads` (uses rayon). Off by
+//! On by default: `loaders` (reads robots from files, and has built-in robots) and `threads` (uses rayon). Off by
 //! default: `clarabel`, which adds `Backend::Clarabel`, a second solver for comparison, and its dependencies.
 //!
 //! Sources: Sentis and Khatib (2005) for operational tasks under contact; Herzog et al. (2016) for inverse dynamics as

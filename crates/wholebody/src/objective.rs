@@ -1,4 +1,5 @@
-//! Rows of the tasks at one state. Each row has the form J q̈ = a* − J̇ v.
+//! Rows of the tasks at one state. Each row has the form J q̈ = a* − J̇ v, with the Jacobian J and the desired
+//! acceleration a* of the task.
 
 use crate::contact_rows::ContactRows;
 use crate::kinematics::{FrameMotion, Kinematics};

@@ -2,7 +2,8 @@
 
 use crate::error::Error;
 
-/// Gains of a task: the desired acceleration is a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+/// Gains of a task: the desired acceleration is a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v), with the position x and the
+/// velocity v of the task, and their references.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// k (1/s²).
@@ -28,7 +29,7 @@ impl Gains {
 pub enum TaskKind {
     /// Centre of mass, c̈: 3 numbers.
     Com,
-    /// Origin and rotation of a frame, (p̈, ω̇): 6 numbers, linear first.
+    /// Origin and rotation of a frame: 6 numbers, the acceleration of the origin, then the angular acceleration.
     Pose(String),
     /// Origin of a frame, p̈: 3 numbers.
     Position(String),
@@ -78,8 +79,8 @@ pub enum Axes {
     Frame(String),
 }
 
-/// Task: a quantity to be controlled, with the cost ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². The
-/// [`References`](crate::References) contain its target.
+/// Task: a quantity to be controlled, with the cost ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². Here w is the weight, J the
+/// Jacobian of the quantity, and a* its desired acceleration. The [`References`](crate::References) contain its target.
 ///
 /// Tasks of priority 0 come first. Tasks of priority 1 determine only the motion that priority 0 leaves open, and so on
 /// (lexicographic). Within a priority only the ratios of the weights matter.

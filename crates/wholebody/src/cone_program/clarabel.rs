@@ -166,8 +166,8 @@ impl Shape {
             tol_feas: tolerance,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
-            // Refine only as accurately as the tolerance requires, because clarabel's own 1e-13 costs a sixth of the
-            // time.
+            // Refine only as accurately as the tolerance requires, because clarabel's own value, 1e-13, takes a sixth
+            // of the time of a solve.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
             static_regularization_constant: REGULARISATION,

@@ -35,7 +35,8 @@ pub(super) fn tail(x: &[f64], y: &[f64]) -> f64 {
     sum
 }
 
-/// Returns η, and writes w and λ. Returns `None` if s or z is not in the interior of the cone.
+/// Computes the scaling of a pair (s, z): returns η, and writes w and the scaled variable λ. Returns `None` if s or z
+/// is not in the interior of the cone.
 #[inline(always)]
 pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -> Option<f64> {
     let (ds, dz) = (determinant(s), determinant(z));

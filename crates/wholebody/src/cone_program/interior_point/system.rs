@@ -33,8 +33,8 @@ pub(super) struct System {
     ldh: usize,
     /// Inverse of the factor's diagonal.
     inverse: Vec<f64>,
-    /// Scaled columns of K (√D G and W⁻¹ F), then the columns of E. Only non-zero blocks of these columns are written
-    /// and multiplied.
+    /// Scaled rows of G and F (√D G and W⁻¹ F), then the rows of E. Only non-zero blocks of these rows are written and
+    /// multiplied.
     pub B: OuterProducts,
     n: usize,
     me: usize,
@@ -59,8 +59,8 @@ impl System {
         }
     }
 
-    /// Copies the sizes of a program and the non-zero blocks of its columns. Writes E, and writes zeros into the
-    /// columns of K.
+    /// Copies the sizes of a program and the non-zero blocks of its columns. Writes the rows of E, and writes zeros
+    /// into the rows of G and F.
     pub(super) fn prepare(&mut self, data: &Scaled) {
         let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
         (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
@@ -71,14 +71,15 @@ impl System {
         B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
         for k in 0..columns + me {
             let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
-            // W⁻¹ combines the rows of a cone: each resulting row has the union of the blocks of these rows.
+            // The scaling W⁻¹ combines the rows of a cone: each resulting row has the union of the blocks of these
+            // rows.
             let mask = if k < columns { data.masks[k] } else { mask(row) };
             B.multiply([k, k], [mask, mask]);
         }
     }
 
-    /// Factorises P + B Bᵀ, after the caller has written `B`. Returns false if the factorisation fails even with the
-    /// greatest regularisation.
+    /// Factorises the matrix P + B Bᵀ of the linear system, after the caller has written `B`. Returns false if the
+    /// factorisation fails even with the greatest regularisation.
     pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
         let Self { H, ldh, B, n, me, inverse, .. } = self;
         let (n, me, ldh, ld) = (*n, *me, *ldh, data.ld);
@@ -111,7 +112,7 @@ impl System {
         false
     }
 
-    /// Uses the factor to replace r₁ by dx and r₂ by dy.
+    /// Solves the linear system with the factor: replaces its right-hand sides r₁ by dx and r₂ by dy.
     fn solve_once(&mut self, data: &Scaled, x: &mut [f64], y: &mut [f64]) {
         let (n, me, ldh) = (self.n, self.me, self.ldh);
         let (L, (inverse, inverse_S)) = (View::new(&self.H, ldh), self.inverse[..n + me].split_at(n));
@@ -132,8 +133,8 @@ impl System {
         backward_solve(L, inverse, x);
     }
 
-    /// Replaces r₁ in `x` by dx and r₂ in `y` by dy, and writes K dx. In each refinement, `weigh` replaces K dx by [D G
-    /// dx; W⁻² F dx].
+    /// Solves the linear system: replaces its right-hand sides r₁ in `x` by dx and r₂ in `y` by dy. Also writes K dx,
+    /// which is G dx and F dx. In each refinement, `weigh` replaces K dx by [D G dx; W⁻² F dx].
     pub(super) fn solve(
         &mut self,
         data: &Scaled,
@@ -149,7 +150,7 @@ impl System {
         re[..me].copy_from_slice(&y[..me]);
         self.solve_once(data, x, y);
         for _ in 0..refinements {
-            // Compute the residuals r₁ − H dx + Eᵀ dy and r₂ − E dx.
+            // Compute the residuals r₁ − H dx + Eᵀ dy and r₂ − E dx of the linear system.
             data.multiply(x, Kdx);
             weigh(Kdx);
             for i in 0..n {
