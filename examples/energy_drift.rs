@@ -57,13 +57,13 @@ fn humanoid() -> System {
 
 /// Energy error of an integrator over time.
 struct Drift {
-    /// E(0) (J).
+    /// Energy at the start, E(0) (J).
     start: f64,
     /// Greatest kinetic energy (J).
     kinetic: f64,
     /// Greatest energy error |E(t) − E(0)| in each hundredth of the time (J).
     errors: Vec<f64>,
-    /// E(10 s) − E(0) (J).
+    /// Energy error at the end, E(10 s) − E(0) (J).
     end: f64,
 }
 

@@ -73,7 +73,7 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Cholesky<S> {
-    /// L, in the lower triangle. Shape: n × n. Written by: `factorize`.
+    /// Factor L, in the lower triangle. Shape: n × n for a matrix of n rows. Written by: `factorize`.
     L: Matrix<S>,
 }
 

@@ -137,7 +137,7 @@ impl<S: Scalar> Ltdl<S> {
         &self.rows[self.tree.first[k]..][..self.tree.depth[k]]
     }
 
-    /// Returns 1/D, in elimination order.
+    /// Returns the reciprocals of the diagonal entries of D, in elimination order.
     #[doc(hidden)]
     #[inline(always)]
     pub fn inverse_diagonal(&self) -> &[S] {
@@ -170,7 +170,7 @@ impl<S: Scalar> Ltdl<S> {
         core::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
     }
 
-    /// Returns D, in the [`order`](Self::order) of positions.
+    /// Returns the diagonal entries of D, in the [`order`](Self::order) of positions.
     pub fn diagonal(&self) -> impl Iterator<Item = S> {
         self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
     }

@@ -125,7 +125,7 @@ fn strip<V: Vector, const S: usize>(y: &mut [f64], a: View<'_>, i: usize, x: &[f
     }
 }
 
-/// Returns xᵀ y.
+/// Returns the dot product xᵀ y.
 #[inline]
 pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()

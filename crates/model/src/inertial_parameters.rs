@@ -100,13 +100,13 @@ pub fn pseudo_inertia<S: Scalar>(I: Inertia<S>) -> SMatrix<S, 4, 4> {
     )
 }
 
-/// Factor U with J = U Uᵀ.
+/// Cholesky factor U of the pseudo-inertia J = U Uᵀ.
 struct Factor {
     /// Scale eᵅ.
     scale: f64,
-    /// Diagonal eᵅ (e^d₁, e^d₂, e^d₃).
+    /// First three diagonal entries of U: eᵅ (e^d₁, e^d₂, e^d₃).
     diagonal: Vec3<f64>,
-    /// Entries eᵅ (s₁₂, s₂₃, s₁₃) above the diagonal.
+    /// Entries of U above the diagonal: eᵅ (s₁₂, s₂₃, s₁₃).
     above: Vec3<f64>,
     /// Centre of mass.
     t: Vec3<f64>,

@@ -39,7 +39,7 @@ pub trait Layout {
     fn placement(&self, i: usize) -> Se3<Self::S>;
     /// Returns the inertia of body i in the body's frame.
     fn inertia(&self, i: usize) -> Inertia<Self::S>;
-    /// Returns the acceleration −g of the world, which represents gravity.
+    /// Returns −g, the acceleration of the world that represents the gravity g.
     fn minus_gravity(&self) -> Vec3<Self::S>;
     /// Returns the armature of degree of freedom k of joint i.
     fn armature(&self, i: usize, k: usize) -> Self::S;

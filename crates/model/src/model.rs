@@ -65,7 +65,7 @@ pub struct Model<R = f64> {
     /// Whether each body connects two joints of a chain and therefore has no mass on purpose.
     pub(crate) between: Vec<bool>,
     pub(crate) warnings: Vec<Warning>,
-    /// Bodies whose joints make M singular.
+    /// Bodies whose joints make the inertia matrix singular.
     pub(crate) singular: Vec<usize>,
 }
 

@@ -22,7 +22,7 @@ fn four(q: Quaternion<f64>) -> [f64; 4] {
     [q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Returns the dual numbers x + ε d, one per component.
+/// Returns the dual numbers x + ε d with the dual unit ε, one per component.
 fn dual(x: Vec3<f64>, d: Vec3<f64>) -> Vec3<Dual64> {
     let (x, d) = (x.to_array(), d.to_array());
     core::array::from_fn(|k| Dual64::new(x[k], d[k])).into()

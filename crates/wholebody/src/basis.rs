@@ -29,7 +29,7 @@ pub(crate) struct Basis {
     places: Vec<Place>,
     /// T of the equation x_B = p − T z. Shape: other unknowns × basic unknowns, with padding rows.
     T: DMatrix<f64>,
-    /// p.
+    /// Vector p of the equation x_B = p − T z.
     pub p: Vec<f64>,
     /// Scratch: the columns of basic unknowns in several rows. Shape: rows × basic unknowns, with padding.
     basic_part: DMatrix<f64>,

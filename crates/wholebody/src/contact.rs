@@ -68,7 +68,7 @@ pub struct FrictionContact {
     pub shape: Shape,
     /// The direction in which the environment pushes.
     pub normal: Normal,
-    /// μ, Coulomb's friction coefficient; above 0.
+    /// Coulomb's friction coefficient μ; above 0.
     pub friction: f64,
     /// Length γ (m) in the bound |yaw moment| ≤ γ f_n of a [wrench](SurfaceForces::Wrench) with the normal force f_n.
     /// For a polygon, `None` means ⅔ μ r, with the friction coefficient μ. This value is exact for a uniformly loaded
@@ -216,7 +216,7 @@ pub(crate) struct Geometry {
     /// Indices of the components of the frame's six-dimensional motion that the contact holds. The contact's wrench has
     /// the components with the same indices.
     pub motion: &'static [usize],
-    /// γ.
+    /// Length γ (m) in the bound |yaw moment| ≤ γ f_n, with the normal force f_n.
     pub yaw: f64,
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct ContactRows {
     axes: Mat3<f64>,
     /// Vector from the frame's origin to the contact's centre, along the world's axes.
     arm: Vec3<f64>,
-    /// Jᵀ, nv × number of held rows.
+    /// Transpose Jᵀ of the contact's Jacobian: nv × number of held rows.
     pub Jt: DMatrix<f64>,
     /// Required value of J q̈, which is a* − J̇ v.
     pub held: [f64; 6],
@@ -192,7 +192,7 @@ impl ContactRows {
         }
     }
 
-    /// Adds the equalities J q̈ = a* − J̇ v.
+    /// Adds the equalities J q̈ = a* − J̇ v, with the Jacobian J of the contact and its required acceleration a*.
     pub(crate) fn add_equalities(&self, program: &mut ConeProgram) {
         let (n, nv) = (program.size.unknowns, self.Jt.nrows());
         for (r, J) in self.Jt.as_slice().chunks_exact(nv).enumerate() {

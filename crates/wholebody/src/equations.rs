@@ -37,7 +37,7 @@ pub(crate) struct Equations {
     pub program: ConeProgram,
     /// Indices of the unknowns and constraints in the program.
     places: Places,
-    /// ‖g‖ times the mass (N).
+    /// Weight of the robot: ‖g‖ times the mass (N).
     pub weight: f64,
 }
 
@@ -141,7 +141,7 @@ impl Equations {
         }
     }
 
-    /// Computes τ = E x + h for the actuated coordinates.
+    /// Computes the efforts τ = E x + h of the actuated coordinates.
     pub(crate) fn effort(&self, x: &[f64], tau: &mut [f64]) {
         for &i in &self.actuated {
             tau[i] = self.kinematics.h[i] + dot(&self.Et.as_slice()[i * self.Et.nrows()..], x);

@@ -154,7 +154,7 @@ impl ResolvedTask {
 /// All tasks, grouped by priority.
 pub(crate) struct Objective {
     pub tasks: Vec<ResolvedTask>,
-    /// q_ref ⊖ q, nv numbers.
+    /// Error q_ref ⊖ q of the position, nv numbers.
     pub error: Vec<f64>,
     /// Objective of each priority.
     pub priorities: Vec<LeastSquares>,

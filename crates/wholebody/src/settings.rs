@@ -9,7 +9,8 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Friction {
-    /// ‖f_t‖ ≤ μ f_n, a second-order cone.
+    /// Second-order cone ‖f_t‖ ≤ μ f_n, with the tangential force f_t, the normal force f_n and the friction
+    /// coefficient μ.
     Cone,
     /// A pyramid instead of the cone, for comparisons.
     Pyramid {
@@ -69,7 +70,7 @@ pub enum Formulation {
 /// at that tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
-    /// T (s), the look-ahead time; at least the duration of several ticks.
+    /// Look-ahead time T (s); at least the duration of several ticks.
     pub look_ahead: f64,
     /// a_max (rad/s², m/s²).
     pub max_acceleration: f64,

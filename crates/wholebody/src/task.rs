@@ -6,9 +6,9 @@ use crate::error::Error;
 /// velocity v of the task, and their references.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
-    /// k (1/s²).
+    /// Gain k of the position error (1/s²).
     pub stiffness: f64,
-    /// d (1/s).
+    /// Gain d of the velocity error (1/s).
     pub damping: f64,
 }
 
@@ -27,17 +27,17 @@ impl Gains {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TaskKind {
-    /// Centre of mass, c̈: 3 numbers.
+    /// Centre of mass: 3 numbers, its acceleration.
     Com,
     /// Origin and rotation of a frame: 6 numbers, the acceleration of the origin, then the angular acceleration.
     Pose(String),
-    /// Origin of a frame, p̈: 3 numbers.
+    /// Origin of a frame: 3 numbers, the acceleration of the origin.
     Position(String),
-    /// Rotation of a frame, ω̇: 3 numbers.
+    /// Rotation of a frame: 3 numbers, the angular acceleration.
     Orientation(String),
     /// Velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first.
     Velocity(String),
-    /// Actuated joints, q̈.
+    /// Actuated joints: their accelerations.
     Posture,
     /// Rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers.
     AngularMomentum,
@@ -99,7 +99,7 @@ pub struct Task {
     pub kind: TaskKind,
     /// w, the weight; at least 0. A task with weight 0 has no effect.
     pub weight: f64,
-    /// Gains k and d of the errors of position and velocity.
+    /// Gains k and d, by which the errors of position and velocity are multiplied.
     pub gains: Gains,
     /// Selection of the task's components that enter the cost. Tasks with 3 components use the first 3 entries; the
     /// posture uses `joints` instead.

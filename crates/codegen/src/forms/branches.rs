@@ -27,7 +27,7 @@ pub struct Branches<'f, S> {
     /// For each index, the number of indices before it that belong to other branches. A branch begins after the last
     /// index with several children.
     before_branch: Vec<usize>,
-    /// Entries of the diagonal matrix −D⁻¹.
+    /// Entries of the diagonal matrix −D⁻¹, where M = Lᵀ D L is the inertia matrix.
     minus_inverse_diagonal: Vec<S>,
     rows: BTreeMap<(usize, usize), Vec<S>>,
 }
@@ -54,7 +54,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         Self { factor, before, before_branch, minus_inverse_diagonal, rows: BTreeMap::new() }
     }
 
-    /// Returns the row G_ke for the first m indices e before k.
+    /// Returns the entries G_ke of row k of G, for the first m indices e before k.
     fn row(&mut self, k: usize, m: usize) -> Vec<S> {
         if let Some(row) = self.rows.get(&(k, m)) {
             return row.clone();

@@ -26,11 +26,11 @@ use nalgebra::{DMatrix, DVectorView};
 pub struct ForwardDerivatives<S> {
     /// Acceleration q̈, nv numbers.
     pub a: Vec<S>,
-    /// ∂q̈/∂q in the tangent space, nv × nv.
+    /// Derivative ∂q̈/∂q in the tangent space, nv × nv.
     pub da_dq: DMatrix<S>,
-    /// ∂q̈/∂v, nv × nv.
+    /// Derivative ∂q̈/∂v, nv × nv.
     pub da_dv: DMatrix<S>,
-    /// ∂q̈/∂τ = M⁻¹, nv × nv.
+    /// Derivative ∂q̈/∂τ = M⁻¹, the inverse inertia matrix, nv × nv.
     pub da_dtau: DMatrix<S>,
 }
 
@@ -176,7 +176,7 @@ impl<S: Scalar> Inverse<S> {
         Some(Self { factor: Some(factor), Minv })
     }
 
-    /// Replaces b by x = M⁻¹ b.
+    /// Replaces b by x = M⁻¹ b, with the inertia matrix M.
     fn solve(&self, b: &mut [S]) {
         match &self.factor {
             Some(factor) => factor.solve(b),

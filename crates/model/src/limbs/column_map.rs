@@ -54,7 +54,7 @@ pub struct Pair {
     pub in_row: [u32; LANES],
     /// Index of the entry in the column of the step's own column.
     pub in_column: [u32; LANES],
-    /// Index of the entry of Z D⁻¹.
+    /// Index of the entry in the matrix Z D⁻¹, where Z = L⁻¹ and M = Lᵀ D L is the inertia matrix.
     pub in_ZD: [u32; LANES],
     /// Index of the entry of Zᵀ.
     pub in_Zt: [u32; LANES],

@@ -36,7 +36,7 @@ impl<S: Scalar> Inertia<S> {
 
 impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
     type Output = Force<S>;
-    /// Returns I v = [m v − h × ω; Ī ω + h × v].
+    /// Returns I [v; ω] = [m v − h × ω; Ī ω + h × v] for the inertia I = (m, h, Ī).
     #[inline(always)]
     fn mul(self, v: Motion<S>) -> Force<S> {
         Force {
@@ -100,7 +100,7 @@ impl<S: Scalar> Mul<Motion<S>> for ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> ArticulatedInertia<S> {
-    /// Returns I − s U Uᵀ.
+    /// Returns I − s U Uᵀ, where I is this inertia.
     #[inline(always)]
     pub fn minus_outer(self, U: Force<S>, s: S) -> Self {
         let (s, Mat3 { x, y, z }) = (-s, self.coupling);

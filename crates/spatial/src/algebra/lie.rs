@@ -41,7 +41,7 @@ pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
     c
 }
 
-/// 1/k!, at index k.
+/// Reciprocal factorials: 1/k! at index k.
 const INVERSE_FACTORIAL: [f64; 4] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0];
 
 /// Computes the functions from the series, for t < 1.
@@ -114,7 +114,7 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     v.scale(half * S::splat(2.0))
 }
 
-/// Computes θ/(2n) near 0 from its series.
+/// Computes θ/(2n) from its series, for a quaternion with a vector part of length n near 0 and the angle θ.
 #[inline(always)]
 fn log3_near<S: Scalar>(n2: S, w: S) -> S {
     let r = n2 * (w * w).recip();
@@ -184,9 +184,9 @@ pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<
 /// angular part of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionMap<S> {
-    /// A: maps the linear part to the linear part, and the angular part to the angular part.
+    /// Block A: maps the linear part to the linear part, and the angular part to the angular part.
     pub diagonal: Mat3<S>,
-    /// B: maps the angular part to the linear part.
+    /// Block B: maps the angular part to the linear part.
     pub coupling: Mat3<S>,
 }
 

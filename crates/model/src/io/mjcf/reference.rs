@@ -13,9 +13,9 @@ pub(super) struct Reference<'m> {
     poses: &'m [Se3<f64>],
     /// Columns of the motion subspace S.
     S: Vec<Motion<f64>>,
-    /// Forces U = Iᴬ S, by column.
+    /// Forces U = Iᴬ S of each column S of the joints, with the articulated inertia Iᴬ.
     U: Vec<Force<f64>>,
-    /// Inertias D = Sᵀ Iᴬ S + armature, by column.
+    /// Inertias D = Sᵀ Iᴬ S + armature along each column S of the joints, with the articulated inertia Iᴬ.
     D: Vec<f64>,
 }
 

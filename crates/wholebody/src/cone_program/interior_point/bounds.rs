@@ -10,12 +10,12 @@ pub(super) struct Side {
     pub sign: f64,
     pub s: Vec<f64>,
     pub z: Vec<f64>,
-    /// 1 / s and 1 / z.
+    /// Reciprocals 1 / s of the slack variables. The field `inverse_z` has the reciprocals 1 / z of the multipliers.
     pub inverse_s: Vec<f64>,
     pub inverse_z: Vec<f64>,
-    /// z / s.
+    /// Quotients z / s of the multipliers and the slack variables.
     pub d: Vec<f64>,
-    /// ±(G x − bound) − s.
+    /// Residual ±(G x − bound) − s of each row.
     pub r: Vec<f64>,
     pub ds: Vec<f64>,
     pub dz: Vec<f64>,

@@ -21,11 +21,11 @@ pub(super) struct Candidate<'a> {
     pub x: &'a [f64],
     pub Kx: &'a [f64],
     pub Px: &'a [f64],
-    /// cᵀ x.
+    /// Linear part cᵀ x of the objective.
     pub linear: f64,
-    /// ‖Kᵀ z + Eᵀ y‖∞.
+    /// Norm ‖Kᵀ z + Eᵀ y‖∞, with the multipliers z of the rows of K = [G; F] and y of the equalities E x = e.
     pub force: f64,
-    /// eᵀ y + lᵀ z₋ − uᵀ z₊ − hᵀ z.
+    /// Sum eᵀ y + lᵀ z₋ − uᵀ z₊ − hᵀ z of the right sides and bounds of all constraints, each times its multiplier.
     pub support: f64,
 }
 

@@ -23,15 +23,16 @@ macro_rules! by_dimension {
 pub(super) struct Cones {
     pub s: Vec<f64>,
     pub z: Vec<f64>,
-    /// h + F x − s.
+    /// Residuals h + F x − s.
     pub r: Vec<f64>,
     pub ds: Vec<f64>,
     pub dz: Vec<f64>,
-    /// w and η of each cone's W, and λ.
+    /// Vector w and number η of the scaling W of each cone, and the scaled variable λ: the fields `w`, `eta` and
+    /// `lambda`.
     w: Vec<f64>,
     eta: Vec<f64>,
     lambda: Vec<f64>,
-    /// λ \ ξ.
+    /// Solution p of λ ∘ p = ξ, where ξ is the right side of a step (see `target`).
     p: Vec<f64>,
     ds_tilde: Vec<f64>,
     dz_tilde: Vec<f64>,
@@ -117,7 +118,7 @@ impl Cones {
         }
     }
 
-    /// Computes x ← W⁻² x.
+    /// Computes x ← W⁻² x, with the scaling W of each cone.
     pub(super) fn weigh(&mut self, cones: &[Cone], x: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
             let at = cone.at..cone.at + cone.dim;
@@ -188,7 +189,7 @@ impl Cones {
         *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
     }
 
-    /// Computes s += α ds and z += α dz.
+    /// Adds the step: s += α ds and z += α dz, with the step length α.
     pub(super) fn advance(&mut self, rows: usize, step: f64) {
         for i in 0..rows {
             self.s[i] += step * self.ds[i];

@@ -29,9 +29,9 @@ const NO_ROW_TOLERANCE: f64 = 1e-9;
 /// Origin of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
-    /// A row of A.
+    /// Row of A, with its index.
     Equality(usize),
-    /// A row of G.
+    /// Row of G, with its index.
     Row(usize),
     /// A row of F, for a cone of one dimension.
     Cone(usize),
@@ -69,15 +69,15 @@ pub(super) struct Scaled {
     pub n: usize,
     /// Offset from one column of a matrix to the next.
     pub ld: usize,
-    /// P, with both triangles.
+    /// Cost matrix P, with both triangles.
     pub P: Vec<f64>,
     pub c: Vec<f64>,
-    /// D, the unit of each unknown.
+    /// Units D of the unknowns.
     pub units: Vec<f64>,
     /// Scratch: inverse of a maximum for each unknown. The maximum is the value that rows with two bounds allow if the
     /// other unknowns are zero.
     inverse_limits: Vec<f64>,
-    /// Factor by which P and c were multiplied.
+    /// Factor by which the cost P and c was multiplied.
     pub cost: f64,
     /// Eᵀ, with a column for each equality and for each row of G with l = u.
     pub E: Vec<f64>,
@@ -89,7 +89,7 @@ pub(super) struct Scaled {
     /// Mask of the non-zero blocks of each column. The columns of one cone share the union of their masks.
     pub masks: Vec<u64>,
     runs: Vec<Run>,
-    /// l and u, 0 for a missing bound.
+    /// Bounds l and u of the rows of G; 0 for a missing bound.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
     /// 1 if the bound exists, otherwise 0.
@@ -158,7 +158,7 @@ impl Scaled {
         }
     }
 
-    /// Computes y += Kᵀ x.
+    /// Computes y += Kᵀ x, which is Gᵀ and Fᵀ times the two parts of x.
     pub(super) fn add_transposed(&self, x: &[f64], y: &mut [f64]) {
         for Run { columns, rows } in &self.runs {
             let K = View::new(&self.K, self.ld).at(rows.start, columns.start);

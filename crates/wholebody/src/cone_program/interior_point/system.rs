@@ -28,7 +28,7 @@ const ATTEMPTS: usize = 4;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// Lower triangle of [H; E], later overwritten by its factor.
+    /// Lower triangle of [H; E], the matrices of the linear system, later overwritten by its factor.
     H: Vec<f64>,
     ldh: usize,
     /// Inverse of the factor's diagonal.

@@ -24,7 +24,7 @@ pub(super) struct Workspace {
     pub cones: Cones,
     pub x: Vec<f64>,
     pub y: Vec<f64>,
-    /// G x and F x.
+    /// Products G x and F x.
     pub Kx: Vec<f64>,
     pub dx: Vec<f64>,
     pub dy: Vec<f64>,
@@ -72,7 +72,7 @@ pub(super) struct Measure {
     /// objective, divided by the same number.
     pub mu: f64,
     pub scale: f64,
-    /// ‖P x + c − Kᵀ z − Eᵀ y‖∞.
+    /// Dual residual ‖P x + c − Kᵀ z − Eᵀ y‖∞, with K = [G; F].
     pub dual: f64,
     /// Greatest of the relative residuals and the relative gap. Each is relative to the terms from which it is
     /// computed. The result is NaN if a residual or the gap is not finite.

@@ -17,7 +17,7 @@ pub(super) enum Kind {
     ZeroCones,
     /// A minimiser at a vertex: P is almost zero.
     Vertex,
-    /// P with half rank, all unknowns in a box.
+    /// Cost matrix P with half the full rank; bounds keep all unknowns in a box.
     Semidefinite,
     /// Rows and cones scaled by factors from 1e-4 to 1e4.
     BadlyScaled,
