@@ -2,12 +2,14 @@
 //! differences: `cargo bench -p condyle-benches --bench derivatives`.
 //!
 //! The throughput is the number of pairs per time. A pair consists of a joint and one of its ancestors, or of a joint
-//! and itself. The number of pairs is n · depth, where depth is the mean number of joints on the path to the world. If
-//! the throughput is constant, the cost grows as O(n · depth).
+//! and itself. The number of pairs is n · depth, where n is the number of joints, and depth is the mean number of
+//! joints on the path to the world. If the throughput is constant, the cost grows as O(n · depth).
 //!
-//! Results for n = 8, 32 and 128 on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`. A cell has the times of
-//! analytic derivatives (µs), and in brackets the times per pair (ns). Two ranges over n follow: the time with dual
-//! numbers, and the time with central differences, each divided by the time of analytic derivatives.
+//! The table has results for n = 8, 32 and 128 on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`. The rows ∂τ and
+//! ∂q̈ are first derivatives of efforts and accelerations; the rows λᵀ∂² are second derivatives of a sum with the
+//! weights λ. A cell has the times of analytic derivatives (µs), and in brackets the times per pair (ns). Two ranges
+//! over n follow: the time with dual numbers, and the time with central differences, each divided by the time of
+//! analytic derivatives.
 //!
 //! | | shape | n = 8, 32, 128 |
 //! | --- | --- | --- |

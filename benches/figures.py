@@ -150,8 +150,8 @@ def us(ns: float) -> str:
 
 
 def ways_table(figures: Figures) -> str:
-    """Returns the table of forward dynamics by three methods. The table also has the times to factorise M and to
-    compute M⁻¹."""
+    """Returns the table of forward dynamics by three methods. The table also has the times to factorise the inertia
+    matrix M and to compute M⁻¹."""
     groups = figures.medians("factorisation")
     names = [group.partition("/")[2] for group in groups if group.startswith("forward dynamics/")]
     order = ["arm7", "quadruped", "humanoid"]

@@ -109,7 +109,8 @@ function makeScene(data, host) {
     scene.add(tip);
   }
 
-  // --- feet: the path of each, and an arrow for its contact force; the robot's weight is drawn a third of the scene's size long
+  // --- feet: the path of each foot, and an arrow for its contact force; an arrow as long as a third of the scene is
+  // the robot's weight
   const contacts = data.contacts;
   const arrows = (contacts?.trails ?? []).map((way) => {
     const geometry = new THREE.LineGeometry().setPositions(way.flat());

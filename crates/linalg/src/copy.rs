@@ -184,18 +184,18 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         let (to, from, mut j) = (to * (ldo + 1), from * (stride + 1), 0);
         while j < size {
             let (at, from) = (to + j * (ldo + 1), from + j * (stride + 1));
-            // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
+            // SAFETY: both matrices have `size` columns, each with `size` rows and `V::N` − 1 padding rows.
             unsafe { move_transposed::<V, false>(out, at, ldo, x, from, stride) };
             for k in 0..V::N {
                 // Copies the column from the diagonal down, because the transposed block is valid only above the
                 // diagonal. Numbers after the last row are padding, or are written again later.
-                // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
+                // SAFETY: both matrices have `size` columns, each with `size` rows and `V::N` − 1 padding rows.
                 unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
             let mut i = next_block::<V>(j, size);
             while i < size {
                 let (low, high, from) = (to + j * ldo + i, to + i * ldo + j, from - j + i);
-                // SAFETY: all offsets are in columns with `size` rows and N − 1 padding rows.
+                // SAFETY: all offsets are in columns with `size` rows and `V::N` − 1 padding rows.
                 unsafe { move_both::<V>(out, [low, high], ldo, x, from, stride) };
                 i = next_block::<V>(i, size);
             }
@@ -207,7 +207,7 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         let mut i = 0;
         while i < turn {
             let (from, places) = (j * stride + split + i, [(turn + j) * ldo + i, i * ldo + turn + j]);
-            // SAFETY: all offsets are in columns with `size` rows and N − 1 padding rows.
+            // SAFETY: all offsets are in columns with `size` rows and `V::N` − 1 padding rows.
             unsafe { move_both::<V>(out, places, ldo, x, from, stride) }; // writes the blocks QV and VQ
             i = next_block::<V>(i, turn);
         }

@@ -102,8 +102,8 @@ pub struct Settings {
     /// Weight of ½ ‖q̈‖², which determines the motion that the tasks leave open; above 0.
     pub acceleration_weight: f64,
     /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), with the contact forces f and their references f_ref. It distributes the
-    /// forces; above 0. A moment of a sole's wrench costs as much as the corner forces that cause it, so that the
-    /// pressure stays away from the edges.
+    /// forces; above 0. A moment of a sole's wrench costs as much as the corner forces that cause it. This cost keeps
+    /// the centre of pressure away from the edges of the sole.
     pub force_weight: f64,
     /// Baumgarte gains k and d. The required acceleration of a contact with the pose X, the reference pose X_ref and
     /// the velocity v is k (X_ref ⊖ X) − d v instead of 0.
