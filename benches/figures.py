@@ -300,7 +300,8 @@ def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
 
 
 def share_of_sum(f: Figures, group: str) -> tuple[str, str]:
-    """Returns the least and the greatest ratio of two times: forward dynamics with the faster factor of M, and ABA."""
+    """Returns the least and the greatest ratio of two times: forward dynamics with the faster factorisation of the
+    inertia matrix, and ABA."""
     ratios = [
         min(ways["Dense"], ways["Sparse"]) / ways["ArticulatedBody"]
         for name, ways in f.medians("factorisation").items()

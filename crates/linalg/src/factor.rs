@@ -138,7 +138,7 @@ compiled! {
                 upper[i * ldu + j] = h[j * stride + i];
             }
         }
-        // Solves from the last column to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
+        // Solves for X from the last column to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
         let mut block = m.div_ceil(COLUMNS);
         while block > 0 {
             block -= 1;

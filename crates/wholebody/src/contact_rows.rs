@@ -11,7 +11,7 @@ use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
 use nalgebra::DMatrix;
 
 /// Contact and its quantities at the current state. The rows of its Jacobian refer to the contact's centre and the
-/// contact's axes (t₁, t₂, n).
+/// contact's axes: t₁ and t₂ are tangential, n is normal.
 pub(crate) struct ContactRows {
     pub description: FrictionContact,
     pub geometry: Geometry,

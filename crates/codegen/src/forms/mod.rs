@@ -160,7 +160,8 @@ struct Inverse<S> {
 }
 
 impl<S: Scalar> Inverse<S> {
-    /// Computes the inverse of M. Returns `None` if, for this model, the library's algorithm computes M⁻¹ without M.
+    /// Computes the inverse of the inertia matrix M. Returns `None` if, for this model, the library's algorithm
+    /// computes M⁻¹ without M.
     fn of<R>(model: &Model<R>, M: impl FnOnce() -> DMatrix<S>) -> Option<Self> {
         model.check_regular();
         let (mut factor, mut Minv) = (Ltdl::new(model), zeros(model));

@@ -98,7 +98,8 @@ impl Solid {
         for t in &triangles {
             let t = corners(t, centroid);
             let v = part(t);
-            // Adds the centre of mass of a pyramid, relative to its tip. MuJoCo uses the same point for a triangle.
+            // Adds the centre of mass of a pyramid, relative to its tip. For a triangle of a shell, MuJoCo uses the
+            // same point as for a pyramid.
             (volume, com) = (volume + v, com + (t[0] + t[1] + t[2]).scale(v / 4.0));
         }
         if volume < LEAST {

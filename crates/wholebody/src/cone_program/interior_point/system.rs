@@ -15,12 +15,13 @@ use condyle_linalg::{
     transposed_product_vector,
 };
 
-/// Regularisation added to diagonal entries of H. These entries have size one for costs of size one. Iterative
-/// refinement removes the effect of the regularisation.
+/// Regularisation added to diagonal entries of the matrix H of the linear system. These entries have size one for costs
+/// of size one. Iterative refinement removes the effect of the regularisation.
 const REGULARISATION: f64 = 1e-13;
 /// Regularisation relative to the diagonal entry, as large as a few rounding errors of a factorisation.
 const RELATIVE_REGULARISATION: f64 = 1e-15;
-/// Regularisation added to diagonal entries of X Xᵀ. These entries have size one for costs of size one.
+/// Regularisation added to diagonal entries of the Schur complement X Xᵀ of the equalities. These entries have size one
+/// for costs of size one.
 const DUAL_REGULARISATION: f64 = 1e-13;
 /// Factor by which the regularisation grows after a pivot that was not positive.
 const GROWTH: f64 = 1e3;
