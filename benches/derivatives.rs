@@ -2,12 +2,14 @@
 //! differences: `cargo bench -p condyle-benches --bench derivatives`.
 //!
 //! The throughput is the number of pairs per time. A pair consists of a joint and one of its ancestors, or of a joint
-//! and itself. The number of pairs is n · depth, where depth is the mean number of joints on the path to the world. If
-//! the throughput is constant, the cost grows as O(n · depth).
+//! and itself. The number of pairs is n · depth, where n is the number of joints, and depth is the mean number of
+//! joints on the path to the world. If the throughput is constant, the cost grows as O(n · depth).
 //!
-//! Results for n = 8, 32 and 128 on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`. A cell has the times of
-//! analytic derivatives (µs), and in brackets the times per pair (ns). Then follow the ranges of two ratios to these
-//! times: for dual numbers, and for central differences.
+//! The table has results for n = 8, 32 and 128 on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`. The rows ∂τ and
+//! ∂q̈ are first derivatives of efforts and accelerations; the rows λᵀ∂² are second derivatives of a sum with the
+//! weights λ. A cell has the times of analytic derivatives (µs), and in brackets the times per pair (ns). Two ranges
+//! over n follow: the time with dual numbers, and the time with central differences, each divided by the time of
+//! analytic derivatives.
 //!
 //! | | shape | n = 8, 32, 128 |
 //! | --- | --- | --- |
@@ -54,7 +56,7 @@ fn pairs(model: &Model) -> u64 {
     depth.iter().sum()
 }
 
-/// State (q, v), a vector x that serves as a or τ, and the weights λ of the second derivatives.
+/// State (q, v), a vector x that serves as acceleration a or effort τ, and the weights λ of the second derivatives.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,

@@ -1,8 +1,8 @@
 //! Finds the minimum number of bodies for which divide and conquer is faster than ABA, on one thread and on two
 //! threads: `cargo bench -p condyle-benches --bench divide_conquer`.
 //!
-//! `docs/lanes.md` has the table for a tree that is cut into pieces of n/2 bodies. If the tree is cut into pieces of
-//! one body each, divide and conquer takes 8 times as long as ABA on one thread.
+//! `docs/lanes.md` has the table for a tree of n bodies that is cut into two halves. If the tree is cut at every joint,
+//! divide and conquer takes 8 times as long as ABA on one thread.
 
 use condyle::{Data, aba, divide_conquer::DivideConquer, random_configuration, robots};
 use condyle_benches::tree;

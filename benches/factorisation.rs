@@ -1,7 +1,7 @@
-//! Finds the fastest method for forward dynamics and for M⁻¹, for several sizes and shapes of a tree: `cargo bench -p
-//! condyle-benches --bench factorisation`. `ForwardDynamicsMethod::fastest` has a rule that follows from these results;
-//! `docs/performance.md` has the table. Computing M⁻¹ from the factor of M is faster than the recursion if the factor's
-//! rows have at most about 12 entries on average.
+//! Finds the fastest method for forward dynamics and for the inverse inertia matrix M⁻¹, for several sizes and shapes
+//! of a tree: `cargo bench -p condyle-benches --bench factorisation`. `ForwardDynamicsMethod::fastest` has a rule that
+//! follows from these results; `docs/performance.md` has the table. Computing M⁻¹ from the factor of M is faster than
+//! the recursion if the factor's rows have at most about 12 entries on average.
 #![allow(non_snake_case)]
 
 use condyle::{

@@ -150,8 +150,8 @@ def us(ns: float) -> str:
 
 
 def ways_table(figures: Figures) -> str:
-    """Returns the table of forward dynamics by three methods. The table also has the times to factorise M and to
-    compute M⁻¹."""
+    """Returns the table of forward dynamics by three methods. The table also has the times to factorise the inertia
+    matrix M and to compute M⁻¹."""
     groups = figures.medians("factorisation")
     names = [group.partition("/")[2] for group in groups if group.startswith("forward dynamics/")]
     order = ["arm7", "quadruped", "humanoid"]
@@ -300,7 +300,8 @@ def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
 
 
 def share_of_sum(f: Figures, group: str) -> tuple[str, str]:
-    """Returns the least and the greatest ratio of two times: forward dynamics with the faster factor of M, and ABA."""
+    """Returns the least and the greatest ratio of two times: forward dynamics with the faster factorisation of the
+    inertia matrix, and ABA."""
     ratios = [
         min(ways["Dense"], ways["Sparse"]) / ways["ArticulatedBody"]
         for name, ways in f.medians("factorisation").items()

@@ -1,8 +1,8 @@
 //! Times several standing quadrupeds in one model, compared with a model of one quadruped: `cargo bench -p
 //! condyle-benches --bench islands`, in µs per robot. A second table has the times for the same robots as separate
-//! models, on one thread or on several threads. This table shows how much time solving islands in parallel could save
-//! at most. `islands.py` runs this program under callgrind and prints the instructions of each function. callgrind
-//! identifies functions by name.
+//! models, on one thread or on several threads. This table shows how much time one model could save at most if the
+//! robots in it were computed in parallel. `islands.py` runs this program under callgrind and prints the instructions
+//! of each function. callgrind identifies functions by name.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,

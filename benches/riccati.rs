@@ -1,18 +1,27 @@
 //! Times the backward sweep per knot, with and without use of the structure of Euler steps: `cargo bench -p
 //! condyle-benches --bench riccati`.
 //!
-//! The figures are times in µs per knot on a Xeon at 2.5 GHz with the default build. Each time is from the shortest of
-//! many sweeps of 50 knots, for (ndx, nu) = (76, 32) / (36, 12) / (18, 9) / (14, 7). With AVX-512, a knot takes 46 /
-//! 8.4 / 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7 / 1.6 with dense matrices. With AVX2, it takes 63 / 9.1 / 2.7
-//! / 1.7, or 106 / 11 / 2.9 / 1.8 with dense matrices. At the baseline level, it takes 133 / 15 / 3.7 / 2.3, or 222 /
-//! 22 / 4.9 / 2.7 with dense matrices. The sweep uses the structure if ndx is at least 16. The 46 µs consist of the
-//! three products (36 %, at 57 GFLOP/s), factor and gains (24 %), waiting for 200 KB per knot (10 %), and copies and
-//! transposes.
+//! The table has times in µs per knot on a Xeon at 2.5 GHz with the default build. Each time is from the shortest of
+//! many sweeps of 50 knots. A column is a pair of sizes: ndx numbers of the state's tangent vector, and nu controls.
 //!
-//! In a sweep in segments, some knots take longer than the 46 / 8.1 / 1.6 µs of a usual knot (on one thread). A knot
-//! takes 1.4 / 1.3 / 1.0 times as long if the value function after its segment is unknown. A link between two segments
-//! takes 1.9 / 1.7 / 1.35 times as long. The figures of `Sweep::set_segments` follow from these ratios. The benchmark
-//! group `segments` has the times of whole sweeps, on one thread and on all threads.
+//! | level | matrices | (76, 32) | (36, 12) | (18, 9) | (14, 7) |
+//! | --- | --- | --- | --- | --- | --- |
+//! | AVX-512 | with the structure | 46 | 8.4 | 2.6 | 1.7 |
+//! | AVX-512 | dense | 65 | 9.1 | 2.7 | 1.6 |
+//! | AVX2 | with the structure | 63 | 9.1 | 2.7 | 1.7 |
+//! | AVX2 | dense | 106 | 11 | 2.9 | 1.8 |
+//! | baseline | with the structure | 133 | 15 | 3.7 | 2.3 |
+//! | baseline | dense | 222 | 22 | 4.9 | 2.7 |
+//!
+//! The sweep uses the structure if ndx is at least 16. The 46 µs of the first entry consist of three matrix products
+//! (36 %, at 57 GFLOP/s), factor and gains (24 %), and waiting for 200 KB of memory per knot (10 %). Copies and
+//! transposes take the rest.
+//!
+//! In a sweep in segments, some knots take longer than a usual knot, which takes 46, 8.1 and 1.6 µs on one thread for
+//! ndx = 76, 36 and 14. If the value function after its segment is unknown, a knot takes 1.4, 1.3 and 1.0 times as long
+//! as a usual knot. A link between two segments takes 1.9, 1.7 and 1.35 times as long as a usual knot. The figures of
+//! `Sweep::set_segments` follow from these ratios. The benchmark group `segments` has the times of whole sweeps, on one
+//! thread and on all threads.
 #![allow(non_snake_case)]
 
 use condyle::optimal::{LqKnot, Sweep};

@@ -1,8 +1,8 @@
 //! Measures the energy error of each integrator in motions of 10 s without motors and friction. One robot is a double
 //! pendulum that swings chaotically. The other is a humanoid that falls and tumbles with loose joints.
 //!
-//! The example prints a table and draws |E(t) − E(0)|. Each point of a curve is the greatest value in a hundredth of
-//! the time.
+//! The example prints a table and draws the energy error |E(t) − E(0)|. Each point of a curve is the greatest value in
+//! a hundredth of the time.
 //!
 //! The humanoid is difficult. Its wrists are light and loose, and sometimes come near the position in which yaw and
 //! roll have the same axis. Near this position, joint speeds change abruptly. Euler's method uses the Coriolis forces
@@ -57,13 +57,13 @@ fn humanoid() -> System {
 
 /// Energy error of an integrator over time.
 struct Drift {
-    /// E(0) (J).
+    /// Energy at the start, E(0) (J).
     start: f64,
     /// Greatest kinetic energy (J).
     kinetic: f64,
-    /// Greatest |E(t) − E(0)| in each hundredth of the time (J).
+    /// Greatest energy error |E(t) − E(0)| in each hundredth of the time (J).
     errors: Vec<f64>,
-    /// E(10 s) − E(0) (J).
+    /// Energy error at the end, E(10 s) − E(0) (J).
     end: f64,
 }
 
@@ -96,7 +96,7 @@ fn drift(system: &System, integrator: Integrator, dt: f64) -> Result<Drift, Stat
     Ok(drift)
 }
 
-/// Figure with one panel for each system, which shows |E(t) − E(0)| on a logarithmic axis.
+/// Figure with one panel for each system, which shows the energy error |E(t) − E(0)| on a logarithmic axis.
 struct Figure {
     svg: String,
     panels: usize,

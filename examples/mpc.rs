@@ -2,10 +2,10 @@
 //!
 //! `cargo run --release --example mpc`
 //!
-//! Every 10 ms the loop reads the state x and applies the control u + K (x ⊖ x̄) of the last plan. Then it shifts the
-//! horizon by a knot, and improves the plan by one iteration within 5 ms. The example prints the error of the tool and
-//! the timing of the loop. If an iteration takes longer than 5 ms, the solve ends after this iteration and reports the
-//! overrun. The next solve has its whole time budget again.
+//! Every 10 ms the loop reads the state x and applies the control u + K (x ⊖ x̄), with the control u, the gains K and
+//! the state x̄ of the last plan. Then it shifts the horizon by a knot, and improves the plan by one iteration within 5
+//! ms. The example prints the error of the tool and the timing of the loop. If an iteration takes longer than 5 ms, the
+//! solve ends after this iteration and reports the overrun. The next solve has its whole time budget again.
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};

@@ -7,7 +7,8 @@
 
 use condyle::{Data, Error, Model, Scalar, Vec3, forward_kinematics, hessian, integrate, robots, terms::gravity};
 
-/// Computes ½ (|p(q) − target|² + 1e-4 |g(q)|² + 1e-2 |q − q₀|²), with terms in m², (N m)² and rad².
+/// Computes ½ (|p(q) − target|² + 1e-4 |g(q)|² + 1e-2 |q − q₀|²), with terms in m², (N m)² and rad². p is the tool's
+/// position, and g are the efforts that gravity requires.
 fn cost<S: Scalar>(arm: &Model, data: &mut Data<S>, tool: usize, q: &[S]) -> S {
     let off = forward_kinematics(arm, data, q).frame(tool).translation - Vec3::new(0.4, 0.3, 0.4).lift();
     let efforts = gravity(arm, data, q).iter().fold(S::zero(), |sum, &g| g.mul_add(g, sum));

@@ -12,8 +12,8 @@ functions. It also prints the iterations, the cost, and the time to build the ex
 CasADi's own virtual machine, as pinocchio.casadi's expressions do.
 
 The time outside of the functions belongs to IPOPT and its linear solver, and does not depend on the source of the
-functions. So faster functions cannot reduce this time. For an arm of two links (`swing_up`), it is 0.42 of the whole
-time with expressions.
+functions. So faster functions cannot reduce this time. For an arm of two links (`swing_up`), this time is 0.42 of the
+time of a solve with expressions.
 """
 
 import argparse

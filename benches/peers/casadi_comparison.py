@@ -3,9 +3,9 @@
 
     .venv/pinocchio/bin/python benches/peers/casadi_comparison.py [FILE.json] [--quick]
 
-The functions are RNEA and ABA, their Jacobian, and the Hessian of λᵀf, for the embedded robots. Each function is timed
-in three forms: Condyle's call from Python, Condyle's function in CasADi, and the same recursion written as CasADi
-expressions.
+The functions are RNEA and ABA, their Jacobian, and the Hessian of λᵀf (a sum of the results f with the weights λ), for
+the built-in robots. Each function is timed in three forms: Condyle's call from Python, Condyle's function in CasADi,
+and the same recursion written as CasADi expressions.
 
 In the motion, an arm goes to a point and comes to rest there. FDDP solves the problem directly. IPOPT solves it by
 multiple shooting with exact Hessians, once with Condyle's ABA and once with an ABA of expressions. All three solutions

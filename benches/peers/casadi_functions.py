@@ -4,10 +4,10 @@ expressions.
 
     .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
-Without a URDF, the robots are the embedded arm and humanoid. For RNEA and ABA, the program prints times in microseconds
+Without a URDF, the robots are the built-in arm and humanoid. For RNEA and ABA, the program prints times in microseconds
 and the speed-up by condyle.casadi. It prints these for the function, for its Jacobian with respect to all arguments,
-and for the Hessian of λᵀf. Times are medians of alternating rounds on one core. The expressions run in CasADi's own
-virtual machine, as pinocchio.casadi's expressions do.
+and for the Hessian of λᵀf, a sum of the results f with the weights λ. Times are medians of alternating rounds on one
+core. The expressions run in CasADi's own virtual machine, as pinocchio.casadi's expressions do.
 """
 
 import argparse
@@ -28,7 +28,8 @@ SECONDS = 0.02  # duration of each round
 
 
 def derived(f: casadi.Function) -> dict[str, casadi.Function]:
-    """Returns the function, its Jacobian, and the blocks of the Hessian of λᵀf that an optimisation needs."""
+    """Returns the function, its Jacobian, and the blocks of the Hessian of λᵀf that an optimisation needs. λᵀf is a sum
+    of the results f with the weights λ."""
     return {"value": f, "Jacobian": f.jacobian(), "Hessian": f.reverse(1).jacobian()}
 
 

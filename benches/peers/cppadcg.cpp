@@ -48,7 +48,8 @@ void part1(const Task &), part2(const Task &), part3(const Task &);
 
 static double seconds(Clock::time_point since) { return std::chrono::duration<double>(Clock::now() - since).count(); }
 
-// Algorithm to be recorded and timed. Its arguments are q, v, and a or τ. It writes its results one after the other.
+// Algorithm to be recorded and timed. Its arguments are the position q, the velocity v, and the acceleration a or the
+// effort τ. It writes its results one after the other.
 using Algorithm = std::function<void(const Model &, Data &, const Vector &, const Vector &, const Vector &, Vector &)>;
 static void measure(const Task &task, const char *name, int outputs, bool takes_tau, const Algorithm &algorithm) {
   const auto start = Clock::now();

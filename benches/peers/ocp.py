@@ -8,9 +8,10 @@ problems whose subfolder `robots` contains the robots. The program compares the 
 cost), the step lengths, the regularisations, and the optimum. The stopping value is printed but not compared, because
 it has few correct digits near the optimum. Both solvers are timed in turn, round after round, on one core. Each timed
 solve follows the same untimed solve, as in a control loop that solves repeatedly. Times are medians of milliseconds per
-iteration, for the whole solve and for its phases. With --converted, `condyle.crocoddyl` converts Crocoddyl's problem;
-the program then compares the times of the converted problem and of Condyle's own problem from the JSON, instead of
-Crocoddyl's times. The program needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which `./test` makes.
+iteration, for the whole solve and for its phases: derivatives, backward sweep and rollout. With --converted,
+`condyle.crocoddyl` converts Crocoddyl's problem; the program then compares the times of the converted problem and of
+Condyle's own problem from the JSON, instead of Crocoddyl's times. The program needs crocoddyl 3.2.1, pin 4.0.0 and
+condyle in one environment, which `./test` makes.
 """
 
 import argparse

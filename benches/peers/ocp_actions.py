@@ -9,7 +9,8 @@ from condyle import optimal
 
 
 def unicycle(stage):
-    """Returns the running and the terminal action of a unicycle with x = (x, y, θ) and u = (v, ω)."""
+    """Returns the running and the terminal action of a unicycle with x = (x, y, θ) and u = (v, ω): position, heading,
+    speed and turn rate."""
     dt, wx, wu = stage["dt"], stage["w_x"], stage["w_u"]
 
     def calc(t, x, u):
@@ -32,7 +33,8 @@ def unicycle(stage):
 
 
 class Cartpole:
-    """Action of a pole on a cart, with x = (y, θ, ẏ, θ̇) and u = (f). The pole is upright at θ = 0."""
+    """Action of a pole on a cart, with x = (y, θ, ẏ, θ̇) and u = (f): position y of the cart, angle θ of the pole, and
+    force f on the cart. The pole is upright at θ = 0."""
 
     def __init__(self, stage):
         self.m1, self.m2, self.l, self.g = (stage[k] for k in ("m_cart", "m_pole", "length", "g"))
@@ -100,7 +102,8 @@ class DoublePendulum:
         self.dt, self.costs = stage["dt"], stage["costs"]
 
     def goal(self, x, w):
-        """Returns value, gradient and Hessian of ½ Σ w r², r = (sin q, 1 − cos q, v)."""
+        """Returns value, gradient and Hessian of ½ Σ w r² with the weights w and the residual r = (sin q, 1 − cos q,
+        v)."""
         s, c = np.sin(x[:2]), np.cos(x[:2])
         r = np.r_[s, 1.0 - c, x[2:]]
         slope = np.r_[c * (w * r)[:2] + s * (w * r)[2:4], (w * r)[4:]]

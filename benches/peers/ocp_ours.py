@@ -65,8 +65,8 @@ def our_contact(contact, gains):
 
 
 def our_action(stage, model, spec, bounded, terminal=False, others=()):
-    """Returns an action. `others` lists further knots, and the stage of each. These knots use the same action with
-    their own costs."""
+    """Returns an action. `others` lists further knots, each with its stage (the entry of the JSON). These knots use the
+    same action with their own costs."""
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]

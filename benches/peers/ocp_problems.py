@@ -1,9 +1,9 @@
 """Condyle's own optimal control problems, as the JSON that `ocp.py` reads: an arm, a rotorcraft and legged robots.
 
-A problem names its robot and has the keys `x0`, `stage_models`, `stages`, `terminal`, `warm_start` and `solvers`.
-`stages` has the index of each knot's stage, and `terminal` the index of the terminal stage. A stage of kind `euler` has
-a duration, dynamics and costs. A stage of kind `impulse` has the frames that hit the ground, and costs. The robots come
-from the package example-robot-data.
+A problem names its robot and has the keys `x0`, `stage_models`, `stages`, `terminal`, `warm_start` and `solvers`. A
+stage is the action of one or more knots. `stages` has the index of each knot's stage, and `terminal` the index of the
+terminal stage. A stage of kind `euler` has a duration, dynamics and costs. A stage of kind `impulse` has the frames
+that hit the ground, and costs. The robots come from the package example-robot-data.
 """
 
 import math

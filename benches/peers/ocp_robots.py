@@ -33,8 +33,8 @@ def homogeneous(placement):
 
 @dataclass
 class Solve:
-    """Result of a solve: for each iteration a row (cost, step length, regularisation, stopping value), and the time of
-    each phase (s)."""
+    """Result of a solve: for each iteration a row (cost, step length, regularisation, stopping value), and the time (s)
+    of each phase: derivatives, backward sweep, rollout."""
 
     rows: np.ndarray
     cost: float

@@ -5,11 +5,11 @@
 //! ours URDF fixed|free_flyer LOCKED,JOINTS STATES [batch]
 //! ```
 //!
-//! STATES contains q, v, a, τ of one state after the other as doubles. The program prints a line for each algorithm:
-//! its name and the median time of a call in ns. The derivatives of `rnea` are also timed by dual numbers and by
-//! central differences. Lines with `batch:` have the time per state of a batch. Lines with `horizon:` have the time for
-//! N knots of `aba`, the derivatives of `aba`, and `rnea`. With the argument `batch`, the program times only batches,
-//! and prints the least time instead of the median (see `python.py`).
+//! STATES is a file with q, v, a, τ of one state after the other, as 64-bit floating-point numbers. The program prints
+//! a line for each algorithm: its name and the median time of a call in ns. The derivatives of `rnea` are also timed by
+//! dual numbers and by central differences. Lines with `batch:` have the time per state of a batch. Lines with
+//! `horizon:` have the time for N knots of `aba`, the derivatives of `aba`, and `rnea`. With the argument `batch`, the
+//! program times only batches, and prints the least time instead of the median (see `python.py`).
 
 use condyle::{
     Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba,

@@ -2,10 +2,10 @@
 //
 //     pinocchio MODEL STATES
 //
-// MODEL is an archive written by Pinocchio's Python package. STATES contains q, v, a, τ of one state after the other as
-// doubles. The program prints a line for each algorithm: its name and the median time of a call in ns. If Pinocchio
-// offers an algorithm in two conventions, the program prints the time of the faster convention. The file is compiled
-// once for each PART, because a single translation unit would take too much memory.
+// MODEL is an archive written by Pinocchio's Python package. STATES is a file with q, v, a, τ of one state after the
+// other, as 64-bit floating-point numbers. The program prints a line for each algorithm: its name and the median time
+// of a call in ns. If Pinocchio offers an algorithm in two conventions, the program prints the time of the faster
+// convention. The file is compiled once for each PART, because a single translation unit would take too much memory.
 #include <pinocchio/multibody.hpp>
 #if PART == 0
 #include <pinocchio/serialization.hpp>

@@ -171,8 +171,9 @@ fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
 }
 
 /// Writes the programs of consecutive ticks with pyramids, in both forms, and Condyle's optimum. Sizes are written as
-/// JSON, one line for each tick. The other numbers are doubles: P, c, A, b, G, l, u of the full form, then the same
-/// arrays of the condensed form, then Condyle's solutions in both forms. Matrices are stored column by column.
+/// JSON, one line for each tick. The other numbers are stored as 64-bit floating-point numbers: P, c, A, b, G, l, u of
+/// the full form, then the same arrays of the condensed form, then Condyle's solutions in both forms. Matrices are
+/// stored column by column.
 fn export(robot: &Robot, motion: &str, ticks: &[Tick], folder: &Path) -> Result<(), Box<dyn Error>> {
     let settings = Settings { friction: PYRAMID, ..Robot::settings() };
     let mut controller = robot.controller(settings);

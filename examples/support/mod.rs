@@ -112,8 +112,8 @@ impl Gait {
         costs
     }
 
-    /// Adds knots with the feet `support` on the ground. Knot k has the costs `costs(k)`. All knots of the phase share
-    /// one action model.
+    /// Adds knots with the feet `support` on the ground. Knot k has the costs `costs(k)`. All these knots share one
+    /// action model.
     fn phase(
         &mut self,
         support: &[usize],

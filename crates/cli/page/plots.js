@@ -63,7 +63,7 @@ function makePlots(data, on) {
     const scaleOf = (joint) => (inShares || joint.unit === joints[0].unit ? "y" : "y2");
     const inScale = (key) => joints.map((joint, j) => j).filter((j) => scaleOf(joints[j]) === key);
 
-    // The range covers all shown curves, and their limits unless these would flatten the curves.
+    // The range covers all shown curves, and also their limits, unless the limits would flatten the curves.
     function range(key) {
       let low = Infinity, high = -Infinity;
       const take = (y) => { if (y != null) { low = Math.min(low, y); high = Math.max(high, y); } };

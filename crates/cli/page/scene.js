@@ -1,5 +1,5 @@
 "use strict";
-// 3-D playback. The world frame is the one of the data: metres, z up.
+// 3-D playback. The world frame is the frame of the data: lengths in metres, z up.
 
 /** Draws `data.scene` into `host`. Returns the functions that the player calls. Throws if the browser has no WebGL. */
 function makeScene(data, host) {
@@ -109,7 +109,8 @@ function makeScene(data, host) {
     scene.add(tip);
   }
 
-  // --- feet: the path of each, and an arrow for its contact force; the robot's weight is drawn a third of the scene's size long
+  // --- feet: the path of each foot, and an arrow for its contact force; an arrow as long as a third of the scene is
+  // the robot's weight
   const contacts = data.contacts;
   const arrows = (contacts?.trails ?? []).map((way) => {
     const geometry = new THREE.LineGeometry().setPositions(way.flat());

@@ -78,7 +78,7 @@ pub(crate) fn text(findings: &[Finding], source: &str) -> String {
 }
 
 /// Minimum ratio between the masses, or moments of inertia, of a body and its parent. A larger ratio is reported. Its
-/// cause can be a wrong unit, or a light tip, which makes M ill-conditioned.
+/// cause can be a wrong unit, or a light tip, which makes the inertia matrix ill-conditioned.
 const APART: f64 = 1e3;
 /// Excess over a limit that counts as a rounding error.
 const ROUNDING: f64 = 1e-9;

@@ -211,7 +211,7 @@ impl Gait {
         Ok(())
     }
 
-    /// Adds the knots of a phase.
+    /// Adds the knots of a phase of the gait.
     pub(crate) fn add(&mut self, phase: &Phase, next: Option<&Phase>) -> Result<(), Error> {
         let all: Vec<usize> = (0..self.feet.len()).collect();
         let swinging = match &phase.kind {

@@ -35,8 +35,8 @@ pub(crate) struct Plan {
     pub dt: f64,
     pub budget_ms: f64,
     pub solution: Solution,
-    /// Expected decrease of the cost, relative to the cost. The value is `None` unless the limits hold, the cost can
-    /// hardly decrease, and the solver did not reach its own tolerance.
+    /// Expected decrease of the cost, relative to the cost. The value exists only if three conditions hold: the limits
+    /// hold, the cost can hardly decrease, and the solver did not reach its own tolerance.
     pub settled: Option<f64>,
     /// Iterations of all solves.
     pub trace: Vec<Iteration>,

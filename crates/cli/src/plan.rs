@@ -360,8 +360,8 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
 
 /// Solves a problem with limits as constraints, starting from a solution that exceeds the limits.
 ///
-/// The second result is the expected decrease of the cost, relative to the cost. It is `None` unless the limits hold,
-/// the cost can hardly decrease, and the solver did not reach its own tolerance.
+/// The second result is the expected decrease of the cost, relative to the cost. It exists only if three conditions
+/// hold: the limits hold, the cost can hardly decrease, and the solver did not reach its own tolerance.
 fn hold(
     arguments: &Arguments,
     plan: &Plan,

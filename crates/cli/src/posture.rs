@@ -17,8 +17,8 @@ const REACHED: f64 = 1e-4;
 /// target. If several postures reach the target, returns the posture nearest to `q0`. If no posture reaches the target,
 /// returns the posture with the smallest distance.
 ///
-/// The method is damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), with coordinates clamped to their limits
-/// (Nakamura and Hanafusa 1986).
+/// The method is damped least squares (Nakamura and Hanafusa 1986): q becomes q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), with
+/// the frame's position p, its Jacobian J and the damping λ. Coordinates are clamped to their limits.
 pub(crate) fn reaching(model: &Model, frame: usize, target: Vec3<f64>, q0: &[f64]) -> (Vec<f64>, f64) {
     let mut data = Data::new(model);
     let mut rng = StdRng::seed_from_u64(0);

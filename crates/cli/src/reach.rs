@@ -61,7 +61,8 @@ pub(crate) fn problem(
         Cost::new("stop", 1e0, state(), moving(1.0)),
         Cost::new("limits", 1e2, state(), within()),
     ];
-    // Compute the straight path with minimum jerk, q0 ⊕ s(t) way, with s = 10 r³ − 15 r⁴ + 6 r⁵ and r = t/T.
+    // Compute the straight path with minimum jerk, q0 ⊕ s(t) way, with s = 10 r³ − 15 r⁴ + 6 r⁵ and r = t/T. T is the
+    // duration, and `way` is the tangent vector from q0 to the final posture.
     let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
     difference(model, q0, q_end, &mut way);
     let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();

@@ -120,7 +120,7 @@ impl Place {
     }
 }
 
-/// Maximum number of knots of a phase.
+/// Maximum number of knots of a phase of a gait.
 const MOST_KNOTS: u32 = 100_000;
 /// Maximum size of a task file in bytes.
 const LARGEST: u64 = 1 << 20;
@@ -251,7 +251,7 @@ pub(crate) fn parse(text: &str, file: &str) -> Result<Task, Error> {
     })
 }
 
-/// Checks a phase from the file, and converts it.
+/// Checks a phase of a gait from the file, and converts it.
 fn phase(from: &PhaseFile, feet: &[String], wrong: &dyn Fn(usize, String) -> Error) -> Result<Phase, Error> {
     let PhaseFile { kind, knots, length, side, height, .. } = from;
     if !(1..=MOST_KNOTS).contains(knots.get_ref()) {

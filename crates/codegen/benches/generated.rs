@@ -2,7 +2,7 @@
 //! compares the time per state of two variants: generated code for vectors of eight states, and a batch of the library.
 //!
 //! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free` reads these files. Without files,
-//! the benchmark uses the embedded robots. The environment variable `CC` names the compiler, and `CFLAGS` contains the
+//! the benchmark uses the built-in robots. The environment variable `CC` names the compiler, and `CFLAGS` contains the
 //! compiler's flags.
 
 use condyle_codegen::{Function, Language, Settings, functions};

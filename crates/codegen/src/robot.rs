@@ -120,8 +120,8 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
             match name {
                 _ if is_constrained => return robot.constrained(r, name),
                 "frames" => robot.frames(r, &frames),
-                // Keep the world's frame here: in second derivatives of accelerations, M⁻¹ would amplify the rounding
-                // errors of another frame beyond the tolerance of the tests.
+                // Keep the world's frame here: in second derivatives of accelerations, the inverse inertia matrix M⁻¹
+                // would amplify the rounding errors of another frame beyond the tolerance of the tests.
                 "centroidal" | "aba_hessian" => robot.unconstrained(r, name),
                 _ => {
                     robot.in_frame_of_first_body()?;

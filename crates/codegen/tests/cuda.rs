@@ -23,8 +23,8 @@ use std::process::Command;
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use trees::Tree;
 
-/// Tolerance, relative to the largest number of an array. A kernel adds in another order than the library, and M⁻¹
-/// amplifies the rounding errors.
+/// Tolerance, relative to the largest number of an array. A kernel adds in another order than the library, and the
+/// inverse inertia matrix M⁻¹ amplifies the rounding errors.
 const ROUNDING: f64 = 1e-11;
 
 /// Maximum error of an `f32` kernel, divided by the error of the library in `f32` for the same states. Both errors are
@@ -387,8 +387,8 @@ fn blocks_keep_every_multiprocessor_busy() {
         check(&device, &kernels, &arm, "rnea", &[n]);
         assert_eq!(fake.launches().0, [blocks, threads, 1], "{n} states");
     }
-    // With partitions, a launch has several rows of blocks. Each row occupies multiprocessors, so the blocks are
-    // larger.
+    // A function with partitions is launched with one row of blocks for each partition. The rows share the
+    // multiprocessors, so each row gets fewer and larger blocks.
     let quadruped = robots::quadruped();
     let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_partitions(&quadruped, &["rnea"], 4)).unwrap();
     for (n, [blocks, threads]) in [(1, [1, 32]), (30, [1, 32]), (100, [1, 128]), (129, [1, 160]), (3000, [12, 256])] {

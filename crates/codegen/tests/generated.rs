@@ -27,10 +27,11 @@ const ROUNDING: f64 = 1e-12;
 /// Coefficient of restitution in impacts.
 const RESTITUTION: f64 = 0.3;
 
-/// Tolerance for results that use M⁻¹ or Λ: a large condition number amplifies rounding errors.
+/// Tolerance for results that use the inverse inertia matrix M⁻¹ or the inertia Λ of the contacts: their large
+/// condition numbers amplify rounding errors.
 const THROUGH_INVERSE: f64 = 1e-11;
 
-/// Returns the tolerance for random trees, where M may have a large condition number.
+/// Returns the tolerance for random trees, whose inertia matrix may have a large condition number.
 fn bound_of_trees(name: &str) -> f64 {
     if bound(name) == ROUNDING { ROUNDING } else { 1e-9 }
 }
@@ -48,7 +49,8 @@ fn all_robots() -> [(&'static str, Model, Settings); 3] {
     [("arm", arm, a), ("quadruped", quadruped, q), ("humanoid", humanoid, h)]
 }
 
-/// Returns random q and v, random numbers that serve as a or τ, and random numbers that serve as λ.
+/// Returns four random vectors: positions q, velocities v, numbers that serve as accelerations a or efforts τ, and
+/// numbers that serve as weights λ of second derivatives.
 fn state(model: &Model, rng: &mut StdRng) -> [Vec<f64>; 4] {
     let mut numbers = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
     let [v, x, lambda] = [(); 3].map(|()| numbers(model.nv()));

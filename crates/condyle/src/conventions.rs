@@ -69,14 +69,14 @@ impl MuJoCo {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Converts Condyle's q and v to MuJoCo's qvel: the origin's velocity, rotated by R to the world's axes, then ω
-    /// along the body's axes.
+    /// Converts Condyle's q and v to MuJoCo's qvel: the origin's velocity, rotated to the world's axes, then the
+    /// angular velocity along the body's axes.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         joined(rotation(q) * vec3(&v[..3]), vec3(&v[3..]))
     }
 
-    /// Converts MuJoCo's qpos and qvel to Condyle's v: the origin's velocity ṗ, rotated by Rᵀ to the body's axes, then
-    /// ω.
+    /// Converts MuJoCo's qpos and qvel to Condyle's v: the origin's velocity, rotated to the body's axes, then the
+    /// angular velocity.
     pub fn velocity_from(qpos: &[f64; 7], qvel: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(qpos));
         joined(R.transpose() * vec3(&qvel[..3]), vec3(&qvel[3..]))
@@ -107,15 +107,15 @@ impl Drake {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Converts Condyle's q and v to Drake's v: the angular velocity, then the origin's velocity, both rotated by R to
-    /// the world's axes.
+    /// Converts Condyle's q and v to Drake's v: the angular velocity, then the origin's velocity, both rotated to the
+    /// world's axes.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(q);
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))
     }
 
-    /// Converts Drake's q and v to Condyle's v: the origin's velocity, then the angular velocity, both rotated by Rᵀ to
-    /// the body's axes.
+    /// Converts Drake's q and v to Condyle's v: the origin's velocity, then the angular velocity, both rotated to the
+    /// body's axes.
     pub fn velocity_from(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(q)).transpose();
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))

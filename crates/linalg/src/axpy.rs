@@ -10,8 +10,8 @@ pub fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// Computes Σ xₖ yₖ as four independent partial sums, so that the four additions of a step are independent of each
-/// other.
+/// Computes Σ xₖ yₖ as four partial sums. The four additions of a loop step do not depend on each other, so the
+/// processor can execute them at the same time.
 #[inline(always)]
 pub fn dot<S: Scalar>(x: &[S], y: &[S]) -> S {
     let n = x.len();

@@ -73,7 +73,7 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Cholesky<S> {
-    /// L, in the lower triangle. Shape: n × n. Written by: `factorize`.
+    /// Factor L, in the lower triangle. Shape: n × n for a matrix of n rows. Written by: `factorize`.
     L: Matrix<S>,
 }
 
@@ -123,7 +123,7 @@ impl<S: Scalar> Cholesky<S> {
         factorize(self.L.as_mut_slice(), n, go_on)
     }
 
-    /// Solves M x = b in place, in O(n²).
+    /// Solves M x = b in place for the factorized n × n matrix M, in O(n²).
     ///
     /// b: n numbers, overwritten with x. Allocates nothing.
     ///
@@ -136,7 +136,7 @@ impl<S: Scalar> Cholesky<S> {
         solve(self.L.as_slice(), b);
     }
 
-    /// Solves M X = B in place, column by column, each in O(n²).
+    /// Solves M X = B in place for the factorized n × n matrix M, column by column, each in O(n²).
     ///
     /// B: n rows, any number of columns, overwritten with X. Allocates nothing.
     ///
@@ -151,7 +151,7 @@ impl<S: Scalar> Cholesky<S> {
         }
     }
 
-    /// Computes X = M⁻¹, the full symmetric matrix, in O(n³).
+    /// Computes X = M⁻¹ for the factorized n × n matrix M, in O(n³). X is the full symmetric matrix.
     ///
     /// X: n × n, overwritten. Allocates nothing.
     ///

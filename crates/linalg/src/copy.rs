@@ -37,8 +37,8 @@ compiled! {
 
     /// Writes to OUT the symmetric matrix of `size` rows whose lower triangle is in A.
     pub fn copy_symmetric<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
-        // Transposes the lower triangle into the upper one, a block of columns at a time. Entries above the diagonal of
-        // A are transposed, too; `lower` then overwrites them in OUT.
+        // Transposes the lower triangle of A into the upper triangle of OUT, a block of columns at a time. Entries
+        // above the diagonal of A are transposed, too, into the lower triangle of OUT, which `lower` then overwrites.
         let (width, mut j) = (V::N.min(size), 0);
         while j < size {
             let from = j.min(size - width);
@@ -94,7 +94,7 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
     }
 }
 
-/// Copies a register from offset `from` in `x` to offset `at` in `to`.
+/// Copies a register of N numbers from offset `from` in `x` to offset `at` in `to`.
 ///
 /// # Safety
 /// `to` has N numbers from offset `at` on, and `x` has N numbers from offset `from` on.
@@ -105,8 +105,8 @@ unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: u
     unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
 }
 
-/// Copies the transpose of a block of N rows and columns, or minus the transpose, from offset `from` in `x` to offset
-/// `at` in `to`.
+/// Copies the transpose of a block of N rows and N columns (N numbers fill a register), or minus the transpose, from
+/// offset `from` in `x` to offset `at` in `to`.
 ///
 /// # Safety
 /// Both slices have N numbers in each of N columns: `to` from offset `at` on, `x` from offset `from` on.
@@ -143,7 +143,8 @@ fn next_block<V: Vector>(i: usize, size: usize) -> usize {
     if i + V::N >= size { size } else { (i + V::N).min(size - V::N) }
 }
 
-/// Copies a block of N rows and columns to offset `at[0]` in `to`, and the transpose of the block to offset `at[1]`.
+/// Copies a block of N rows and N columns (N numbers fill a register) to offset `at[0]` in `to`, and the transpose of
+/// the block to offset `at[1]`.
 ///
 /// # Safety
 /// Both offsets meet the conditions of [`move_transposed`].
@@ -157,8 +158,9 @@ unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[
     unsafe { move_transposed::<V, false>(to, at[1], ldo, x, from, ldx) };
 }
 
-/// Implements [`copy_symmetric_turned`]. The lower triangle of A is [VV ·; QV QQ], where V has `split` rows and Q has
-/// `turn` rows. The result is the full matrix [QQ QV; VQ VV] with VQ = QVᵀ.
+/// Implements [`copy_symmetric_turned`]. The lower triangle of A is [VV ·; QV QQ]. The block VV has `split` rows, the
+/// block QQ has `turn` rows, and the dot stands for entries that are not used. The result is the full matrix [QQ QV; VQ
+/// VV] with VQ = QVᵀ.
 #[inline(always)]
 fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [usize; 2]) {
     let (size, View { data: x, stride }) = (split + turn, a);
@@ -182,18 +184,18 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         let (to, from, mut j) = (to * (ldo + 1), from * (stride + 1), 0);
         while j < size {
             let (at, from) = (to + j * (ldo + 1), from + j * (stride + 1));
-            // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
+            // SAFETY: both matrices have `size` columns, each with `size` rows and `V::N` − 1 padding rows.
             unsafe { move_transposed::<V, false>(out, at, ldo, x, from, stride) };
             for k in 0..V::N {
                 // Copies the column from the diagonal down, because the transposed block is valid only above the
                 // diagonal. Numbers after the last row are padding, or are written again later.
-                // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
+                // SAFETY: both matrices have `size` columns, each with `size` rows and `V::N` − 1 padding rows.
                 unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
             let mut i = next_block::<V>(j, size);
             while i < size {
                 let (low, high, from) = (to + j * ldo + i, to + i * ldo + j, from - j + i);
-                // SAFETY: all offsets are in columns with `size` rows and N − 1 padding rows.
+                // SAFETY: all offsets are in columns with `size` rows and `V::N` − 1 padding rows.
                 unsafe { move_both::<V>(out, [low, high], ldo, x, from, stride) };
                 i = next_block::<V>(i, size);
             }
@@ -205,7 +207,7 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         let mut i = 0;
         while i < turn {
             let (from, places) = (j * stride + split + i, [(turn + j) * ldo + i, i * ldo + turn + j]);
-            // SAFETY: all offsets are in columns with `size` rows and N − 1 padding rows.
+            // SAFETY: all offsets are in columns with `size` rows and `V::N` − 1 padding rows.
             unsafe { move_both::<V>(out, places, ldo, x, from, stride) }; // writes the blocks QV and VQ
             i = next_block::<V>(i, turn);
         }

@@ -31,9 +31,9 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         block
     }
 
-    /// Factorizes the block of H that begins in row j0 of `columns`, after subtracting a bᵀ. The product a bᵀ is a sum
-    /// over the j0 columns before the block. S registers hold the COLUMNS rows of a column. The entries above the
-    /// diagonal are overwritten.
+    /// Factorizes the diagonal block of a matrix H that begins in row j0. `columns` are the columns of H from this
+    /// block on. First subtracts the product a bᵀ, where a and b are rows of the j0 columns before the block. A column
+    /// of the block has COLUMNS rows, which fit in S registers. The entries above the diagonal are overwritten.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -73,7 +73,8 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         Ok(())
     }
 
-    /// Computes C ← (C − a bᵀ) L⁻ᵀ on the given rows of C. The product a bᵀ is a sum over `length` columns.
+    /// Computes C ← (C − a bᵀ) L⁻ᵀ on the given rows of C, where L is this block. The product a bᵀ is a sum over
+    /// `length` columns.
     #[inline(always)]
     pub(crate) fn solve_rows<V: Vector>(
         &self,
@@ -96,7 +97,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         }
     }
 
-    /// Computes C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C, from row i on.
+    /// Computes C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C, from row i on, where L is this block.
     #[inline(always)]
     fn solve_strip<V: Vector, const S: usize>(
         &self,

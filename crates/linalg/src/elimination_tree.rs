@@ -48,19 +48,19 @@ pub const NONE: usize = usize::MAX;
 /// first, parents before children.
 #[derive(Clone, Debug)]
 pub struct EliminationTree {
-    /// Row of the matrix that is moved to each position. Length: n.
+    /// Row of the matrix that is moved to each position. Length: the number of rows.
     pub order: Vec<usize>,
     /// Exchanges that move rows to their positions, in the order of execution; empty if each column has its own row.
     pub swaps: Vec<(usize, usize)>,
-    /// Parent of each position on the path to the root, or [`NONE`]. Length: n.
+    /// Parent of each position on the path to the root, or [`NONE`]. Length: the number of rows.
     pub parent: Vec<usize>,
-    /// Depth of each position: the number of steps to the root of its tree. Length: n.
+    /// Depth of each position: the number of steps to the root of its tree. Length: the number of rows.
     pub depth: Vec<usize>,
     /// First position of the run that ends with each position. A run consists of consecutive positions on a path to the
-    /// root. Length: n.
+    /// root. Length: the number of rows.
     pub run: Vec<usize>,
     /// Offset of each row in `Ltdl::rows`, a multiple of the step to which rows are padded. The last entry is the total
-    /// length of the rows. Length: n + 1.
+    /// length of the rows. Length: the number of rows plus 1.
     pub first: Vec<usize>,
 }
 

@@ -10,8 +10,8 @@ compiled! {
     /// Eliminates the first m columns of a symmetric H, whose lower triangle is given. `shape` = [rows, columns, m].
     /// The rows below the square part of H are right-hand sides.
     ///
-    /// H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. A dot stands for entries that
-    /// are not used. H has padding rows.
+    /// H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. The block Hᵤᵤ has m rows and m
+    /// columns. A dot stands for entries that are not used. H has padding rows.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -40,9 +40,9 @@ compiled! {
         Ok(())
     }
 
-    /// Eliminates as [`eliminate`] does, for rows G = [Gᵤ Gₓ] that are not stored below H. H was eliminated before: `h`
-    /// is [L; X], from column 0 on. G becomes [Y Gₓ − Y Xᵀ] with Y = Gᵤ L⁻ᵀ. `shape` = [rows of G, columns, m]. G and H
-    /// have padding rows.
+    /// Eliminates as [`eliminate`] does, for rows G = [Gᵤ Gₓ] that are not stored below H. The first m columns of H
+    /// were eliminated before: `h` is [L; X], from column 0 on. Gᵤ has m columns. G becomes [Y Gₓ − Y Xᵀ] with Y = Gᵤ
+    /// L⁻ᵀ. `shape` = [rows of G, columns, m]. G and H have padding rows.
     pub fn eliminate_rows<V, COLUMNS>(g: &mut [f64], stride: usize, shape: [usize; 3], h: View<'_>) {
         let ([rows, size, m], mut j0) = (shape, 0);
         while j0 < m {
@@ -138,7 +138,7 @@ compiled! {
                 upper[i * ldu + j] = h[j * stride + i];
             }
         }
-        // Solves from the last column to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
+        // Solves for X from the last column to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
         let mut block = m.div_ceil(COLUMNS);
         while block > 0 {
             block -= 1;

@@ -9,8 +9,9 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 /// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
 /// ```
 ///
-/// Only the lower triangle of A is read. For lanes, only this triangle is computed. For single numbers, whole columns
-/// are computed, also column k: a column is one register, and the loop needs no exception for k.
+/// Only the lower triangle of A is read. For scalars with SIMD lanes, only this triangle is computed. For single
+/// numbers, whole columns are computed, including column k. A whole column fits in one register, and the loop needs no
+/// exception for column k.
 #[inline(always)]
 pub fn gauss_jordan<S: Scalar, const MOST: usize>(
     M: &DenseMatrix<S, impl Dense<S>>,

@@ -94,8 +94,8 @@ fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
     panic!("{argument}: expected an index below {count}, the number of {things}, found {found}");
 }
 
-/// Panics with the message of [`check`]. This function is not inlined, because hundreds of functions check several
-/// arguments each, and their code would grow.
+/// Panics with the message of [`check`]. This function is not inlined. Hundreds of functions check several arguments
+/// each, and inlining would enlarge the code of all these functions.
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -12,13 +12,14 @@ use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
 use crate::{check, check_index};
 use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, same_layout};
 
-/// Returns the step. Row lengths are rounded up to a multiple of the step, so that the innermost loop has no remainder.
-/// The content of the padding after a row has no meaning.
+/// Returns the step: row lengths are rounded up to a multiple of this number, so that the innermost loop has no
+/// remainder. The content of the padding after a row has no meaning.
 const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { 4 } else { 1 }
 }
 
-/// Computes y += Σ xₖ sₖ for N vectors x, so that y is loaded and stored once. Lengths are multiples of the step.
+/// Computes y += Σ sₖ xₖ for N vectors xₖ with factors sₖ. Each number of y is loaded and stored only once. All lengths
+/// are multiples of `step`.
 #[inline(always)]
 fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -136,7 +137,7 @@ impl<S: Scalar> Ltdl<S> {
         &self.rows[self.tree.first[k]..][..self.tree.depth[k]]
     }
 
-    /// Returns 1/D, in elimination order.
+    /// Returns the reciprocals of the diagonal entries of D, in elimination order.
     #[doc(hidden)]
     #[inline(always)]
     pub fn inverse_diagonal(&self) -> &[S] {
@@ -169,13 +170,13 @@ impl<S: Scalar> Ltdl<S> {
         core::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
     }
 
-    /// Returns D, in the [`order`](Self::order) of positions.
+    /// Returns the diagonal entries of D, in the [`order`](Self::order) of positions.
     pub fn diagonal(&self) -> impl Iterator<Item = S> {
         self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
     }
 
-    /// Factorizes M = Lᵀ D L, in O(n d²). Reads only the diagonal and the entries below it, in
-    /// the [`order`](Self::order) of positions.
+    /// Factorizes M = Lᵀ D L, in O(n d²) for n = nv and a tree of depth d. Reads only the diagonal and the entries
+    /// below it, in the [`order`](Self::order) of positions.
     ///
     /// M: nv × nv, symmetric, positive definite (as `crba` returns it). If M is not positive definite, at least one
     /// entry of D is not positive. Allocates nothing. Source: Featherstone (2005).
@@ -224,7 +225,8 @@ impl<S: Scalar> Ltdl<S> {
         true
     }
 
-    /// Solves M x = b in place, in O(n d): Lᵀ y = b, then L x = D⁻¹ y.
+    /// Solves M x = b in place for the factorized M = Lᵀ D L: Lᵀ y = b, then L x = D⁻¹ y. This takes O(n d) for n = nv
+    /// and a tree of depth d.
     ///
     /// b: nv numbers, overwritten with x. Allocates nothing. Source: Featherstone (2005).
     ///
@@ -269,7 +271,8 @@ impl<S: Scalar> Ltdl<S> {
         }
     }
 
-    /// Solves M X = B in place, column by column, each in O(n d).
+    /// Solves M X = B in place for the factorized M, column by column. Each column takes O(n d) for n = nv and a tree
+    /// of depth d.
     ///
     /// B: nv rows, any number of columns, overwritten with X. Allocates nothing.
     ///
@@ -295,7 +298,8 @@ impl<S: Scalar> Ltdl<S> {
         }
     }
 
-    /// Computes X = M⁻¹, the full symmetric matrix, in O(n² d).
+    /// Computes X = M⁻¹ for the factorized M = Lᵀ D L, in O(n² d) for n = nv and a tree of depth d. X is the full
+    /// symmetric matrix.
     ///
     /// The right-hand side of L X = D⁻¹ L⁻ᵀ is upper triangular. So row k of X follows from the rows above it: X_kj =
     /// −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.

@@ -104,8 +104,8 @@ struct Place {
     masks: [u64; 2],
 }
 
-/// Sum Σ left rightᵀ of outer products; blocks of zeros are skipped. Each row has one number more than the sum has
-/// columns. In left rows, this number belongs to the gradient, which is the last row of the sum.
+/// Sum of outer products, each of a left row and a right row. Blocks of zeros are skipped. Each row has one number more
+/// than the sum has columns. In a left row, this number contributes to the gradient, which is the last row of the sum.
 #[derive(Debug, Clone, Default)]
 pub struct OuterProducts {
     /// Numbers of all rows.
@@ -189,8 +189,8 @@ impl OuterProducts {
         }
     }
 
-    /// Adds the lower triangle of the sum to H, and the gradient to the row below. Some entries above the diagonal
-    /// change as well. H has padding rows.
+    /// Adds the lower triangle of the sum to the matrix H, and the gradient to the row below. Some entries above the
+    /// diagonal change as well. H has padding rows.
     pub fn add_to(&mut self, h: &mut [f64], ldh: usize) {
         let Self { rows, stride, size, runs, places, .. } = self;
         places.clear();
@@ -248,8 +248,8 @@ fn bits(wide: u32, from: usize, length: usize) -> u64 {
     (2_u64 << (last - first)).wrapping_sub(1) << first
 }
 
-/// Adds one tile of the sum to H[i.., j..]; the tile has S registers of rows. Runs without nonzero blocks in this tile
-/// are skipped.
+/// Adds one tile of the sum to the matrix H, from entry (i, j) on; the tile has S registers of rows. Runs without
+/// nonzero blocks in this tile are skipped.
 ///
 /// # Safety
 /// Each left row has S registers of numbers from i on, and each right row COLUMNS numbers from j on.

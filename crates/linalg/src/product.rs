@@ -156,7 +156,7 @@ pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
                 }
                 continue;
             }
-            // SAFETY: the register starts at row i ≤ rows − N of a column that was found to be in bounds.
+            // SAFETY: the register starts at row i ≤ `rows` − `V::N` of a column that was found to be in bounds.
             unsafe {
                 let load = |x: &[f64], at: usize| V::load(x.get_unchecked(at..at + V::N));
                 let x = load(b.data, from_b).mul_add(step, load(a.data, from_a));
@@ -197,7 +197,7 @@ pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'
             continue;
         }
         loop {
-            // SAFETY: the register starts at row i ≤ rows − N of a column that was found to be in bounds.
+            // SAFETY: the register starts at row i ≤ `rows` − `V::N` of a column that was found to be in bounds.
             unsafe {
                 let load = |x: &[f64], at: usize| V::load(x.get_unchecked(at..at + V::N));
                 let sum = load(a.data, from_a + i).add(load(b.data, from_b + i));

@@ -13,8 +13,9 @@ narrow! {
     /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ, where xₖ are the
     /// columns of X.
     ///
-    /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. In each column
-    /// of X, zeros follow these numbers, up to four registers after the last row of H. H has padding rows.
+    /// `shape` = [rows of H, columns of H, m], where m is the number of columns to eliminate. `length` = [rows of X,
+    /// columns of X]. X has at most as many rows as H. Each column of X is followed by zeros, at least up to the length
+    /// of a column of H plus four registers. H has padding rows.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -68,8 +69,8 @@ struct Sum<'a> {
     reach: usize,
 }
 
-/// Computes H ← H + Σ x xᵀ − Σ h hᵀ, where h are the first m columns of H, on `columns` columns from column j on. The
-/// rows are j..`rows`.
+/// Computes H ← H + Σ x xᵀ − Σ h hᵀ, where x are the columns of the sum and h are the first m columns of H. Changes
+/// only the rows j..`rows` of `columns` columns from column j on.
 ///
 /// # Safety
 /// H has padding rows after `rows`, and X has four registers of padding.
@@ -155,8 +156,9 @@ fn subtract_outer<V: Vector, const S: usize>(tile: &mut [[V; S]; COLUMNS], strip
     }
 }
 
-/// Computes column j of L and X, on S registers of rows from row i on, from its sum of products and the columns before
-/// it. The first call for a column starts on the diagonal and sets `factor`, the inverse of the diagonal entry.
+/// Computes column j of the eliminated matrix, on S registers of rows from row i on. The result follows from column j
+/// of H + Σ x xᵀ and from the columns before column j. The first call for a column starts on the diagonal and sets
+/// `factor`, the inverse of the diagonal entry.
 ///
 /// # Errors
 /// Returns the column and its pivot if the pivot is not positive or not finite.

@@ -127,11 +127,11 @@ pub(crate) fn next_strip<V: Vector>(rows: usize) -> usize {
 /// Operation that stores a product in an entry of C.
 #[derive(Clone, Copy)]
 pub(crate) enum Store {
-    /// C = product.
+    /// Stores the product: C = product.
     Set,
-    /// C = C + product.
+    /// Adds the product: C = C + product.
     Add,
-    /// C = C − product.
+    /// Subtracts the product: C = C − product.
     Subtract,
 }
 

@@ -51,8 +51,8 @@ pub fn minus_block_product<S: Scalar>(
     }
 }
 
-/// Computes [`neg_product`] for two matrices B and one symmetric A. This function is used for scalars with lanes,
-/// because their matrices are too large for the L1 cache.
+/// Computes [`neg_product`] for two matrices B and one symmetric A. It reads A only once for both matrices. It is used
+/// for scalars with lanes, whose matrices are too large for the L1 cache.
 #[inline(always)]
 fn neg_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let (n, mut j) = (nonzero_rows.len(), 0);
@@ -63,8 +63,8 @@ fn neg_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], 
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
         let rows = Inside::new(rows, n);
-        // M columns and N rows are chosen so that sums and operands fill the vector registers: 32 of eight numbers, or
-        // 16 of four numbers.
+        // M columns and N rows are chosen so that sums and operands fill the vector registers. There are 32 registers
+        // of eight numbers, or 16 registers of four numbers.
         match (many, size_of::<S>()) {
             (4, 64..) => twice::<S, 4, 2>(A, B, C, rows),
             (4, _) => twice::<S, 4, 1>(A, B, C, rows),
@@ -210,7 +210,7 @@ fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: 
     }
 }
 
-/// Computes X = −A B for two matrices B and one symmetric A. Column j of both B is zero except in the rows of
+/// Computes X = −A B for two matrices B and one symmetric A. Column j of each B is zero except in the rows of
 /// `nonzero_rows[j]`.
 #[inline]
 pub fn neg_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
@@ -250,8 +250,8 @@ fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[N
 
 /// Number of columns of B that are computed together.
 const SIDE: usize = 4;
-/// Number of operations that the processor executes at the same time. A loop with fewer sums than this number takes the
-/// same time.
+/// Number of operations that the processor executes at the same time. A loop with fewer independent sums takes as long
+/// as a loop with this number of sums.
 const UNDER_WAY: usize = 8;
 
 /// Implements [`minus_products`] in vector registers.
@@ -294,7 +294,7 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
         let mut j = 0;
         while j < self.nonzero_rows.len() {
             let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
-            // Index k counts the columns j, …, j + same − 1 of the first matrix, then the same columns of the second
+            // Index k counts the columns j, …, j + `same` − 1 of the first matrix, then the same columns of the second
             // matrix.
             let (same, mut k) = (*same_pattern, 0);
             let rows = Inside::new(rows, self.nonzero_rows.len());

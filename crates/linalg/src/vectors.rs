@@ -125,7 +125,7 @@ fn strip<V: Vector, const S: usize>(y: &mut [f64], a: View<'_>, i: usize, x: &[f
     }
 }
 
-/// Returns xᵀ y.
+/// Returns the dot product xᵀ y.
 #[inline]
 pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
@@ -162,7 +162,7 @@ pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
         _ => {
             let (last, mut i) = (length - V::N, 0);
             while i < last {
-                // SAFETY: i + N < length, and both slices have `length` numbers.
+                // SAFETY: i + `V::N` < length, and both slices have `length` numbers.
                 unsafe { V::load(x.get_unchecked(i..i + V::N)).store(to.get_unchecked_mut(i..i + V::N)) };
                 i += V::N;
             }
@@ -195,7 +195,7 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
     let (a, last, mut i) = (V::splat(a), length - V::N, 0);
     loop {
         let k = (i + V::N).min(last);
-        // SAFETY: i and k are at least N before the end, and both slices have `length` numbers.
+        // SAFETY: i and k are at least `V::N` before the end, and both slices have `length` numbers.
         unsafe {
             V::load(x.get_unchecked(i..i + V::N)).mul(a).store(to.get_unchecked_mut(i..i + V::N));
             V::load(x.get_unchecked(k..k + V::N)).mul(a).store(to.get_unchecked_mut(k..k + V::N));

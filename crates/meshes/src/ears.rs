@@ -14,7 +14,7 @@ const MAX_CORNERS: usize = 100;
 #[derive(Default)]
 pub(super) struct Ears {
     tests: usize,
-    /// Number of faces of which triangles are left out.
+    /// Number of faces from which triangles are left out.
     pub(super) lost: usize,
 }
 

@@ -64,7 +64,7 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
     cut_triangles(format, bytes).map(|(triangles, _)| triangles)
 }
 
-/// Returns the result of [`triangles`], and the number of OBJ faces of which triangles are left out.
+/// Returns the result of [`triangles`], and the number of OBJ faces from which triangles are left out.
 ///
 /// # Errors
 /// Returns the same errors as [`triangles`].

@@ -12,7 +12,7 @@ struct Mesh {
     points: Vec<[f64; 3]>,
     /// Triangles by material.
     groups: Vec<Group>,
-    /// Number of faces of which triangles are left out.
+    /// Number of faces from which triangles are left out.
     lost: usize,
 }
 
@@ -24,8 +24,8 @@ pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Resu
     Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
 }
 
-/// Returns all points of an OBJ, the triangles of its first object or group, and the number of faces of which triangles
-/// are left out.
+/// Returns all points of an OBJ, the triangles of its first object or group, and the number of faces from which
+/// triangles are left out.
 pub(super) fn first(text: &str) -> Result<(super::Triangles, usize), String> {
     let Mesh { points, groups, lost } = parse(text, &|_| None, true)?;
     Ok(((points, groups.into_iter().flat_map(|group| group.1).collect()), lost))

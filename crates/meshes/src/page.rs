@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// Maximum number of triangles of a page.
 const MOST: usize = 60_000;
-/// Maximum number of triangles of a part, whose corner indices have 16 bits.
+/// Maximum number of triangles of a part. A part then has at most 60 000 points, so 16 bits suffice for the index of a
+/// point.
 const MOST_OF_PART: usize = 20_000;
 /// Smallest number of triangles to which a part is reduced.
 const FEWEST: usize = 12;

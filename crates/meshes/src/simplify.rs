@@ -27,7 +27,7 @@ pub(super) fn simplify(part: &Part, target: usize) -> Part {
     if welded.triangles.len() > target {
         welded = Surface::new(&welded).collapse(target);
     }
-    // Small pieces without common points have no edges that can collapse. Coarser cells merge such pieces.
+    // Triangles without common points have no edges that can collapse. Coarser cells merge such triangles.
     cells = cells.min(256.0);
     while welded.triangles.len() > target && cells > 1.0 {
         cells /= 2.0;
@@ -104,8 +104,8 @@ impl Quadric {
         (slopes[0] * x + slopes[1] * y + slopes[2] * z + ww).max(0.0)
     }
 
-    /// Returns the point with the smallest sum, computed by cofactors. If this point is not unique, the result is far
-    /// away or not finite.
+    /// Returns the point with the smallest sum of squared distances, computed by cofactors. If this point is not
+    /// unique, the result is far away or not finite.
     fn least(&self) -> Vector3<f64> {
         let [xx, xy, xz, xw, yy, yz, yw, zz, zw, _] = self.0;
         let [a, b, c] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
@@ -339,7 +339,7 @@ mod tests {
         assert!(simplify(&Part::default(), 12).triangles.is_empty());
         let point = Part { points: vec![[1.0; 3]; 3], triangles: vec![[0, 1, 2]], color: None };
         assert!(simplify(&point, 12).triangles.is_empty());
-        // The pieces have no common points. Coarser cells reduce the number of triangles.
+        // These triangles have no common points, so only coarser cells can reduce their number.
         let mut pieces = Part::default();
         for k in 0..5000u32 {
             let x = f64::from(k % 70);

@@ -172,7 +172,8 @@ impl ModelBuilder {
                 if let Transmission::Tendon { joints, .. } = &old.transmission {
                     let held = joints.iter().filter(|(i, _)| locked.contains(i));
                     let length: f64 = held.map(|&(i, coefficient)| coefficient * model.joint_position(i, q)).sum();
-                    // The part of −kp l that depends on the locked joint is now constant.
+                    // With the length l of the tendon, the part of the force −kp l that depends on the locked joint is
+                    // now constant.
                     actuator.bias -= actuator.kp * actuator.gear[0] * length;
                 }
                 self.actuator(actuator);
@@ -205,7 +206,7 @@ impl ModelBuilder {
                             held(id, c.iter().rev().fold(0.0, |sum, c| sum * at + c)) // Σ cᵢ qⁱ
                         }
                         (Some(id), leader) => Some(Draft::Coupling(id, leader.as_ref().and_then(body), *c)),
-                        // a locked follower holds the leader at q_l = (q_f − c₀) / c₁
+                        // a follower that is locked at q_f holds the leader at q_l = (q_f − c₀) / c₁
                         (None, Some(i)) if c[1] != 0.0 && c[2..] == [0.0; 3] => {
                             body(i).and_then(|id| held(id, (model.joint_position(*follower, q) - c[0]) / c[1]))
                         }

@@ -317,7 +317,8 @@ impl ModelBuilder {
         }
     }
 
-    /// Replaces each leader that is a follower itself by the leader of that follower: q_f = r₁ (r₂ q + o₂) + o₁.
+    /// Replaces each leader that is a follower itself by the leader of that follower: q_f = r₁ (r₂ q + o₂) + o₁, with
+    /// the ratios r and offsets o of both relations.
     fn compose_mimics(&mut self) -> Result<(), Error> {
         for i in 1..self.drafts.len() {
             // `way` lists the followers on the path from joint i to its final leader, whose relations are not yet
@@ -385,8 +386,8 @@ impl ModelBuilder {
     }
 }
 
-/// Relative rounding error of the position limits of followers. If they leave the leader a range below this error, the
-/// leader counts as unable to move.
+/// Relative rounding error of the position limits of followers. If these limits leave the leader a range below this
+/// error, the leader counts as unable to move.
 const MIMIC_ROUNDING: f64 = 1e-9;
 
 /// Lists of a model with one entry for each coordinate or degree of freedom.

@@ -260,7 +260,8 @@ pub enum DifferenceArgument {
 }
 
 impl DifferenceArgument {
-    /// Returns the sign s with which the Jacobian is s · J_log(s · d).
+    /// Returns the sign s with which the Jacobian of a difference d is s · J(s · d), where J is the right Jacobian of
+    /// the logarithm.
     fn sign<S: Scalar>(self) -> S {
         match self {
             Self::From => -S::one(),
@@ -281,7 +282,8 @@ pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: Di
     block_diagonal(model, ("d", d), GroupJacobian::Log, argument.sign(), J);
 }
 
-/// Computes sign · J(sign · v), joint by joint. `name` is the name of the tangent vector v in error messages.
+/// Computes sign · J(sign · v), joint by joint, where J is the Jacobian `which` of the joint's Lie group. `name` is the
+/// name of the tangent vector v in error messages.
 #[track_caller]
 fn block_diagonal<S: Scalar, R>(
     model: &Model<R>,
@@ -311,7 +313,8 @@ pub fn difference_jacobian_groups<S: Scalar>(model: &Model, d: &[S], argument: D
     group_blocks(model, d, GroupJacobian::Log, argument.sign(), J);
 }
 
-/// Computes the blocks of sign · J(sign · v) for joints whose positions are not a vector space.
+/// Computes the blocks of sign · J(sign · v) for joints whose positions are not a vector space. J is the Jacobian
+/// `which` of the joint's Lie group.
 fn group_blocks<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, sign: S, J: &mut DMatrix<S>) {
     for Space { joint, v: iv, .. } in model.tree.spaces.iter().filter(|space| !space.joint.commutes()) {
         let mut signed = [S::zero(); 6];

@@ -49,7 +49,7 @@ pub enum NotPhysical {
          a principal moment of inertia is not below the sum of the other two"
     )]
     Spread {
-        /// First pivot of Σ, taken about the centre of mass, that is not positive (kg m²).
+        /// First pivot of the second moments Σ about the centre of mass that is not positive (kg m²).
         moment: f64,
     },
 }
@@ -100,19 +100,20 @@ pub fn pseudo_inertia<S: Scalar>(I: Inertia<S>) -> SMatrix<S, 4, 4> {
     )
 }
 
-/// Factor U with J = U Uᵀ.
+/// Cholesky factor U of the pseudo-inertia J = U Uᵀ.
 struct Factor {
     /// Scale eᵅ.
     scale: f64,
-    /// Diagonal eᵅ (e^d₁, e^d₂, e^d₃).
+    /// First three diagonal entries of U: eᵅ (e^d₁, e^d₂, e^d₃).
     diagonal: Vec3<f64>,
-    /// Entries eᵅ (s₁₂, s₂₃, s₁₃) above the diagonal.
+    /// Entries of U above the diagonal: eᵅ (s₁₂, s₂₃, s₁₃).
     above: Vec3<f64>,
     /// Centre of mass.
     t: Vec3<f64>,
 }
 
-/// Computes the factor from the last column to the first column. The factor exists if all pivots are positive.
+/// Computes the Cholesky factor of the pseudo-inertia, from the last column to the first column. The factor exists if
+/// all pivots are positive.
 fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
     let positive = |moment: f64| if moment > 0.0 { Ok(moment.sqrt()) } else { Err(NotPhysical::Spread { moment }) };
     let mass = I.mass;
@@ -135,7 +136,8 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
 /// Point masses, rods and plates have no volume. They are limit cases and are refused.
 ///
 /// # Errors
-/// Returns [`NotPhysical`] with the mass, or with the first pivot that is not positive.
+/// Returns [`NotPhysical`] with the mass if the mass is not positive or not finite. Otherwise, returns [`NotPhysical`]
+/// with the first pivot that is not positive.
 ///
 /// ```
 /// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters::check};
@@ -216,7 +218,8 @@ pub fn log_cholesky_jacobian<S: Scalar>(theta: [S; 10]) -> SMatrix<S, 10, 10> {
     const ENTRIES: [(usize, usize); 9] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
     for (k, &(row, column)) in ENTRIES.iter().enumerate() {
         let rate = if row == column { u[row][column] } else { S::one() } * mass;
-        // The derivative of Σ is dΣ = e²ᵅ (e_row u_columnᵀ + u_column e_rowᵀ).
+        // The derivative of Σ is dΣ = e²ᵅ (e_row u_columnᵀ + u_column e_rowᵀ), with unit vectors e and the columns u of
+        // U / eᵅ.
         let change = Vec3::new(u[0][column], u[1][column], u[2][column]).scale(rate);
         let unit = Vec3::from(core::array::from_fn(|r| if r == row { S::one() } else { S::zero() }));
         let moments = Sym3::outer_sum(unit, change);

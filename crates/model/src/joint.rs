@@ -110,7 +110,7 @@ impl Joint {
     }
 
     /// Returns the indices of the unit motions (linear x, y, z, angular x, y, z) along which the joint moves: the
-    /// columns of S. (A helical joint also moves along z, by its pitch.)
+    /// columns of the motion subspace S. (A helical joint also moves along z, by its pitch.)
     #[doc(hidden)]
     #[inline(always)]
     pub fn axes(self) -> &'static [usize] {
@@ -252,7 +252,8 @@ impl Joint {
         }
     }
 
-    /// Returns column k of S in the world's frame, for a joint whose body is at the pose oX.
+    /// Returns column k of the joint's motion subspace S in the world's frame, for a joint whose body is at the pose
+    /// oX.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
@@ -270,7 +271,7 @@ impl Joint {
         }
     }
 
-    /// Returns the column S of a joint that turns about z, in the world's frame.
+    /// Returns the motion subspace of a joint that turns about z, which has a single column, in the world's frame.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column_about_z<S: Scalar>(oX: &Se3<S>) -> Motion<S> {

@@ -35,11 +35,11 @@ pub trait Layout {
     fn joint(&self, i: usize) -> Joint;
     /// Returns the joints that turn about z.
     fn revolute_angles(&self) -> &RevoluteAngles;
-    /// Returns X_T: the pose of the joint's frame in the parent's frame.
+    /// Returns X_T, the placement of joint i: the pose of its frame in the parent's frame.
     fn placement(&self, i: usize) -> Se3<Self::S>;
     /// Returns the inertia of body i in the body's frame.
     fn inertia(&self, i: usize) -> Inertia<Self::S>;
-    /// Returns the acceleration −g of the world, which represents gravity.
+    /// Returns −g, the acceleration of the world that represents the gravity g.
     fn minus_gravity(&self) -> Vec3<Self::S>;
     /// Returns the armature of degree of freedom k of joint i.
     fn armature(&self, i: usize, k: usize) -> Self::S;

@@ -65,7 +65,7 @@ pub struct Model<R = f64> {
     /// Whether each body connects two joints of a chain and therefore has no mass on purpose.
     pub(crate) between: Vec<bool>,
     pub(crate) warnings: Vec<Warning>,
-    /// Bodies whose joints make M singular.
+    /// Bodies whose joints make the inertia matrix singular.
     pub(crate) singular: Vec<usize>,
 }
 
@@ -155,8 +155,8 @@ impl<R> Model<R> {
     pub fn constraints(&self) -> &[ModelConstraint] {
         &self.constraints
     }
-    /// Returns the armature: the inertia of the rotor, reflected to each joint (kg m², kg). It is part of M in every
-    /// algorithm.
+    /// Returns the armature: the inertia of the rotor, reflected to each joint (kg m², kg). Every algorithm includes
+    /// the armature in the inertia matrix.
     #[inline(always)]
     pub fn armature(&self) -> &[R] {
         &self.armature
@@ -227,8 +227,8 @@ impl<R> Model<R> {
     pub fn support_len(&self) -> usize {
         self.tree.support.len()
     }
-    /// Returns the nonzero rows of each column of M. Row i of column j is nonzero if an acceleration of coordinate j
-    /// needs an effort in coordinate i.
+    /// Returns the nonzero rows of each column of the inertia matrix. Row i of column j is nonzero if an acceleration
+    /// of coordinate j needs an effort in coordinate i.
     #[inline(always)]
     pub fn nonzero_rows(&self) -> &[NonzeroRows] {
         &self.tree.nonzero_rows

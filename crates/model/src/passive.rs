@@ -27,7 +27,7 @@ pub struct Spring {
 }
 
 /// Compensation of the weight of a body by an external force, as with MuJoCo's `gravcomp`. The compensated mass m has
-/// its centre at c ([`carried`](Self::carried)), and the force −m g acts at c.
+/// its centre at c ([`carried`](Self::carried)), and the force −m g acts at c, with the gravity g.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GravityCompensation {

@@ -37,7 +37,8 @@ pub struct Node<R> {
     pub body_depth: usize,
     /// Range (first, end) in `Tree::closed` of the bodies whose subtrees end with this body.
     pub closed: (usize, usize),
-    /// X_T: pose of the joint's frame in the parent's frame, where both frames are turned.
+    /// X_T: pose of the joint's frame in the parent's frame, where each frame is turned such that the axis of its joint
+    /// is z.
     pub placement: Se3<R>,
     /// Inertia in the turned frame.
     pub inertia: Inertia<R>,
@@ -85,8 +86,8 @@ pub(crate) struct Tree<R> {
     pub closed: Vec<usize>,
     /// Joints that turn about z.
     pub revolute_angles: RevoluteAngles,
-    /// Nonzero rows of each column of M: the coordinate itself, its ancestors and its descendants in the tree. Length:
-    /// nv.
+    /// Nonzero rows of each column of the inertia matrix: the coordinate itself, its ancestors and its descendants in
+    /// the tree. Length: nv.
     pub nonzero_rows: Vec<NonzeroRows>,
     /// Ranges of the coordinates of all joints, in order. The ranges of consecutive joints whose positions are vectors
     /// are merged.

@@ -1,5 +1,5 @@
 //! Validation of every model, for all functions that create a model. Invalid numbers are errors. Physically impossible
-//! inertias, and degrees of freedom along which M is singular, are warnings.
+//! inertias, and degrees of freedom along which the inertia matrix M is singular, are warnings.
 
 use crate::body::{Body, Frame, JointOptions, Limits};
 use crate::configuration::random_configuration;
@@ -26,8 +26,8 @@ const COM_ROUNDING: f64 = 1e-12;
 const PIVOT_ROUNDING: f64 = 1e-13;
 /// Minimum pivot (kg m², kg). The reciprocal of a smaller pivot may overflow.
 const LEAST_PIVOT: f64 = 1e-200;
-/// Number of random positions at which M is tested. A joint is reported as singular if it is singular at all of these
-/// positions.
+/// Number of random positions at which the inertia matrix is tested. A joint is reported as singular if it is singular
+/// at all of these positions.
 const SAMPLES: usize = 3;
 /// Maximum radius of gyration of a body without a warning (m). The largest ships and cranes have smaller radii. Public
 /// robots with larger radii use a wrong unit.
@@ -216,8 +216,8 @@ impl Model {
         self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
     }
 
-    /// Finds singular joints by the pivots D = Sᵀ Iᴬ S of the articulated bodies. Degrees of freedom with pivot 0 are
-    /// not eliminated.
+    /// Finds singular joints by the pivots D = Sᵀ Iᴬ S of the articulated bodies. Iᴬ is the inertia of an articulated
+    /// body, and S is the motion subspace of its joint. Degrees of freedom with pivot 0 are not eliminated.
     fn singular_by_bodies(&self, Placed { oX, S }: &Placed) -> Vec<bool> {
         let l = Single::<f64, f64>::new(self);
         let mut singular = vec![false; self.bodies.len()];
@@ -240,7 +240,8 @@ impl Model {
         singular
     }
 
-    /// Finds singular joints by the pivots of M. This method is used for robots whose joints share coordinates.
+    /// Finds singular joints by the pivots of the inertia matrix M. This method is used for robots whose joints share
+    /// coordinates.
     fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
         let mut M = self.inertia_matrix(placed);
         let diagonal = M.diagonal();
@@ -263,7 +264,7 @@ impl Model {
     }
 }
 
-/// Poses of the bodies, and columns of S in the world's frame, at one position.
+/// Poses of the bodies, and columns of the joints' motion subspaces S in the world's frame, at one position.
 struct Placed {
     /// Poses oXi of the bodies, by index of the body.
     oX: Vec<Se3<f64>>,
@@ -304,7 +305,8 @@ impl Model {
         Ok(())
     }
 
-    /// Computes M in the world's frame by the method of composite rigid bodies. Source: Featherstone (2008), table 6.2.
+    /// Computes the inertia matrix M in the world's frame by the method of composite rigid bodies. Source: Featherstone
+    /// (2008), table 6.2.
     fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
         let l = Single::<f64, f64>::new(self);
         let mut M = DMatrix::zeros(self.tree.nv, self.tree.nv);
@@ -335,13 +337,14 @@ impl<R> Model<R> {
         &self.warnings
     }
 
-    /// Returns the bodies whose joints make M singular, because nothing that they carry has inertia along these joints.
-    /// Forward dynamics and M⁻¹ refuse such a robot; an armature on these joints solves the problem.
+    /// Returns the bodies whose joints make the inertia matrix M singular, because nothing that they carry has inertia
+    /// along these joints. Forward dynamics and M⁻¹ refuse such a robot; an armature on these joints solves the
+    /// problem.
     pub fn singular_joints(&self) -> &[usize] {
         &self.singular
     }
 
-    /// Panics with the name of a joint if M has no inverse.
+    /// Panics with the name of a joint if the inertia matrix M has no inverse.
     #[doc(hidden)]
     #[inline]
     #[track_caller]

@@ -44,7 +44,8 @@ pub enum Warning {
         /// Principal moments (kg m²), smallest first.
         moments: [f64; 3],
     },
-    /// No body that a joint moves has inertia along the joint. So M is singular, and forward dynamics has no solution.
+    /// No body that a joint moves has inertia along the joint. So the inertia matrix is singular, and forward dynamics
+    /// has no solution.
     Singular {
         /// Name of the joint.
         joint: String,

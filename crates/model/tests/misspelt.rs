@@ -4,7 +4,7 @@ use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 use roxmltree::Document;
 use std::ops::Range;
 
-/// URDF with most of the elements and attributes that have an effect.
+/// URDF with most of the elements and attributes that affect a model.
 const URDF: &str = r#"<robot name="r" version="1.0">
   <link name="a"><inertial><origin xyz="0 0 1" rpy="0 0 0.1"/><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <link name="b"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>

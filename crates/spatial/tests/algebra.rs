@@ -77,7 +77,8 @@ proptest! {
 
     #[test]
     fn gyroscopic_torque(c in vec3(), mass in 0.1..2.0, w in vec3(), d in prop::array::uniform3(0.1..2.0)) {
-        // a body rotates about its centre of mass: the moment about this point is n = ω × J ω, and the force is zero
+        // a body rotates about its centre of mass: with the angular velocity ω and the inertia J, the moment about this
+        // point is n = ω × J ω, and the force is zero
         let J = Sym3 { xx: d[0], yy: d[1], zz: d[2], ..Sym3::zero() };
         let at_com = Inertia::from_com(mass, Vec3::zero(), J);
         let v = Motion::new(Vec3::zero(), w);
@@ -94,7 +95,7 @@ proptest! {
 
     #[test]
     fn inertia_is_a_sum_of_points(points in prop::collection::vec((0.1..2.0, vec3()), 3), v in motion()) {
-        // the momentum of a mass point at c is m (v + ω × c), with a moment about the origin
+        // the momentum of a mass point m at c is m (v + ω × c), with a moment about the origin
         let mut I = Inertia::zero();
         let mut momentum = Force::zero();
         for (m, c) in points {

@@ -22,7 +22,7 @@ fn four(q: Quaternion<f64>) -> [f64; 4] {
     [q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Returns the dual numbers x + ε d, one per component.
+/// Returns the dual numbers x + ε d with the dual unit ε, one per component.
 fn dual(x: Vec3<f64>, d: Vec3<f64>) -> Vec3<Dual64> {
     let (x, d) = (x.to_array(), d.to_array());
     core::array::from_fn(|k| Dual64::new(x[k], d[k])).into()
@@ -103,7 +103,7 @@ proptest! {
         prop_assert!(distance(p.to_array(), X.translation.to_array()) < ROUNDING);
     }
 
-    /// Checks that the Jacobian J of exp satisfies exp(w + ε d) = exp(w) exp(ε J d).
+    /// Checks that the Jacobian J of exp satisfies exp(w + ε d) = exp(w) exp(ε J d) for the dual unit ε.
     #[test]
     fn jexp3_is_the_derivative(w in rotation_vector(), stretch in 0.0..2.0, d in vec3()) {
         let w = w.scale(stretch); // up to angles of 2π
@@ -114,7 +114,7 @@ proptest! {
         prop_assert!(distance((lie::jexp3(w) * d).to_array(), d_body.to_array()) < ROUNDING);
     }
 
-    /// Checks that the Jacobian J of log satisfies log(exp(w) exp(ε d)) = w + ε J d.
+    /// Checks that the Jacobian J of log satisfies log(exp(w) exp(ε d)) = w + ε J d for the dual unit ε.
     #[test]
     fn jlog3_is_the_derivative(w in rotation_vector(), d in vec3()) {
         let turned = lie::exp3(dual(w, Vec3::zero())) * lie::exp3(dual(Vec3::zero(), d));

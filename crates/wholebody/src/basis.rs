@@ -1,5 +1,5 @@
-//! Splits the unknowns x of a program by its equalities. The basic unknowns follow from the other unknowns z as x_B = p
-//! − T z. A row of coefficients of x becomes a row of coefficients of z.
+//! Splits the unknowns x of a program by its equalities. The basic unknowns x_B follow from the other unknowns z as x_B
+//! = p − T z, with a vector p and a matrix T. A row of coefficients of x becomes a row of coefficients of z.
 
 use crate::cone_program::ConeProgram;
 use crate::numbers::Reader;
@@ -29,7 +29,7 @@ pub(crate) struct Basis {
     places: Vec<Place>,
     /// T of the equation x_B = p − T z. Shape: other unknowns × basic unknowns, with padding rows.
     T: DMatrix<f64>,
-    /// p.
+    /// Vector p of the equation x_B = p − T z.
     pub p: Vec<f64>,
     /// Scratch: the columns of basic unknowns in several rows. Shape: rows × basic unknowns, with padding.
     basic_part: DMatrix<f64>,
@@ -47,13 +47,14 @@ impl Basis {
         }
     }
 
-    /// Returns column i of T. Basic unknown i is pᵢ minus the product of this column and z.
+    /// Returns column i of T, where x_B = p − T z. Basic unknown i is pᵢ minus the product of this column and z.
     pub(crate) fn column(&self, i: usize) -> &[f64] {
         &self.T.as_slice()[i * self.T.nrows()..][..self.others.len()]
     }
 
-    /// Computes (G_N − G_B T)ᵀ and G_B p for the first `count` rows of G, which are the columns of `from`. `particular`
-    /// gets G_B p and needs padding.
+    /// Maps the first `count` rows of G from x to z, where x_B = p − T z: computes (G_N − G_B T)ᵀ and G_B p. G_B and
+    /// G_N are the columns of G for the basic and for the other unknowns. The columns of `from` are the rows of G.
+    /// `particular` gets G_B p and needs padding.
     pub(crate) fn map_dense_rows(
         &mut self,
         from: &DMatrix<f64>,
@@ -136,7 +137,8 @@ impl Basis {
 
 /// Elimination of the equalities, with memory for the largest program.
 pub(crate) struct Elimination {
-    /// Scratch: Aᵀ while it is being eliminated. Shape: unknowns × equalities, with padding rows.
+    /// Scratch: Aᵀ of the equalities A x = b, while it is being eliminated. Shape: unknowns × equalities, with padding
+    /// rows.
     W: DMatrix<f64>,
     right: Vec<f64>,
     /// Equality and unknown of each pivot, in elimination order. The next call tries these pivots first.

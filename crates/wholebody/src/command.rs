@@ -44,8 +44,8 @@ pub struct Command {
     /// Force of the environment on the robot at each contact (N, N m). The moment is about the frame's origin, and all
     /// components are along the world's axes. A safe command repeats the forces of the last solution.
     pub forces: Vec<Force<f64>>,
-    /// Acceleration of the centre of mass, c̈ = J q̈ + J̇ v, in the world's frame (m/s²). A safe command repeats the
-    /// value of the last solution.
+    /// Acceleration of the centre of mass, c̈ = J q̈ + J̇ v with its Jacobian J, in the world's frame (m/s²). A safe
+    /// command repeats the value of the last solution.
     pub com_acceleration: Vec3<f64>,
     /// Largest violation of a constraint (N, N m, m/s²). A safe command repeats the value of the last solution.
     pub violation: f64,

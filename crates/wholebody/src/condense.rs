@@ -43,7 +43,7 @@ pub(crate) struct Condenser {
     P: DMatrix<f64>,
     /// Scratch: values of the rows at z = 0.
     particular: Vec<f64>,
-    /// Scratch: z.
+    /// Scratch: values of the other unknowns z.
     z: Vec<f64>,
 }
 
@@ -109,7 +109,7 @@ impl Condenser {
         z
     }
 
-    /// Computes P and c of the least-squares objective over z.
+    /// Computes the cost matrix P and the cost vector c of the least-squares objective over z.
     fn objective(&mut self, from: &LeastSquares, out: &mut ConeProgram) {
         let Self { basis, rows, right_side, P, particular, .. } = self;
         let (n, tall) = (basis.others.len(), rows.nrows());

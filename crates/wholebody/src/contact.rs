@@ -49,7 +49,7 @@ pub enum Shape {
 }
 
 /// Contact with friction. The contact holds its point or surface, and each contact force f lies in the cone ‖f_t‖ ≤ μ
-/// f_n.
+/// f_n. Here f_t is the tangential force, f_n the normal force, and μ the friction coefficient.
 ///
 /// [`ContactTarget::activation`](crate::ContactTarget) sets at each tick whether the contact touches. An activation
 /// below 1 also limits the normal force.
@@ -68,11 +68,12 @@ pub struct FrictionContact {
     pub shape: Shape,
     /// The direction in which the environment pushes.
     pub normal: Normal,
-    /// μ, Coulomb's friction coefficient; above 0.
+    /// Coulomb's friction coefficient μ; above 0.
     pub friction: f64,
-    /// Length γ (m) in the bound |yaw moment| ≤ γ f_n of a [wrench](SurfaceForces::Wrench). For a polygon, `None` means
-    /// ⅔ μ r, which is exact for a uniformly loaded disc. Here r is the radius of the largest circle inside the polygon
-    /// about the mean of the corners. For an edge of length 2 l, `None` means ½ μ l.
+    /// Length γ (m) in the bound |yaw moment| ≤ γ f_n of a [wrench](SurfaceForces::Wrench) with the normal force f_n.
+    /// For a polygon, `None` means ⅔ μ r, with the friction coefficient μ. This value is exact for a uniformly loaded
+    /// disc. Here r is the radius of the largest circle inside the polygon about the mean of the corners. For an edge
+    /// of length 2 l, `None` means ½ μ l.
     pub yaw_friction: Option<f64>,
     /// Minimum normal force of the whole contact (N); at least 0.
     pub min_force: f64,
@@ -208,13 +209,14 @@ pub(crate) struct Geometry {
     /// Contact axes (t₁, t₂, n), right-handed. If the normal is given along the world's axes, they are vectors in the
     /// world, otherwise in the contact's frame.
     pub axes: Mat3<f64>,
-    /// Corners along t₁ and t₂ from the centre, counterclockwise about n; empty for a point.
+    /// Corners: coordinates along the tangential axes t₁ and t₂ from the centre, counterclockwise about the normal n.
+    /// Empty for a point.
     pub corners: Vec<[f64; 2]>,
     pub by_corners: bool,
     /// Indices of the components of the frame's six-dimensional motion that the contact holds. The contact's wrench has
     /// the components with the same indices.
     pub motion: &'static [usize],
-    /// γ.
+    /// Length γ (m) in the bound |yaw moment| ≤ γ f_n, with the normal force f_n.
     pub yaw: f64,
 }
 
@@ -224,8 +226,8 @@ impl Geometry {
         if self.by_corners { 3 * self.corners.len() } else { self.motion.len() }
     }
 
-    /// Returns the number of friction cones. Cone k limits unknowns 3 k to 3 k + 2, which are forces along t₁, t₂ and
-    /// n.
+    /// Returns the number of friction cones. Cone k limits unknowns 3 k to 3 k + 2, which are forces along the
+    /// tangential axes t₁, t₂ and the normal n.
     pub(crate) fn cones(&self) -> usize {
         if self.by_corners { self.corners.len() } else { 1 }
     }
@@ -284,7 +286,8 @@ fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
 
 /// Returns unit vectors (t₁, t₂, n), right-handed, for a unit vector n.
 fn axes(n: Vec3<f64>) -> Mat3<f64> {
-    // Take t₁ perpendicular to n and to x or y, whichever of x and y makes the larger angle with n.
+    // Take the tangential axis t₁ perpendicular to the normal n and to x or y, whichever of x and y makes the larger
+    // angle with n.
     let (x, y) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0));
     let t = if n.x.abs() < n.y.abs() { n.cross(x) } else { y.cross(n) };
     let t1 = t.scale(1.0 / norm(t));

@@ -11,7 +11,7 @@ use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
 use nalgebra::DMatrix;
 
 /// Contact and its quantities at the current state. The rows of its Jacobian refer to the contact's centre and the
-/// contact's axes (t₁, t₂, n).
+/// contact's axes: t₁ and t₂ are tangential, n is normal.
 pub(crate) struct ContactRows {
     pub description: FrictionContact,
     pub geometry: Geometry,
@@ -29,7 +29,7 @@ pub(crate) struct ContactRows {
     axes: Mat3<f64>,
     /// Vector from the frame's origin to the contact's centre, along the world's axes.
     arm: Vec3<f64>,
-    /// Jᵀ, nv × number of held rows.
+    /// Transpose Jᵀ of the contact's Jacobian: nv × number of held rows.
     pub Jt: DMatrix<f64>,
     /// Required value of J q̈, which is a* − J̇ v.
     pub held: [f64; 6],
@@ -125,7 +125,8 @@ impl ContactRows {
                 self.Jt[(j, r)] = along[row];
             }
         }
-        // required acceleration a* = k (X_ref ⊖ X) − d v of the contact's centre, limited to the maximum correction
+        // required acceleration a* = k (X_ref ⊖ X) − d v of the contact's centre, with its pose X, its velocity v and
+        // the gains k and d, limited to the maximum correction
         let gains = settings.contact_gains;
         let (v, w) = (frame.velocity.linear, frame.velocity.angular);
         let turn: Mat3<f64> = target.pose.rotation * R.transpose();
@@ -161,7 +162,8 @@ impl ContactRows {
         self.bounds = [min_force, max_force];
         self.activation = target.activation.min(1.0);
         if target.activation < 1.0 {
-            // f_n ≤ α times the maximum force; the robot's weight replaces an infinite maximum force
+            // The normal force f_n is at most the activation α times the maximum force. The robot's weight replaces an
+            // infinite maximum force.
             let most = if max_force.is_finite() { max_force } else { weight };
             self.bounds = [min_force, most].map(|bound| bound * target.activation);
         }
@@ -172,7 +174,8 @@ impl ContactRows {
         [a.x, a.y, a.z, b.x, b.y, b.z]
     }
 
-    /// Writes the coefficients of the contact's force in each coordinate's effort, −Jᵀ, into the columns of Eᵀ.
+    /// Writes −Jᵀ, the coefficients of the contact's force, into the columns of Eᵀ. J is the contact's Jacobian, and
+    /// the efforts of the coordinates are τ = E x + h.
     pub(crate) fn add_effort(&self, support: &[usize], Et: &mut DMatrix<f64>) {
         let (rows, stride, nv) = (self.geometry.motion, Et.nrows(), self.Jt.nrows());
         let (J, Et) = (self.Jt.as_slice(), Et.as_mut_slice());
@@ -189,7 +192,7 @@ impl ContactRows {
         }
     }
 
-    /// Adds the equalities J q̈ = a* − J̇ v.
+    /// Adds the equalities J q̈ = a* − J̇ v, with the Jacobian J of the contact and its required acceleration a*.
     pub(crate) fn add_equalities(&self, program: &mut ConeProgram) {
         let (n, nv) = (program.size.unknowns, self.Jt.nrows());
         for (r, J) in self.Jt.as_slice().chunks_exact(nv).enumerate() {
@@ -219,8 +222,8 @@ impl ContactRows {
         if !by_corners && motion.len() > 3 {
             let (f_n, moments) = (self.column + 2, self.column + motion.len() - 2);
             for [a, b, c] in self.geometry.edges() {
-                // The centre of pressure p satisfies f_n p = (−τ₂, τ₁). So the half-plane a x + b y + c ≥ 0 becomes −a
-                // τ₂ + b τ₁ + c f_n ≥ 0.
+                // With the normal force f_n and the moments τ₁ and τ₂ about the tangential axes, the centre of pressure
+                // p satisfies f_n p = (−τ₂, τ₁). So the half-plane a x + b y + c ≥ 0 becomes −a τ₂ + b τ₁ + c f_n ≥ 0.
                 let row = add_row(program, 0.0, f64::INFINITY);
                 program.Gt[(moments, row)] = -a;
                 if b != 0.0 {
@@ -275,7 +278,7 @@ impl ContactRows {
     }
 }
 
-/// Adds a row of zeros with these bounds to G, and returns its index.
+/// Adds a row of zeros with these bounds to the matrix G of a program, and returns the row's index.
 fn add_row(program: &mut ConeProgram, lower: f64, upper: f64) -> usize {
     let (row, n) = (program.size.rows, program.size.unknowns);
     program.row_mut(row)[..n].fill(0.0);

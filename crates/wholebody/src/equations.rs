@@ -30,13 +30,14 @@ pub(crate) struct Equations {
     pub bounds: AccelerationBounds,
     /// Coordinates with limits of position or velocity. Each has a row of G for the bounds on its acceleration.
     bounded: Vec<usize>,
-    /// Eᵀ of the equation τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate.
+    /// Eᵀ of the efforts τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate. M is the inertia matrix, J the
+    /// Jacobian of the contacts, and h the bias efforts.
     pub Et: DMatrix<f64>,
-    /// Constraints of the whole program; the solver fills in P and c.
+    /// Constraints of the whole program; the solver fills in the cost P and c.
     pub program: ConeProgram,
     /// Indices of the unknowns and constraints in the program.
     places: Places,
-    /// ‖g‖ times the mass (N).
+    /// Weight of the robot: ‖g‖ times the mass (N).
     pub weight: f64,
 }
 
@@ -140,7 +141,7 @@ impl Equations {
         }
     }
 
-    /// Computes τ = E x + h for the actuated coordinates.
+    /// Computes the efforts τ = E x + h of the actuated coordinates.
     pub(crate) fn effort(&self, x: &[f64], tau: &mut [f64]) {
         for &i in &self.actuated {
             tau[i] = self.kinematics.h[i] + dot(&self.Et.as_slice()[i * self.Et.nrows()..], x);

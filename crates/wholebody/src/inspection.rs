@@ -50,7 +50,7 @@ impl Program {
         }
     }
 
-    /// Returns ½ xᵀ P x + cᵀ x.
+    /// Returns the objective ½ xᵀ P x + cᵀ x.
     pub fn objective(&self, x: &DVector<f64>) -> f64 {
         0.5 * x.dot(&(&self.P * x)) + self.c.dot(x)
     }

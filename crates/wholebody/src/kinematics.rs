@@ -10,11 +10,11 @@ pub(crate) struct FrameMotion {
     pub frame: usize,
     /// oXf.
     pub pose: Se3<f64>,
-    /// (ṗ, ω) = J v.
+    /// Velocity of the frame's origin and angular velocity: (ṗ, ω) = J v.
     pub velocity: Motion<f64>,
-    /// Acceleration (p̈, ω̇) at q̈ = 0, which is J̇ v.
+    /// Linear and angular acceleration (p̈, ω̇) of the frame at q̈ = 0, which is J̇ v with the Jacobian J.
     pub drift: Motion<f64>,
-    /// J, 6 × nv.
+    /// Jacobian J of the frame, 6 × nv.
     pub J: DMatrix<f64>,
     /// Coordinates that move the frame: only these columns of J may be non-zero.
     pub support: Vec<usize>,
@@ -24,13 +24,13 @@ pub(crate) struct FrameMotion {
 pub(crate) struct Kinematics {
     data: Data<f64>,
     pub model: Model,
-    /// M(q).
+    /// Inertia matrix M(q), nv × nv.
     pub M: DMatrix<f64>,
-    /// h(q, v).
+    /// Bias efforts h(q, v): gravity, Coriolis and centrifugal efforts, nv numbers.
     pub h: Vec<f64>,
-    /// c.
+    /// Position c of the centre of mass (m).
     pub com: Vec3<f64>,
-    /// ċ.
+    /// Velocity ċ of the centre of mass (m/s).
     pub com_velocity: Vec3<f64>,
     /// Acceleration c̈ of the centre of mass at q̈ = 0.
     pub com_drift: Vec3<f64>,

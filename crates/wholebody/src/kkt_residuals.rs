@@ -11,7 +11,7 @@ use nalgebra::{DVector, DVectorView};
 /// compared with accelerations of 1 m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KktResiduals {
-    /// Gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
+    /// Gradient of the Lagrangian, P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
     pub stationarity: f64,
     /// Largest violation of an equality, bound or cone. Each violation is relative to the norm of the constraint's row
     /// times 1 plus the norm of x.
@@ -78,7 +78,8 @@ fn errors(program: &Program, optimum: &Optimum) -> KktResiduals {
     for i in 0..g.len() {
         let (below, above) = (g[i] - lower[i], upper[i] - g[i]);
         primal = primal.max(f64::max(-below, -above) / norm(G, i));
-        // The multiplier of the lower bound is z⁺, and the multiplier of the upper bound is z⁻, if the bound exists.
+        // If the bounds exist, the multiplier of the lower bound is max(z, 0), and the multiplier of the upper bound is
+        // max(−z, 0).
         for (z, slack) in [(z[i].max(0.0), below), ((-z[i]).max(0.0), above)] {
             if z > 0.0 {
                 gap += z * slack;

@@ -1,4 +1,5 @@
-//! Objective of the form ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x.
+//! Objective of the form ½ ‖R x − b‖² + ½ Σ dᵢ xᵢ² + cᵀ x: rows R with right sides b, and diagonal and linear terms of
+//! the unknowns x.
 
 use crate::cone_program::ConeProgram;
 use nalgebra::DMatrix;
@@ -12,9 +13,9 @@ pub(crate) struct LeastSquares {
     pub b: Vec<f64>,
     /// Number of rows in use.
     pub count: usize,
-    /// d.
+    /// Diagonal d of the terms ½ Σ dᵢ xᵢ².
     pub diagonal: Vec<f64>,
-    /// c.
+    /// Vector c of the linear term cᵀ x.
     pub linear: Vec<f64>,
     /// Unknowns with a cost dᵢ xᵢ² from a task, and not only from the regularisation.
     pub single: Vec<usize>,
@@ -44,7 +45,7 @@ impl LeastSquares {
         self.single.clear();
     }
 
-    /// Adds the row ½ w (r x − b)²; `fill` writes r into a slice of zeros.
+    /// Adds the term ½ w (r x − b)² with the weight w and the row r; `fill` writes r into a slice of zeros.
     pub(crate) fn add_row(&mut self, weight: f64, b: f64, fill: impl FnOnce(&mut [f64])) {
         let root = weight.sqrt();
         let stride = self.Rt.nrows();
@@ -58,13 +59,13 @@ impl LeastSquares {
         self.count += 1;
     }
 
-    /// Adds ½ w (x_i − a)² up to a constant.
+    /// Adds the term ½ w (x_i − a)² with the weight w, up to a constant.
     pub(crate) fn add_single(&mut self, i: usize, weight: f64, a: f64) {
         self.diagonal[i] += weight;
         self.linear[i] -= weight * a;
     }
 
-    /// Writes P and c of a program with the same unknowns.
+    /// Writes the cost P and c of a program with the same unknowns.
     pub(crate) fn write(&self, program: &mut ConeProgram) {
         let n = self.unknowns;
         for j in 0..n {

@@ -16,11 +16,11 @@
 //! ```
 //!
 //! The efforts τ are eliminated: their limits become rows in x. [`Task`]s move the centre of mass, frames, joints,
-//! angular momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v). Tasks have weights or strict
-//! priorities. [`References`] set the targets of each tick and the contacts that touch. A step always returns a
-//! [`Command`] that is finite and within the torque limits. The command's [`Status`] tells whether the command is the
-//! solution of the program. Invalid states and references are also reported by a status: a quaternion without length 1,
-//! a matrix that is not a rotation, a number that is not finite.
+//! angular momentum and forces, with the desired acceleration a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v). Tasks have
+//! weights or strict priorities. [`References`] set the targets of each tick and the contacts that touch. A step always
+//! returns a [`Command`] that is finite and within the torque limits. The command's [`Status`] tells whether the
+//! command is the solution of the program. Invalid states and references are also reported by a status: a quaternion
+//! without length 1, a matrix that is not a rotation, a number that is not finite.
 //!
 //! # Conventions
 //! - q, v and τ are defined as in [condyle_dynamics]. Coordinates of free-flyers are not actuated; all others are.
@@ -32,7 +32,7 @@
 //! - An invalid description makes `new` return an [`Error`]; an argument of the wrong length causes a panic.
 //!
 //! # Features
-//! On by default: `loaders` (reads robots from files, and has embedded robots) and `threads` (uses rayon). Off by
+//! On by default: `loaders` (reads robots from files, and has built-in robots) and `threads` (uses rayon). Off by
 //! default: `clarabel`, which adds `Backend::Clarabel`, a second solver for comparison, and its dependencies.
 //!
 //! Sources: Sentis and Khatib (2005) for operational tasks under contact; Herzog et al. (2016) for inverse dynamics as

@@ -1,4 +1,5 @@
-//! Rows of the tasks at one state. Each row has the form J q̈ = a* − J̇ v.
+//! Rows of the tasks at one state. Each row has the form J q̈ = a* − J̇ v, with the Jacobian J and the desired
+//! acceleration a* of the task.
 
 use crate::contact_rows::ContactRows;
 use crate::kinematics::{FrameMotion, Kinematics};
@@ -153,7 +154,7 @@ impl ResolvedTask {
 /// All tasks, grouped by priority.
 pub(crate) struct Objective {
     pub tasks: Vec<ResolvedTask>,
-    /// q_ref ⊖ q, nv numbers.
+    /// Error q_ref ⊖ q of the position, nv numbers.
     pub error: Vec<f64>,
     /// Objective of each priority.
     pub priorities: Vec<LeastSquares>,

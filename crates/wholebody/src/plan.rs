@@ -39,9 +39,10 @@ pub struct PlanData {
     pub times: Vec<f64>,
     /// States (q, v) of the knots, flat: (N + 1)·(nq + nv).
     pub states: Vec<f64>,
-    /// Efforts of the actuated coordinates from each knot to the next, flat: N·nu; or empty.
+    /// Efforts of the actuated coordinates from each knot to the next: nu numbers for each of N intervals; or empty.
     pub controls: Vec<f64>,
-    /// Gains K of the control u = ū + K (x ⊖ x̄) from each knot to the next, row by row, flat: N·nu·2 nv; or empty.
+    /// Gains K of the control u = ū + K (x ⊖ x̄) from each knot to the next: a matrix of nu × 2 nv numbers, row by row,
+    /// for each of N intervals; or empty. x is the state, and the plan has the control ū and the state x̄.
     pub gains: Vec<f64>,
     /// Whether each contact touches from each knot to the next, flat: N·contacts.
     pub touches: Vec<bool>,
@@ -162,8 +163,8 @@ impl Plan {
         ramp(begin.map_or(f64::INFINITY, |k| t - times[k + 1])).min(ramp(end.map_or(f64::INFINITY, |k| times[k] - t)))
     }
 
-    /// Computes the control u = ū + K (x ⊖ x̄) of the plan at time t and state (q, v). `tau` gets the efforts of all
-    /// coordinates (nv numbers), 0 at a free-flyer.
+    /// Computes the control u = ū + K (x ⊖ x̄) at time t and state x = (q, v), from the control ū, the gains K and the
+    /// state x̄ of the plan. `tau` gets the efforts of all coordinates (nv numbers), 0 at a free-flyer.
     ///
     /// # Errors
     /// [`Error::Model`] for a state that is not finite, or with a quaternion or a pair (cos, sin) that does not have

@@ -21,9 +21,9 @@ pub struct ComTarget {
 pub struct FrameTarget {
     /// Pose oXf.
     pub pose: Se3<f64>,
-    /// Velocity (ṗ, ω): m/s, rad/s.
+    /// Velocity ṗ of the origin (m/s) and angular velocity ω (rad/s).
     pub velocity: Motion<f64>,
-    /// Acceleration (p̈, ω̇): m/s², rad/s².
+    /// Acceleration p̈ of the origin (m/s²) and angular acceleration ω̇ (rad/s²).
     pub acceleration: Motion<f64>,
 }
 

@@ -98,8 +98,8 @@ impl Safety {
         false
     }
 
-    /// Computes τ = g − Jᵀ f, with the gravity torques g and forces f of the active contacts. These are the smallest
-    /// forces that carry the base: S (g − Jᵀ f) = 0, where S selects the base's coordinates.
+    /// Computes τ = g − Jᵀ f, with the gravity torques g, and the Jacobians J and forces f of the active contacts.
+    /// These are the smallest forces that carry the base: S (g − Jᵀ f) = 0, where S selects the base's coordinates.
     fn gravity_compensation(
         &mut self,
         kinematics: &mut Kinematics,
@@ -114,7 +114,7 @@ impl Safety {
         let frames = &kinematics.frames;
         let rows = |c: &ContactRows| if c.geometry.motion.len() == 3 { 3 } else { 6 };
         let active = || contacts.iter().filter(|c| c.active);
-        // f = J_b λ, where (Σ J_bᵀ J_b) λ = g_b; index b selects the base's coordinates
+        // forces f = J_b λ of each contact, where (Σ J_bᵀ J_b) λ = g_b; index b selects the base's coordinates
         let mut gram = Matrix6::identity() * 1e-9;
         for c in active() {
             for r in 0..rows(c) {

@@ -9,7 +9,8 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Friction {
-    /// ‖f_t‖ ≤ μ f_n, a second-order cone.
+    /// Second-order cone ‖f_t‖ ≤ μ f_n, with the tangential force f_t, the normal force f_n and the friction
+    /// coefficient μ.
     Cone,
     /// A pyramid instead of the cone, for comparisons.
     Pyramid {
@@ -69,7 +70,7 @@ pub enum Formulation {
 /// at that tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
-    /// T (s), the look-ahead time; at least the duration of several ticks.
+    /// Look-ahead time T (s); at least the duration of several ticks.
     pub look_ahead: f64,
     /// a_max (rad/s², m/s²).
     pub max_acceleration: f64,
@@ -100,11 +101,12 @@ impl Default for JointLimits {
 pub struct Settings {
     /// Weight of ½ ‖q̈‖², which determines the motion that the tasks leave open; above 0.
     pub acceleration_weight: f64,
-    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench costs as
-    /// much as the corner forces that cause it, so that the pressure stays away from the edges.
+    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), with the contact forces f and their references f_ref. It distributes the
+    /// forces; above 0. A moment of a sole's wrench costs as much as the corner forces that cause it. This cost keeps
+    /// the centre of pressure away from the edges of the sole.
     pub force_weight: f64,
-    /// Baumgarte gains k and d. The acceleration of a contact with pose X and velocity v is k (X_ref ⊖ X) − d v instead
-    /// of 0.
+    /// Baumgarte gains k and d. The required acceleration of a contact with the pose X, the reference pose X_ref and
+    /// the velocity v is k (X_ref ⊖ X) − d v instead of 0.
     pub contact_gains: Gains,
     /// Maximum acceleration that `contact_gains` may cause (m/s², rad/s²): a foot that lands fast is stopped over
     /// several ticks.
@@ -118,7 +120,8 @@ pub struct Settings {
     pub joint_limits: Option<JointLimits>,
     /// Maximum number of ticks after the last solution in which the solution's torques serve as the safe command.
     pub hold_ticks: u32,
-    /// Damping of the safe command after `hold_ticks`: −D v, where D is this factor (s/rad) times the maximum effort.
+    /// Damping of the safe command after `hold_ticks`: the effort −D v at the velocity v, where D is this factor
+    /// (s/rad) times the maximum effort.
     pub damping: f64,
     /// Solver of the programs.
     pub backend: Backend,

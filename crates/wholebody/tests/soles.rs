@@ -61,9 +61,9 @@ fn the_centre_of_pressure_stays_within() {
     }
 }
 
-/// Checks that a wrench and corner forces distribute the load in the same way. (Four corner forces, each a quarter of
-/// the load, cost a quarter of one force that carries the load.) When the robot leans halfway to the side, the pressure
-/// must be outside of the middle of the soles, but far from their edges.
+/// Checks that a wrench and corner forces distribute the load in the same way. (The cost of a force is quadratic. So
+/// four corner forces, each a quarter of the load, cost a quarter of one force that carries the load.) When the robot
+/// leans halfway to the side, the pressure must be outside of the middle of the soles, but far from their edges.
 #[test]
 fn pressure_keeps_away_from_the_edges() {
     let model = robots::humanoid();

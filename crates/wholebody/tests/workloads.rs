@@ -35,8 +35,8 @@ fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
 }
 
 /// Checks the Karush–Kuhn–Tucker conditions of the assembled program, before any elimination or scaling. Also checks
-/// forces and torques by formulas that the controller does not use: τ from RNEA, Σ f = m (c̈ − g), cones, and centres
-/// of pressure.
+/// forces and torques by formulas that the controller does not use: τ from RNEA, Σ f = m (c̈ − g) for the acceleration
+/// c̈ of the centre of mass and the gravity g, cones, and centres of pressure.
 #[test]
 fn every_command_is_optimal() {
     all(|robot, what, ticks| {

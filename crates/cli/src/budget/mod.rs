@@ -220,7 +220,7 @@ fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) 
 /// Returns the maximum number N of knots for which an iteration takes at most `time`. The function fits the line a + b
 /// N to the measured times, and minimises relative errors.
 fn largest(rows: &[&solver::Row], time: f64) -> u64 {
-    // Minimise Σ ((a + b N)/t − 1)² by normal equations with the weights 1/t².
+    // Minimise Σ ((a + b N)/t − 1)² over the measured times t, by normal equations with the weights 1/t².
     let (mut w, mut wn, mut wnn, mut wt, mut wnt) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for row in rows {
         let (n, t) = (row.knots as f64, row.best().p99);

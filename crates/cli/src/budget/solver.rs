@@ -47,7 +47,7 @@ const DT: f64 = 0.01;
 const DISTURBANCE: f64 = 1e-3;
 /// Rate at which the slip of a contact decays (1/s).
 const HOLD: f64 = 40.0;
-/// Damping μ for redundant contacts (1/kg).
+/// Damping of the contact dynamics (1/kg), for redundant contacts.
 const DAMPING: f64 = 1e-6;
 const FRICTION: f64 = 0.7;
 

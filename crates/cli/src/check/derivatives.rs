@@ -139,7 +139,7 @@ fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) ->
 }
 
 /// Returns the derivatives of a function f by central differences. For q, column k is (f(q ⊕ h δ, v, x) − f(q ⊕ (−h δ),
-/// v, x)) / 2h, where δ is unit vector k. For v and x, h δ is added to v or to x instead.
+/// v, x)) / 2h, where h is the step and δ is unit vector k. For v and x, h δ is added to v or to x instead.
 fn by_differences(
     function: Function,
     by: By,

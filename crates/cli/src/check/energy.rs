@@ -20,9 +20,9 @@ const SPEED: f64 = 0.1;
 /// Rule for an integrator: name, integrator, bound of the error, and order.
 type Rule = (&'static str, Integrator, f64, f64);
 
-/// Rules for each integrator. A check passes if max |E(t) − E(0)| at the shortest step, relative to the largest kinetic
-/// energy, is within the bound. It also passes if the error falls at least with the given order. Light links can
-/// oscillate too fast for every step length; then only the order is meaningful.
+/// Rules for each integrator. A check passes if the energy error max |E(t) − E(0)| at the shortest step, relative to
+/// the largest kinetic energy, is within the bound. It also passes if the error falls with the step length, at least
+/// with the given order. Light links can oscillate too fast for every step length; then only the order is meaningful.
 const RULES: [Rule; 3] = [
     ("energy, RK4", Integrator::RungeKutta4, 1e-7, 3.0),
     ("energy, variational", Integrator::Variational, 1e-3, 1.5),

@@ -1,7 +1,8 @@
 //! Checks identities that hold for every robot in every state.
 //!
-//! An error is max |found − expected|, relative to 1 + the largest number involved. For results that contain M⁻¹, the
-//! bound is proportional to the condition number κ(M), if this bound is larger than the usual bound.
+//! An error is max |found − expected|, relative to 1 + the largest number involved. For results that contain the
+//! inverse of the inertia matrix M, the bound is proportional to the condition number κ(M), if this bound is larger
+//! than the usual bound.
 
 use super::ledger::Row;
 use crate::states::States;
@@ -27,12 +28,13 @@ const EXACT: f64 = 1e-14;
 /// Bound for results that use a factorisation of M, or sums of the results of several algorithms.
 const INVERTED: f64 = 1e-10;
 /// Bound for the error of a central difference with step h = 1e-6. The error consists of a term h² from the function
-/// and a term ε/h from rounding.
+/// and a term ε/h from the rounding error ε.
 const DIFFERENCE: f64 = 1e-6;
 const STEP: f64 = 1e-6;
 /// Maximum relative error of M⁻¹. With this error, three digits are still correct.
 const LOST: f64 = 1e-3;
-/// Rounding error of a solve with M, in units of ε κ(M).
+/// Rounding error of a solve with the inertia matrix M, in units of ε κ(M): the rounding error of 1 times the condition
+/// number of M.
 const ROUNDINGS: f64 = 100.0;
 
 /// Reasons for the bounds, as shown in the report of `condyle check`.
@@ -43,7 +45,8 @@ pub(super) const SOLVES: &str = "100 ε κ(M), at least 1e-10";
 const STEPS: &str = "central differences";
 const DIGITS: &str = "three digits of M⁻¹ are left";
 
-/// Returns the allowed error of results that contain M⁻¹. `condition` is the condition number of M.
+/// Returns the allowed error of results that contain the inverse of the inertia matrix M. `condition` is the condition
+/// number of M.
 pub(super) fn inverted(condition: f64) -> f64 {
     INVERTED.max(ROUNDINGS * f64::EPSILON * condition)
 }
@@ -115,7 +118,8 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         }
 
         let qdd = aba(model, &mut data, q, v, tau, &[]).to_vec();
-        // Compute |M| |q̈| + |h|, an upper bound of the terms whose sum is τ.
+        // Compute |M| |q̈| + |h|, with the inertia matrix M and the bias efforts h. It is an upper bound of the terms
+        // whose sum is τ.
         let parts = largest((M.abs() * vector(&qdd).abs()).as_slice()) + largest(&h);
         round.compare(rnea(model, &mut data, q, v, &qdd, &[]), tau, parts, bound);
         let again = aba(model, &mut data, q, v, &tau_of_a, &[]);
@@ -190,7 +194,7 @@ pub(super) fn largest(x: &[f64]) -> f64 {
     x.iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Returns Ṁ, the derivative of M along v: the ε part of M(q ⊕ ε v).
+/// Returns Ṁ, the derivative of the inertia matrix M along the velocity v: the ε part of M(q ⊕ ε v).
 fn inertia_rate(model: &Model, q: &[f64], v: &[f64]) -> DMatrix<f64> {
     let q: Vec<Dual64> = q.iter().map(|&q| Dual64::from(q)).collect();
     let way: Vec<Dual64> = v.iter().map(|&v| Dual64::new(0.0, v)).collect();

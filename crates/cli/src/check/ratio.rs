@@ -11,8 +11,8 @@ use nalgebra::DVector;
 /// Mass of a tip relative to the body that carries it.
 const RATIO: f64 = 1e6;
 
-/// Checks ABA of the robot with heavy tips. Compares ABA with RNEA, and with the solution of a linear system with M.
-/// Returns no rows if no body with mass carries another body with mass.
+/// Checks ABA of the robot with heavy tips. Compares ABA with RNEA, and with the solution of a linear system with the
+/// inertia matrix M. Returns no rows if no body with mass carries another body with mass.
 pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> Result<Vec<Row>, Error> {
     let mut round = Row::new("mass ratio 10⁶", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
     let mut forward = Row::new("mass ratio 10⁶", "aba(q, v, τ) = M⁻¹ (τ − h)", SOLVES);

@@ -18,7 +18,8 @@ use condyle_linalg::{Ltdl, check};
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use std::collections::BTreeMap;
 
-/// Rows of G. The key of a row is the index k and the number of indices before k that the row covers.
+/// Rows of the matrix G (see the documentation of the module). The key of a row is the index k and the number of
+/// indices before k that the row covers.
 pub struct Branches<'f, S> {
     factor: &'f Ltdl<S>,
     /// For each index, the indices before it on the path from the root.
@@ -26,7 +27,7 @@ pub struct Branches<'f, S> {
     /// For each index, the number of indices before it that belong to other branches. A branch begins after the last
     /// index with several children.
     before_branch: Vec<usize>,
-    /// Entries of the diagonal matrix −D⁻¹.
+    /// Entries of the diagonal matrix −D⁻¹, where M = Lᵀ D L is the inertia matrix.
     minus_inverse_diagonal: Vec<S>,
     rows: BTreeMap<(usize, usize), Vec<S>>,
 }
@@ -53,7 +54,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         Self { factor, before, before_branch, minus_inverse_diagonal, rows: BTreeMap::new() }
     }
 
-    /// Returns the row G_ke for the first m indices e before k.
+    /// Returns the entries G_ke of row k of G, for the first m indices e before k.
     fn row(&mut self, k: usize, m: usize) -> Vec<S> {
         if let Some(row) = self.rows.get(&(k, m)) {
             return row.clone();
@@ -77,7 +78,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         (0..m).fold(start, |sum, p| sum + G[p] * x(self.before[k][p]))
     }
 
-    /// Replaces b by x = −M⁻¹ b. Zeros of b cost no operations.
+    /// Replaces b by x = −M⁻¹ b, with the inertia matrix M. Zeros of b cost no operations.
     ///
     /// # Panics
     /// If `b` does not have nv numbers.
@@ -95,8 +96,8 @@ impl<'f, S: Scalar> Branches<'f, S> {
         let (mut x, mut own) = (vec![S::zero(); n], vec![S::zero(); n]);
         for k in 0..n {
             let (way, L) = (&self.before[k][..], factor.row_from_root(k));
-            // L x = −D⁻¹ y. Add the contribution of k's own branch first, then the contribution of the indices before
-            // this branch.
+            // Solve L x = −D⁻¹ y, where M = Lᵀ D L. For each index k, add the contribution of k's own branch first,
+            // then the contribution of the indices before this branch.
             let m = if is_given[k] {
                 let m = self.before_branch[k];
                 let start = y[k] * self.minus_inverse_diagonal[k];
@@ -112,8 +113,8 @@ impl<'f, S: Scalar> Branches<'f, S> {
         }
     }
 
-    /// Computes X = M⁻¹, as [`Ltdl::inverse`] does. If k and j are in different branches, X_kj is computed from the
-    /// entries X_ej, where e runs over the common ancestors of k and j.
+    /// Computes X = M⁻¹, the inverse of the inertia matrix, as [`Ltdl::inverse`] does. If k and j are in different
+    /// branches, X_kj is computed from the entries X_ej, where e runs over the common ancestors of k and j.
     ///
     /// # Panics
     /// If `X` is not nv × nv.

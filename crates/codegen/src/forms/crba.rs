@@ -2,8 +2,9 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. This form is used only for
 //! code that is recorded for one robot. In a body's frame, placements and inertias have many constants and zeros, which
-//! the recording simplifies. In addition, S_eᵀ F is a component of F. In the world's frame (`crba.rs` of `dynamics`),
-//! every number depends on all joints between the body and the world. Tests compare generated code with `crba.rs`.
+//! the recording simplifies. In addition, the product of a joint axis S_e and a force F is just a component of F. In
+//! the world's frame (`crba.rs` of `dynamics`), every number depends on all joints between the body and the world.
+//! Tests compare generated code with `crba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::Joint;

@@ -26,15 +26,15 @@ use nalgebra::{DMatrix, DVectorView};
 pub struct ForwardDerivatives<S> {
     /// Acceleration q̈, nv numbers.
     pub a: Vec<S>,
-    /// ∂q̈/∂q in the tangent space, nv × nv.
+    /// Derivative ∂q̈/∂q in the tangent space, nv × nv.
     pub da_dq: DMatrix<S>,
-    /// ∂q̈/∂v, nv × nv.
+    /// Derivative ∂q̈/∂v, nv × nv.
     pub da_dv: DMatrix<S>,
-    /// ∂q̈/∂τ = M⁻¹, nv × nv.
+    /// Derivative ∂q̈/∂τ = M⁻¹, the inverse inertia matrix, nv × nv.
     pub da_dtau: DMatrix<S>,
 }
 
-/// Computes M, nv × nv, as [`condyle_dynamics::crba`] does.
+/// Computes the inertia matrix M, nv × nv, as [`condyle_dynamics::crba`] does.
 ///
 /// # Panics
 /// If `q` does not have nq numbers.
@@ -77,7 +77,7 @@ pub fn aba<S: Scalar, R: Constant<S>>(
     a
 }
 
-/// Computes M⁻¹, nv × nv, as [`condyle_dynamics::minv`] does.
+/// Computes the inverse inertia matrix M⁻¹, nv × nv, as [`condyle_dynamics::minv`] does.
 ///
 /// # Panics
 /// As in [`condyle_dynamics::minv`].
@@ -88,9 +88,9 @@ pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: 
     }
 }
 
-/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. The acceleration is computed from M
-/// and its factor, which takes fewer operations than the articulated-body algorithm. The derivatives ∂q̈ are also
-/// computed from the factor if this takes fewer operations than M⁻¹.
+/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. The acceleration is computed from
+/// the inertia matrix M and its factor, which takes fewer operations than the articulated-body algorithm. The
+/// derivatives ∂q̈ are also computed from the factor if this takes fewer operations than M⁻¹.
 ///
 /// # Panics
 /// As in [`condyle_dynamics::aba_derivatives`].
@@ -135,7 +135,8 @@ fn floating<S: Scalar, R: Constant<S>>(model: &Model<R>) -> Vec<(usize, usize)> 
     model.floating().map(|i| (i, model.nodes()[i].idx_v)).filter(is_free).collect()
 }
 
-/// Computes the efforts τ − h + Σ Jᵢᵀ f_ext,i, with the bias efforts h and the external forces f_ext.
+/// Computes the efforts τ − h + Σ Jᵢᵀ f_ext,i, with the bias efforts h, the Jacobians Jᵢ of the bodies and the external
+/// forces f_ext.
 fn free_effort<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -159,7 +160,8 @@ struct Inverse<S> {
 }
 
 impl<S: Scalar> Inverse<S> {
-    /// Computes the inverse of M. Returns `None` if, for this model, the library's algorithm computes M⁻¹ without M.
+    /// Computes the inverse of the inertia matrix M. Returns `None` if, for this model, the library's algorithm
+    /// computes M⁻¹ without M.
     fn of<R>(model: &Model<R>, M: impl FnOnce() -> DMatrix<S>) -> Option<Self> {
         model.check_regular();
         let (mut factor, mut Minv) = (Ltdl::new(model), zeros(model));
@@ -175,7 +177,7 @@ impl<S: Scalar> Inverse<S> {
         Some(Self { factor: Some(factor), Minv })
     }
 
-    /// Replaces b by x = M⁻¹ b.
+    /// Replaces b by x = M⁻¹ b, with the inertia matrix M.
     fn solve(&self, b: &mut [S]) {
         match &self.factor {
             Some(factor) => factor.solve(b),
@@ -188,9 +190,9 @@ impl<S: Scalar> Inverse<S> {
         }
     }
 
-    /// Computes −M⁻¹ B for two matrices B. The known columns of the results are not computed; they stay zero. The
-    /// function uses M's factor if twice the number of the factor's entries is less than nv². Then solving with the
-    /// factor takes fewer operations than multiplying by M⁻¹.
+    /// Computes −M⁻¹ B for the inertia matrix M and two matrices B. The known columns of the results are not computed;
+    /// they stay zero. The function uses M's factor if twice the number of the factor's entries is less than nv². Then
+    /// solving with the factor takes fewer operations than multiplying by M⁻¹.
     fn neg_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
         let n = model.nv();
         let mut all = B.map(|(B, known)| {

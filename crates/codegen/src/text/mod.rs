@@ -39,8 +39,8 @@ pub enum Language {
     /// C99 with vectors of GCC and clang. Each call computes eight states in `float` precision.
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
-    /// `robot_aba_casadi` for `robot_aba`. The interface has the Jacobian if `robot_aba_derivatives` is also generated.
-    /// In addition, no position coordinates of the robot may be quaternions or points on circles. For impacts, the
+    /// `robot_aba_casadi` for `robot_aba`. The interface has the Jacobian under two conditions. `robot_aba_derivatives`
+    /// is also generated. No position coordinates of the robot are a quaternion or a pair (cos, sin). For impacts, the
     /// Jacobian also has columns for the restitution; the generated functions of derivatives have no such columns.
     CCasadi,
     /// A module of Rust with `f64`, without `std`.
@@ -236,8 +236,8 @@ pub(crate) trait Dialect {
 }
 
 /// Number of steps between two fences. Without fences, LLVM's scheduler moves loads far ahead of their uses, which
-/// spills registers. With fences, the vectorised derivatives of the robot Talos take 0.72 of the time. The gain is the
-/// same for distances of 20 to 200 steps.
+/// spills registers. With fences, the vectorised derivatives of the robot Talos take 0.72 of their time without fences.
+/// The gain is the same for distances of 20 to 200 steps.
 const FENCED: usize = 50;
 
 /// Writer of the code of a program's parts.

@@ -6,8 +6,8 @@ use alloc::vec::Vec;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// Bit of a part's state, set while a thread works on the part. The state is 2·phase before the phase begins, and
-/// 2·phase + `AT_WORK` during the phase.
+/// Bit of a part's state, set while a thread works on the part. The state is 2 p before phase p of the computation
+/// begins, and 2 p + `AT_WORK` during this phase.
 const AT_WORK: u8 = 1;
 
 /// Parts of two slices of equal length, which are split at the same indices. Each part goes through the phases 0, 1, …

@@ -19,8 +19,8 @@ static GLOBAL: OnceLock<usize> = OnceLock::new();
 /// Pool of the first process that was forked from the process `FIRST` and shared work.
 static FORKED: OnceLock<Forked> = OnceLock::new();
 
-/// Pool of a forked process. The pool is never dropped. It is read without a lock, because another thread might hold
-/// the lock during a fork.
+/// Pool of a forked process. The pool is never dropped. It is read without a lock: if another thread held the lock
+/// during a fork, the child process would wait forever.
 struct Forked {
     process: u32,
     /// Thread pool; `None` if no thread could be started.
@@ -93,8 +93,8 @@ pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
 }
 
 /// Executes [`join`] for all types of closures. This function is compiled only once, because rayon's code takes some
-/// kilobytes for each type of closure. A calling thread outside the pool runs the first closure itself. Waking another
-/// thread takes about 50 µs, and the data is still in the cache of the caller's core.
+/// kilobytes for each type of closure. A calling thread outside the pool runs the first closure itself, because waking
+/// another thread takes about 50 µs, and because the data is still in the cache of the caller's core.
 fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     match pool() {
         Pool::Current => {

@@ -71,7 +71,8 @@ impl Joint {
         (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
-    /// Returns the pose λXi = X_T X_J(q) of body i in the frame of its parent λ.
+    /// Returns the pose λXi = X_T X_J(q) of body i in the frame of its parent λ. X_T is the constant placement of the
+    /// joint, and X_J(q) is the pose of the joint.
     #[inline(always)]
     pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
         let (sin, cos) = match l.joint(i) {
@@ -83,7 +84,7 @@ impl Joint {
     }
 
     /// Returns the pose λXi = X_T X_J(q) of body i in the frame of its parent λ, given the sine and cosine of its
-    /// joint's angle.
+    /// joint's angle. X_T is the constant placement of the joint, and X_J(q) is the pose of the joint.
     #[inline(always)]
     pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         Self::placement_on(l, i, l.placement(i), q, sin, cos)
@@ -117,7 +118,8 @@ impl Joint {
         }
     }
 
-    /// Returns the motion S v of joint i in the body's frame, where v contains velocities or accelerations.
+    /// Returns the motion S v of joint i in the body's frame. S is the motion subspace of the joint, and v contains
+    /// velocities or accelerations.
     #[inline(always)]
     pub fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
         match l.joint(i) {
@@ -137,7 +139,8 @@ impl Joint {
         }
     }
 
-    /// Adds the joint effort Sᵀ f of joint i to the coordinates τ.
+    /// Adds the effort Sᵀ f of joint i to the coordinates τ. S is the joint's motion subspace, and f is the force on
+    /// its body.
     #[inline(always)]
     pub fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
         match l.joint(i) {

@@ -2,8 +2,8 @@
 
 use condyle_spatial::{Mat3, Motion, Scalar, Vec3};
 
-/// Velocity S q̇ or acceleration S q̈ of a joint in the body's frame. Each kind of joint has the form with the fewest
-/// numbers.
+/// Velocity S q̇ or acceleration S q̈ of a joint with the motion subspace S, in the body's frame. Each kind of joint
+/// has the form with the fewest numbers.
 #[derive(Clone, Copy)]
 pub enum JointMotion<S> {
     /// Motion about z.
@@ -40,7 +40,8 @@ pub struct ClassicalMotion<S> {
 }
 
 impl<S: Scalar> ClassicalMotion<S> {
-    /// Returns K = ω̇× + ω× ω×, with which a point r of the body has the acceleration a + K r.
+    /// Returns K = ω̇× + ω× ω×. With the acceleration a of the origin, a point r of the body has the acceleration a + K
+    /// r.
     #[inline(always)]
     pub fn centripetal(&self) -> Mat3<S> {
         let (w, dw, minus) = (self.w, self.dw, -self.w);
@@ -64,7 +65,8 @@ impl<S: Scalar> JointMotion<S> {
     }
 
     /// Returns the motion of a body: ω + ω_J, ω̇ + ω̇_J + ω × ω_J, a + a_J + (2 ω + ω_J) × v_J. `self` is the motion
-    /// that the body would have if the joint were fixed. The velocity and the acceleration aJ of the joint are given.
+    /// that the body would have if the joint were fixed. The index J marks the motion of the joint, whose velocity and
+    /// acceleration are given.
     #[inline(always)]
     pub fn added_to(
         self,

@@ -32,7 +32,7 @@ pub struct ColumnMap {
     pub predecessors: Vec<Predecessor>,
     /// Partition of all columns into blocks of consecutive columns.
     pub blocks: Vec<ColumnBlock>,
-    /// Sizes of the matrices Z D⁻¹ and Zᵀ, where Z = L⁻¹.
+    /// Sizes of the matrices Z D⁻¹ and Zᵀ, where Z = L⁻¹ and M = Lᵀ D L is the inertia matrix.
     pub sizes: Sizes,
 }
 
@@ -54,7 +54,7 @@ pub struct Pair {
     pub in_row: [u32; LANES],
     /// Index of the entry in the column of the step's own column.
     pub in_column: [u32; LANES],
-    /// Index of the entry of Z D⁻¹.
+    /// Index of the entry in the matrix Z D⁻¹, where Z = L⁻¹ and M = Lᵀ D L is the inertia matrix.
     pub in_ZD: [u32; LANES],
     /// Index of the entry of Zᵀ.
     pub in_Zt: [u32; LANES],
@@ -86,9 +86,11 @@ pub struct ColumnBlock {
 pub struct Sizes {
     /// Number of rows of both matrices.
     pub rows: usize,
-    /// Length of a row of Z D⁻¹. A row contains the columns on the path from the root.
+    /// Length of a row of the matrix Z D⁻¹, where Z = L⁻¹ and M = Lᵀ D L is the inertia matrix. A row contains the
+    /// columns on the path from the root.
     pub ZD: usize,
-    /// Length of a row of Zᵀ. A row contains all columns and is padded to whole vectors.
+    /// Length of a row of the matrix Zᵀ, where Z = L⁻¹ and M = Lᵀ D L is the inertia matrix. A row contains all columns
+    /// and is padded to whole vectors.
     pub Zt: usize,
 }
 
@@ -98,12 +100,12 @@ impl Sizes {
         Self { rows: tree.nv, ZD: depth, Zt: tree.nv.next_multiple_of(2 * LANES) }
     }
 
-    /// Returns the index after all rows of Z D⁻¹. Lanes without a body write to this index.
+    /// Returns the index after all rows of the matrix Z D⁻¹. Lanes without a body write to this index.
     pub fn end_of_ZD(self) -> usize {
         self.rows * self.ZD
     }
 
-    /// Returns the index after all rows of Zᵀ. Lanes without a body write to this index.
+    /// Returns the index after all rows of the matrix Zᵀ. Lanes without a body write to this index.
     pub fn end_of_Zt(self) -> usize {
         self.rows * self.Zt
     }

@@ -12,7 +12,8 @@ use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Step {
-    /// X_T: pose of the joint's frame in the parent's frame, where both frames are turned.
+    /// X_T: pose of the joint's frame in the parent's frame, where each frame is turned such that the axis of its joint
+    /// is z.
     pub placement: Se3<[f64; LANES]>,
     /// Inertia in the turned frame.
     pub inertia: Inertia<[f64; LANES]>,

@@ -187,8 +187,8 @@ fn classes_of_actuators() {
     assert_eq!((found.damping(), found.armature()), (&[0.0][..], &[0.0][..]));
 }
 
-/// Compares M and damping forces with MuJoCo's `mj_fullM` and `qfrc_damper`: armature and damping of an actuator are
-/// multiplied by gear².
+/// Compares the inertia matrix M and damping forces with MuJoCo's `mj_fullM` and `qfrc_damper`: armature and damping of
+/// an actuator are multiplied by gear².
 #[test]
 fn armature_and_damping_of_actuators() {
     let found = driven(

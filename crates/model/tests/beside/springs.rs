@@ -23,8 +23,9 @@ fn springs_of_joints() {
 }
 
 /// Compares springs and gains that depend on inertia with MuJoCo's `jnt_stiffness`, `dof_damping` and
-/// `actuator_biasprm`. In these robots, joints carry other joints. The inertia is the inverse of J M⁻¹ Jᵀ, with the
-/// rotors of joints and tendons, in the initial configuration of the file.
+/// `actuator_biasprm`. In these robots, joints carry other joints. The inertia is the inverse of J M⁻¹ Jᵀ in the
+/// initial configuration of the file. J is the Jacobian of a length, and M is the inertia matrix with the rotors of
+/// joints and tendons.
 #[test]
 fn springs_and_gains_from_inertia() {
     let text = format!(
@@ -100,8 +101,8 @@ fn tendons_over_one_joint() {
     assert_eq!(said(&slack), [format!("<string>:1: fixed `t`: {what}")]);
 }
 
-/// Compares M with MuJoCo's `mj_fullM`, for tendons over several joints. Only effects that the diagonal of M cannot
-/// represent cause warnings.
+/// Compares the inertia matrix M with MuJoCo's `mj_fullM`, for tendons over several joints. Only effects that the
+/// diagonal of M cannot represent cause warnings.
 #[test]
 fn tendons_over_several_joints() {
     let text = |first: &str, second: &str, attributes: &str| {
@@ -148,7 +149,7 @@ fn weight_is_compensated() {
         compensation.carried(model.bodies()[1].inertia)
     };
     assert_eq!(carried(&found).mass, 5.0);
-    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 kg at (0.1, 0, 0), 0.5 · 2 kg at (0.1, 0, 1)
+    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 4 kg at (0.1, 0, 0) and 1 kg at (0.1, 0, 1)
     let scaled = read(&text.replace("<worldbody>", "<compiler settotalmass='12'/><worldbody>")).unwrap();
     close(&[carried(&scaled).mass], &[10.0]);
     // as in MuJoCo, a negative `gravcomp` acts only if another `gravcomp` is positive

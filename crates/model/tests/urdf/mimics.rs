@@ -40,7 +40,7 @@ fn mimics() {
 }
 
 /// Checks that limits, damping and friction of a follower act on its leader. With x = −2 q + 0.5, the limits −1 and 1
-/// of x are the limits −0.25 and 0.75 of q. The damping d of x has the power d ẋ² = 4 d q̇².
+/// of x are the limits −0.25 and 0.75 of q. A damping coefficient d of x consumes the power d ẋ² = 4 d q̇².
 #[test]
 fn limits_and_losses_of_followers() {
     let free = followers("joint='j' multiplier='-2' offset='0.5'", "joint='j' multiplier='0'");

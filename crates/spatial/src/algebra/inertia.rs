@@ -36,7 +36,7 @@ impl<S: Scalar> Inertia<S> {
 
 impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
     type Output = Force<S>;
-    /// Returns I v = [m v − h × ω; Ī ω + h × v].
+    /// Returns I [v; ω] = [m v − h × ω; Ī ω + h × v] for the inertia I = (m, h, Ī).
     #[inline(always)]
     fn mul(self, v: Motion<S>) -> Force<S> {
         Force {
@@ -47,7 +47,8 @@ impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
 }
 
 impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
-    /// Rotates the inertia, then shifts its origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
+    /// Rotates the inertia (m, h, Ī) by R, then shifts its origin by p: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× −
+    /// m p× p×.
     #[inline(always)]
     fn act(&self, I: Inertia<S>) -> Inertia<S> {
         let p = self.translation;
@@ -99,7 +100,7 @@ impl<S: Scalar> Mul<Motion<S>> for ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> ArticulatedInertia<S> {
-    /// Returns I − s U Uᵀ.
+    /// Returns I − s U Uᵀ, where I is this inertia.
     #[inline(always)]
     pub fn minus_outer(self, U: Force<S>, s: S) -> Self {
         let (s, Mat3 { x, y, z }) = (-s, self.coupling);
@@ -130,7 +131,8 @@ impl<S: Scalar> Act<ArticulatedInertia<S>> for Se3<S> {
         let (linear, rotational) = (I.linear.rotate(R), I.rotational.rotate(R));
         let B = R * I.coupling * R.transpose();
         let Mat3 { x, y, z } = linear.full();
-        // Computes M [p]ₓ column by column. The columns of [p]ₓ are (0, p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0).
+        // Computes M [p]ₓ column by column, for the linear block M and the translation p. The columns of [p]ₓ are (0,
+        // p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0).
         let Mp = Mat3 {
             x: y.scale_add(p.z, -z.scale(p.y)),
             y: z.scale_add(p.x, -x.scale(p.z)),

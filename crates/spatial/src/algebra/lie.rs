@@ -41,7 +41,7 @@ pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
     c
 }
 
-/// 1/k!, at index k.
+/// Reciprocal factorials: 1/k! at index k.
 const INVERSE_FACTORIAL: [f64; 4] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0];
 
 /// Computes the functions from the series, for t < 1.
@@ -95,7 +95,8 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     let negative = q.scalar.lt(S::zero());
     let v = q.vector.scale(S::select(negative, S::splat(-1.0), S::one()));
     let w = S::select(negative, -q.scalar, q.scalar);
-    // With n = |v|, the angle is θ = 2 atan(n/w). Near 0, θ/n = (2/w)(1 − r/3 + r²/5 − …) with r = n²/w².
+    // With n = |v| for the quaternion (v, w), the angle is θ = 2 atan(n/w). Near 0, θ/n = (2/w)(1 − r/3 + r²/5 − …)
+    // with r = n²/w².
     let n2 = v.norm_squared();
     let small = n2.lt(S::splat(1e-3));
     let half = if S::all(small) {
@@ -113,7 +114,7 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     v.scale(half * S::splat(2.0))
 }
 
-/// Computes θ/(2n) near 0 from its series.
+/// Computes θ/(2n) from its series, for a quaternion with a vector part of length n near 0 and the angle θ.
 #[inline(always)]
 fn log3_near<S: Scalar>(n2: S, w: S) -> S {
     let r = n2 * (w * w).recip();
@@ -146,14 +147,15 @@ fn rotation_series<S: Scalar>(w: Vec3<S>, a: S, b: S) -> Mat3<S> {
     (square + w.scale(a).skew()).add_diagonal(S::one() - bw.dot(w))
 }
 
-/// Returns the right Jacobian of [`exp3`]: 1 − c₂ w× + c₃ w×².
+/// Returns the right Jacobian of [`exp3`]: 1 − c₂ w× + c₃ w×², with the functions cₖ of `stumpff` at |w|².
 #[inline(always)]
 pub fn jexp3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     let c = stumpff(w.norm_squared());
     rotation_series(w, -c[2], c[3])
 }
 
-/// Returns the inverse of [`jexp3`], the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×².
+/// Returns the inverse of [`jexp3`], the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×² with θ =
+/// |w|.
 #[inline(always)]
 pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared())[0])
@@ -162,13 +164,15 @@ pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
 /// Computes the exponential of a twist: the pose reached by moving with the twist for one unit of time.
 ///
 /// Returns the rotation as a quaternion, as in configurations, and the translation V v with V = 1 + c₂ w× + c₃ w×².
+/// Here v and w are the linear and angular parts of the twist, and cₖ are the functions of `stumpff` at |w|².
 #[inline(always)]
 pub fn exp6<S: Scalar>(m: Motion<S>) -> (Quaternion<S>, Vec3<S>) {
     let c = stumpff(m.angular.norm_squared());
     (exp3(m.angular), rotation_series(m.angular, c[2], c[3]) * m.linear)
 }
 
-/// Returns the twist of a pose (rotation, translation): [V⁻¹ p; w], with V as in [`exp6`]. Its angle is at most π.
+/// Returns the twist [V⁻¹ p; w] of a pose with translation p and rotation vector w, with V as in [`exp6`]. The angle
+/// |w| is at most π.
 #[inline(always)]
 pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<S> {
     let w = log3(rotation);
@@ -180,9 +184,9 @@ pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<
 /// angular part of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionMap<S> {
-    /// A: maps the linear part to the linear part, and the angular part to the angular part.
+    /// Block A: maps the linear part to the linear part, and the angular part to the angular part.
     pub diagonal: Mat3<S>,
-    /// B: maps the angular part to the linear part.
+    /// Block B: maps the angular part to the linear part.
     pub coupling: Mat3<S>,
 }
 
@@ -223,7 +227,8 @@ impl<S: Scalar> core::ops::Mul for MotionMap<S> {
     }
 }
 
-/// Returns the map with A = 1 + a w× + b w×² for the twist (v, w). B is the derivative of A with respect to w along v.
+/// Returns the map [[A, B], [0, A]] with A = 1 + a w× + b w×² for the twist (v, w). B is the derivative of A with
+/// respect to w along v.
 ///
 /// `da` and `db` are the derivatives a', b' with respect to |w|². B = y× + w× x× + x× w×,
 /// with y = a v + 2 a' (v·w) w and x = b v + b' (v·w) w.
@@ -244,8 +249,8 @@ fn series_map<S: Scalar>(
 /// Returns the right Jacobian of [`exp6`]: [[J, J'], [0, J]] with J = [`jexp3`]. J' is the derivative of J along the
 /// linear part.
 ///
-/// Source: Barfoot and Furgale (2014), equations 100 and 102. The derivative of J along a vector is a shorter form of
-/// both equations.
+/// Source: Barfoot and Furgale (2014), equations 100 and 102. The code computes J' as a derivative along a vector,
+/// which takes less code than both equations.
 #[inline(always)]
 pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
     let [_, _, c2, c3, c4, c5] = stumpff(m.angular.norm_squared());

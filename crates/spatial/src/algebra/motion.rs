@@ -78,7 +78,8 @@ impl<S: Scalar> Force<S> {
 }
 
 impl<S: Scalar> Motion<S> {
-    /// Returns v + ω × p: the velocity (m/s) of the body's point at p (m), in coordinates of the frame.
+    /// Returns v + ω × p for the motion [v; ω]: the velocity (m/s) of the body's point at p (m), in coordinates of the
+    /// frame.
     #[inline(always)]
     pub fn velocity_at(self, point: Vec3<S>) -> Vec3<S> {
         self.angular.cross_add(point, self.linear)
@@ -92,7 +93,7 @@ impl<S: Scalar> Motion<S> {
 }
 
 impl<S: Scalar> Cross<Motion<S>> for Motion<S> {
-    /// Returns v × m = [ω × mᵥ + v × m_ω; ω × m_ω].
+    /// Returns [v; ω] × m = [ω × mᵥ + v × m_ω; ω × m_ω] for the motion m = [mᵥ; m_ω].
     #[inline(always)]
     fn cross(self, m: Motion<S>) -> Motion<S> {
         Motion {
@@ -103,7 +104,7 @@ impl<S: Scalar> Cross<Motion<S>> for Motion<S> {
 }
 
 impl<S: Scalar> Cross<Force<S>> for Motion<S> {
-    /// Returns v ×* f = [ω × f; ω × n + v × f].
+    /// Returns [v; ω] ×* [f; n] = [ω × f; ω × n + v × f] for a force f with the moment n.
     #[inline(always)]
     fn cross(self, f: Force<S>) -> Force<S> {
         Force {

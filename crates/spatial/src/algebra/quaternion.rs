@@ -7,7 +7,7 @@ use crate::scalar::Scalar;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Quaternion<S> {
-    /// Vector part: sin(θ/2) times the axis.
+    /// Vector part: sin(θ/2) times the axis, for a rotation by the angle θ.
     pub vector: Vec3<S>,
     /// Scalar part: cos(θ/2).
     pub scalar: S,

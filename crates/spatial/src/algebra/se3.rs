@@ -12,7 +12,7 @@ use core::ops::Mul;
 pub struct Se3<S> {
     /// Rotation aRb. Its columns are the axes of b in coordinates of a.
     pub rotation: Mat3<S>,
-    /// Origin of b in coordinates of a (m).
+    /// Origin of frame b in coordinates of frame a (m).
     pub translation: Vec3<S>,
 }
 impl_lift!(Se3 { rotation, translation });
@@ -57,13 +57,13 @@ impl<S: Scalar> Mul for Se3<S> {
 }
 
 impl<S: Scalar> Act<Motion<S>> for Se3<S> {
-    /// Returns [R v + p × R ω; R ω].
+    /// Returns [R v + p × R ω; R ω] for the motion m = [v; ω] and the pose (R, p).
     #[inline(always)]
     fn act(&self, m: Motion<S>) -> Motion<S> {
         let angular = self.rotation * m.angular;
         Motion { linear: self.translation.cross_add(angular, self.rotation * m.linear), angular }
     }
-    /// Returns [Rᵀ(v − p × ω); Rᵀ ω].
+    /// Returns [Rᵀ(v − p × ω); Rᵀ ω] for the motion m = [v; ω] and the pose (R, p).
     #[inline(always)]
     fn act_inv(&self, m: Motion<S>) -> Motion<S> {
         Motion {
@@ -74,13 +74,13 @@ impl<S: Scalar> Act<Motion<S>> for Se3<S> {
 }
 
 impl<S: Scalar> Act<Force<S>> for Se3<S> {
-    /// Returns [R f; R n + p × R f].
+    /// Returns [R f; R n + p × R f] for a force f with the moment n and the pose (R, p).
     #[inline(always)]
     fn act(&self, f: Force<S>) -> Force<S> {
         let linear = self.rotation * f.linear;
         Force { linear, angular: self.translation.cross_add(linear, self.rotation * f.angular) }
     }
-    /// Returns [Rᵀ f; Rᵀ(n − p × f)].
+    /// Returns [Rᵀ f; Rᵀ(n − p × f)] for a force f with the moment n and the pose (R, p).
     #[inline(always)]
     fn act_inv(&self, f: Force<S>) -> Force<S> {
         Force {
@@ -92,12 +92,12 @@ impl<S: Scalar> Act<Force<S>> for Se3<S> {
 
 /// Action of a pose on a point.
 impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
-    /// Returns R x + p.
+    /// Returns R x + p for the pose (R, p).
     #[inline(always)]
     fn act(&self, x: Vec3<S>) -> Vec3<S> {
         self.rotation.mul_add(x, self.translation)
     }
-    /// Returns Rᵀ(x − p).
+    /// Returns Rᵀ(x − p) for the pose (R, p).
     #[inline(always)]
     fn act_inv(&self, x: Vec3<S>) -> Vec3<S> {
         self.rotation.transpose_mul(x - self.translation)

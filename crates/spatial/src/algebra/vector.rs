@@ -140,17 +140,17 @@ impl<S: Scalar> Vec3<S> {
     pub fn new(x: S, y: S, z: S) -> Self {
         Self { x, y, z }
     }
-    /// Returns a · b.
+    /// Returns the dot product of two vectors.
     #[inline(always)]
     pub fn dot(self, o: Self) -> S {
         self.x.mul_add(o.x, self.y.mul_add(o.y, self.z * o.z))
     }
-    /// Returns a · b + s.
+    /// Returns the dot product of two vectors, plus s.
     #[inline(always)]
     pub fn dot_add(self, o: Self, s: S) -> S {
         self.x.mul_add(o.x, self.y.mul_add(o.y, self.z.mul_add(o.z, s)))
     }
-    /// Returns a × b + c.
+    /// Returns the cross product of two vectors, plus c.
     #[inline(always)]
     pub fn cross_add(self, o: Self, c: Self) -> Self {
         Self {
@@ -159,7 +159,7 @@ impl<S: Scalar> Vec3<S> {
             z: self.x.mul_add(o.y, (-self.y).mul_add(o.x, c.z)),
         }
     }
-    /// Returns a × b.
+    /// Returns the cross product of two vectors.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self {
@@ -212,28 +212,28 @@ impl<S: Scalar> Mat3<S> {
         let (o, i) = (S::zero(), S::one());
         Self { x: Vec3::new(i, o, o), y: Vec3::new(o, i, o), z: Vec3::new(o, o, i) }
     }
-    /// Returns A b + c.
+    /// Returns A b + c, where A is this matrix.
     #[inline(always)]
     pub fn mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
         self.x.scale_add(b.x, self.y.scale_add(b.y, self.z.scale_add(b.z, c)))
     }
-    /// Returns Aᵀ b + c.
+    /// Returns Aᵀ b + c, where A is this matrix.
     #[inline(always)]
     pub fn transpose_mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
         Vec3::new(self.x.dot_add(b, c.x), self.y.dot_add(b, c.y), self.z.dot_add(b, c.z))
     }
-    /// Returns Aᵀ b.
+    /// Returns Aᵀ b, where A is this matrix.
     #[inline(always)]
     pub fn transpose_mul(self, b: Vec3<S>) -> Vec3<S> {
         Vec3::new(self.x.dot(b), self.y.dot(b), self.z.dot(b))
     }
-    /// Returns Aᵀ.
+    /// Returns the transpose of this matrix.
     #[inline(always)]
     pub fn transpose(self) -> Self {
         let Self { x, y, z } = self;
         Self { x: Vec3::new(x.x, y.x, z.x), y: Vec3::new(x.y, y.y, z.y), z: Vec3::new(x.z, y.z, z.z) }
     }
-    /// Returns A + s 1.
+    /// Returns this matrix with s added to each diagonal entry.
     #[inline(always)]
     pub fn add_diagonal(mut self, s: S) -> Self {
         self.x.x += s;
@@ -312,18 +312,18 @@ pub struct Sym3<S> {
 impl_linear!(Sym3 { xx, xy, yy, xz, yz, zz });
 
 impl<S: Scalar> Sym3<S> {
-    /// Returns s 1.
+    /// Returns s times the identity matrix.
     #[inline(always)]
     pub fn diagonal(s: S) -> Self {
         let o = S::zero();
         Self { xx: s, xy: o, yy: s, xz: o, yz: o, zz: s }
     }
-    /// Returns a aᵀ.
+    /// Returns the outer product a aᵀ.
     #[inline(always)]
     pub fn outer(a: Vec3<S>) -> Self {
         Self { xx: a.x * a.x, xy: a.x * a.y, yy: a.y * a.y, xz: a.x * a.z, yz: a.y * a.z, zz: a.z * a.z }
     }
-    /// Returns A + s a aᵀ.
+    /// Returns A + s a aᵀ, where A is this matrix.
     #[inline(always)]
     pub fn add_outer(self, s: S, a: Vec3<S>) -> Self {
         let b = a.scale(s);
@@ -336,7 +336,7 @@ impl<S: Scalar> Sym3<S> {
             zz: b.z.mul_add(a.z, self.zz),
         }
     }
-    /// Returns A b + c.
+    /// Returns A b + c, where A is this matrix.
     #[inline(always)]
     pub fn mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
         Vec3::new(
@@ -345,7 +345,7 @@ impl<S: Scalar> Sym3<S> {
             self.xz.mul_add(b.x, self.yz.mul_add(b.y, self.zz.mul_add(b.z, c.z))),
         )
     }
-    /// Returns a bᵀ + b aᵀ.
+    /// Returns the sum a bᵀ + b aᵀ of two outer products.
     #[inline(always)]
     pub fn outer_sum(a: Vec3<S>, b: Vec3<S>) -> Self {
         let two = S::splat(2.0);
@@ -358,7 +358,7 @@ impl<S: Scalar> Sym3<S> {
             zz: two * a.z * b.z,
         }
     }
-    /// Returns A + s 1.
+    /// Returns this matrix with s added to each diagonal entry.
     #[inline(always)]
     pub fn add_diagonal(mut self, s: S) -> Self {
         self.xx += s;
@@ -366,7 +366,7 @@ impl<S: Scalar> Sym3<S> {
         self.zz += s;
         self
     }
-    /// Returns R A Rᵀ.
+    /// Returns R A Rᵀ, where A is this matrix.
     #[inline(always)]
     pub fn rotate(self, R: Mat3<S>) -> Self {
         let B = (R * self.full()).transpose(); // the columns of B are the rows of R A

@@ -18,7 +18,7 @@ pub fn tanh<S: Scalar>(x: S) -> S {
     let inside = x.abs().lt(S::splat(SATURATED));
     let y = S::select(inside, x, S::zero()) * S::splat(SCALE);
     let t = y * y;
-    // Evaluates Lambert's (1768) y/(1 + y²/(3 + y²/(5 + … y²/13))) as one fraction.
+    // Evaluates Lambert's (1768) continued fraction y/(1 + y²/(3 + y²/(5 + … y²/13))) as one quotient of polynomials.
     let above = (t + S::splat(378.0)).mul_add(t, S::splat(17_325.0)).mul_add(t, S::splat(135_135.0));
     let below = t.mul_add(S::splat(28.0), S::splat(3150.0));
     let below = below.mul_add(t, S::splat(62_370.0)).mul_add(t, S::splat(135_135.0));

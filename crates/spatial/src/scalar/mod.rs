@@ -86,7 +86,7 @@ pub trait Scalar:
     /// Returns |self|.
     fn abs(self) -> Self;
     /// Returns self. If operations are recorded, for example to generate code, the recorder does not move the sign of
-    /// this number out of products. So equal sums are recorded in the same form.
+    /// this number out of products. So sums with the same structure are also recorded with the same structure.
     #[doc(hidden)]
     #[inline(always)]
     fn kept(self) -> Self {

@@ -343,9 +343,9 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
 }
 
-/// Unsafe marker trait. Vector types have a parameter of this trait, so code without such a type cannot name them. A
-/// processor may lack the instructions of vector operations, and the operations do not check this. [`Scalar::enter`],
-/// which calls code that is generic over the scalar, checks this.
+/// Unsafe marker trait. Vector types have a type parameter that implements this trait, so code without a type that
+/// implements the trait cannot name vector types. A processor may lack the instructions of vector operations, and the
+/// operations do not check this. [`Scalar::enter`], which calls code that is generic over the scalar, checks this.
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};

@@ -34,18 +34,18 @@ const PATIENCE: u32 = 1000;
 /// Number of solves with all rows after a failed solve without some of the rows.
 const RETRIES: u32 = 10;
 
-/// A row of clarabel's A x + s = b.
+/// Row of clarabel's constraints A x + s = b.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Row {
-    /// aᵢ x = bᵢ.
+    /// Equality i: aᵢ x = bᵢ.
     Equality(usize),
-    /// gᵢ x = lᵢ = uᵢ.
+    /// Row i of G whose bounds are equal: gᵢ x = lᵢ = uᵢ.
     Fixed(usize),
-    /// −gᵢ x ≤ −lᵢ.
+    /// Lower bound of row i of G: −gᵢ x ≤ −lᵢ.
     Lower(usize),
-    /// gᵢ x ≤ uᵢ.
+    /// Upper bound of row i of G: gᵢ x ≤ uᵢ.
     Upper(usize),
-    /// −fᵢ x + s = hᵢ.
+    /// Row i of F, in a cone: −fᵢ x + s = hᵢ.
     Cone(usize),
 }
 
@@ -166,8 +166,8 @@ impl Shape {
             tol_feas: tolerance,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
-            // Refine only as accurately as the tolerance requires, because clarabel's own 1e-13 costs a sixth of the
-            // time.
+            // Refine only as accurately as the tolerance requires, because clarabel's own value, 1e-13, takes a sixth
+            // of the time of a solve.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
             static_regularization_constant: REGULARISATION,

@@ -93,11 +93,11 @@ pub(crate) struct Outcome {
 /// Multipliers of the last solve. Their signs are described in the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Multipliers<'s> {
-    /// y, of A x = b.
+    /// Multipliers y of the equalities A x = b.
     pub equalities: &'s [f64],
-    /// z, of l ≤ G x ≤ u.
+    /// Multipliers z of the rows l ≤ G x ≤ u.
     pub rows: &'s [f64],
-    /// w, of the cones.
+    /// Multipliers w of the cones.
     pub cones: &'s [f64],
 }
 

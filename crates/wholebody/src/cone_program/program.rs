@@ -22,23 +22,23 @@ pub(crate) struct Size {
 pub(crate) struct ConeProgram {
     /// Size in use. Each number is at most the number in the capacity.
     pub size: Size,
-    /// P: n × n, positive semidefinite; only the lower triangle is read.
+    /// Matrix P of the cost: n × n for n unknowns, positive semidefinite. Only the lower triangle is read.
     pub P: DMatrix<f64>,
-    /// c: n.
+    /// Vector c of the linear cost: one number for each unknown.
     pub c: Vec<f64>,
-    /// Aᵀ: a column for each equality.
+    /// Transpose of A, the coefficients of the equalities: a column for each equality.
     pub At: DMatrix<f64>,
-    /// b.
+    /// Right sides b of the equalities A x = b.
     pub b: Vec<f64>,
-    /// Gᵀ: a column for each row of G.
+    /// Transpose of G, the coefficients of the rows: a column for each row.
     pub Gt: DMatrix<f64>,
-    /// l; −∞ for a missing bound.
+    /// Lower bounds l of the rows of G; −∞ for a missing bound.
     pub lower: Vec<f64>,
-    /// u; ∞ for a missing bound.
+    /// Upper bounds u of the rows of G; ∞ for a missing bound.
     pub upper: Vec<f64>,
-    /// Fᵀ: a column for each row of F, cone after cone.
+    /// Transpose of F, the coefficients of the cones' rows: a column for each row, cone after cone.
     pub Ft: DMatrix<f64>,
-    /// h.
+    /// Constants h of the cones' rows h + F x.
     pub h: Vec<f64>,
     /// Dimension of each cone in use: at least 2, or 1 for the constraint s₀ ≥ 0. The sum of all dimensions is
     /// `size.cone_rows`.
@@ -146,7 +146,7 @@ impl ConeProgram {
         Ok(())
     }
 
-    /// Returns ½ xᵀ P x + cᵀ x.
+    /// Returns the objective ½ xᵀ P x + cᵀ x.
     #[cfg(test)]
     pub(crate) fn objective(&self, x: &[f64]) -> f64 {
         let mut sum = 0.0;

@@ -95,7 +95,8 @@ pub fn accelerations(
     (feet, com)
 }
 
-/// Computes M q̈ + h − Jᵀ f by one pass of inverse dynamics. The contact forces f are the external forces of this pass.
+/// Computes the efforts M q̈ + h − Jᵀ f by one pass of inverse dynamics. The contact forces f are the external forces
+/// of this pass.
 pub fn inverse_dynamics(
     model: &Model,
     contacts: &[FrictionContact],
@@ -116,7 +117,8 @@ pub fn inverse_dynamics(
     rnea(model, &mut data, q, v, &command.a, &f_ext).to_vec()
 }
 
-/// Returns the margin of friction μ f_n − ‖f_t‖ of a contact on level ground.
+/// Returns the margin of friction μ f_n − ‖f_t‖ of a contact on level ground, with the friction coefficient μ, the
+/// normal force f_n and the tangential force f_t.
 pub fn margin(contact: &FrictionContact, f: Force<f64>) -> f64 {
     contact.friction * f.linear.z - f.linear.x.hypot(f.linear.y)
 }

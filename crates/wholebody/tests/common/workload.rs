@@ -39,8 +39,8 @@ const TROT_FADE: f64 = 0.03;
 const TROT_SWING: f64 = 0.2;
 const TROT_HEIGHT: f64 = 0.05;
 const TROT_SPEED: f64 = 0.25;
-/// Additional reach of a swinging foot (m) per unwanted speed of the trunk (m/s). The value is about √(h / g) with h =
-/// 0.5 m.
+/// Additional reach of a swinging foot (m) per unwanted speed of the trunk (m/s). The value is about √(h / g), with the
+/// height h = 0.5 m of the trunk.
 const CAPTURE: f64 = 0.2;
 
 /// Robot that stands on its feet.
@@ -103,7 +103,7 @@ const ROBOTS: [Description; 4] = [
 ];
 
 impl Robot {
-    /// Loads an embedded robot, or a robot from the list above with its URDF file.
+    /// Loads a built-in robot, or a robot from the list above with its URDF file.
     pub fn new(name: &str, urdf: Option<&str>) -> Result<Self, Box<dyn std::error::Error>> {
         let known = ROBOTS.iter().find(|robot| robot.name == name).ok_or_else(|| format!("no robot `{name}`"))?;
         let options = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };

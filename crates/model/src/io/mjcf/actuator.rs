@@ -83,7 +83,7 @@ impl Mechanics {
         Ok(())
     }
 
-    /// Returns armature and coefficients of damping at the driven joint or tendon, which are multiplied by gear².
+    /// Returns armature and damping coefficients at the driven joint or tendon: the actuator's values times gear².
     pub(super) fn at_joint(&self) -> [f64; 4] {
         let [gear, ..] = self.gear;
         let [d0, d1, d2] = self.damping;
@@ -194,8 +194,8 @@ impl Law<'_> {
         scaled(activation, self.gainprm[0]).map(|f| f + bias[0])
     }
 
-    /// Returns gain, bias, kp and kv of f = gain u + bias − kp l − kv l̇, or the reason why the actuator's force does
-    /// not have this form.
+    /// Returns gain, bias, kp and kv of the force f = gain u + bias − kp l − kv l̇, with the control u and the length
+    /// l. If the actuator's force does not have this form, returns the reason.
     pub(super) fn affine(&self) -> Result<[f64; 4], &'static str> {
         let [g, ..] = self.gainprm;
         let [b0, b1, b2, ..] = self.biasprm;
@@ -203,7 +203,8 @@ impl Law<'_> {
             ("fixed", "none") => Ok([g, 0.0, 0.0, 0.0]),
             ("fixed", "affine") => Ok([g, b0, -b1, -b2]),
             ("pid", _) => Ok([-b1, b0, -b1, -b2]),
-            // With R and K in `gainprm`, f = K/R (u − K l̇).
+            // With the resistance R and the motor constant K in `gainprm`, the force is f = K/R (u − K l̇), with the
+            // voltage u and the speed l̇.
             ("dcmotor", _) => Ok([self.gainprm[1] / g, 0.0, 0.0, self.gainprm[1] * self.gainprm[1] / g]),
             ("affine", _) => Err("its gain depends on length or velocity"),
             ("muscle", _) | (_, "muscle") => Err("it is a muscle"),

@@ -145,7 +145,8 @@ impl Solids {
         Ok(Solid { lost, ..Solid::new(&points, triangles, rule)? })
     }
 
-    /// Returns the points and triangles in the file of a mesh, and the number of faces of which triangles are left out.
+    /// Returns the points and triangles in the file of a mesh, and the number of faces from which triangles are left
+    /// out.
     fn file(
         &mut self,
         source: &Source,

@@ -8,8 +8,8 @@ use condyle_spatial::Vec3;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Attributes of one kind of element in a class. Each attribute has one or more texts, the innermost class last. If a
-/// text has fewer numbers than the texts before it, only the first numbers are replaced.
+/// Attributes of one kind of element in a class. Each attribute has one or more texts; the text of the innermost class
+/// is the last. If a text has fewer numbers than the texts before it, only the first numbers are replaced.
 type Inherited<'a> = HashMap<&'a str, Rc<[&'a str]>>;
 
 /// Attributes of a class, by kind of element.

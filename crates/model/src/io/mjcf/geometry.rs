@@ -204,8 +204,8 @@ fn solid(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
             let across = a * a / 4.0 + h * h / 12.0;
             (PI * a * a * h, [across, across, a * a / 2.0])
         }
-        // A capsule is a cylinder of height h between two half balls, whose centres of mass are 3a/8 beyond the ends of
-        // the cylinder.
+        // A capsule is a cylinder of height h between two half balls of radius a, whose centres of mass are 3a/8 beyond
+        // the ends of the cylinder.
         "capsule" => {
             let h = 2.0 * size[1];
             let (tube, ball) = (PI * a * a * h, 4.0 / 3.0 * PI * a * a * a);

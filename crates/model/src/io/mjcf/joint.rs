@@ -9,8 +9,9 @@ use crate::joint::Joint;
 use condyle_spatial::{Mat3, Se3, Vec3};
 
 impl Reader<'_> {
-    /// Returns the joint, its options, and two constant poses with lXl(q) = lXj X_J(q) jXl. lXj is the pose before the
-    /// joint and includes `−ref`; jXl is the pose after the joint. `X` is the pose of the surrounding `<frame>`.
+    /// Returns the joint, its options, and two constant poses: lXj before the joint, which includes `−ref`, and jXl
+    /// after the joint. At the position q, the joint moves the link by lXj X_J(q) jXl, where X_J(q) is the pose of the
+    /// joint. `X` is the pose of the surrounding `<frame>`.
     pub(super) fn joint(
         &mut self,
         a: &Attributes,

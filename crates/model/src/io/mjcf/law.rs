@@ -49,7 +49,8 @@ pub(super) struct Law<'a> {
     pub(super) bias: &'a str,
     pub(super) dynprm: [f64; PARAMETERS],
     pub(super) gainprm: [f64; PARAMETERS],
-    /// Coefficients b of an affine bias b₀ + b₁ l + b₂ l̇. A positive b₂ of a servo is a damping ratio.
+    /// Coefficients b of the affine bias b₀ + b₁ l + b₂ l̇, with the length l. A positive b₂ of a servo is a damping
+    /// ratio.
     pub(super) biasprm: [f64; PARAMETERS],
     /// Ratio of the control range to the range of the driven joint or tendon; 0 if the control range does not depend on
     /// the range of the joint or tendon.
@@ -237,7 +238,8 @@ impl<'a> Law<'a> {
         Ok(())
     }
 
-    /// Reads a DC motor with the resistance R and the motor constant K. Its force is f = K/R (u − K l̇).
+    /// Reads a DC motor with the resistance R and the motor constant K. Its force is f = K/R (u − K l̇), with the
+    /// voltage u and the speed l̇.
     fn dc_motor(&mut self, a: &Attributes<'a>, viscous: f64) -> Result<(), Error> {
         let some = |name: &str, count: usize| -> Result<[f64; 6], Error> {
             let mut x = [0.0; 6];

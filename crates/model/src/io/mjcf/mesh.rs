@@ -23,12 +23,13 @@ pub(super) struct Solid {
     pub(super) bounds: [[f64; 3]; 2],
     /// Number of corners of the convex hull, if the inertia is computed from the hull; otherwise `None`.
     pub(super) corners: Option<usize>,
-    /// Number of faces in the mesh's file of which triangles are left out.
+    /// Number of faces in the mesh's file from which triangles are left out.
     pub(super) lost: usize,
 }
 
 impl Solid {
-    /// Returns half the sides (m) of the box that has the same inertia as the mesh: Iₓ = m (y² + z²)/3.
+    /// Returns half the sides (m) of the box that has the same inertia as the mesh: Iₓ = m (y² + z²)/3, with the mass m
+    /// and half the sides x, y, z.
     pub(super) fn inertia_box(&self) -> [f64; 3] {
         let [x, y, z] = self.moments;
         [y + z - x, x + z - y, x + y - z].map(|sum| 0.5 * (6.0 * sum).max(0.0).sqrt())
@@ -97,7 +98,8 @@ impl Solid {
         for t in &triangles {
             let t = corners(t, centroid);
             let v = part(t);
-            // Adds the centre of mass of a pyramid, relative to its tip. MuJoCo uses the same point for a triangle.
+            // Adds the centre of mass of a pyramid, relative to its tip. For a triangle of a shell, MuJoCo uses the
+            // same point as for a pyramid.
             (volume, com) = (volume + v, com + (t[0] + t[1] + t[2]).scale(v / 4.0));
         }
         if volume < LEAST {

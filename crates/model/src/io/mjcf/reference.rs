@@ -13,9 +13,9 @@ pub(super) struct Reference<'m> {
     poses: &'m [Se3<f64>],
     /// Columns of the motion subspace S.
     S: Vec<Motion<f64>>,
-    /// Forces U = Iᴬ S, by column.
+    /// Forces U = Iᴬ S of each column S of the joints, with the articulated inertia Iᴬ.
     U: Vec<Force<f64>>,
-    /// Inertias D = Sᵀ Iᴬ S + armature, by column.
+    /// Inertias D = Sᵀ Iᴬ S + armature along each column S of the joints, with the articulated inertia Iᴬ.
     D: Vec<f64>,
 }
 
@@ -41,8 +41,9 @@ impl<'m> Reference<'m> {
         Self { model, poses, S, U, D }
     }
 
-    /// Returns J M⁻¹ Jᵀ: the acceleration of a length due to a unit force along this length. Its reciprocal is the
-    /// effective mass along the length. `J` lists the nonzero entries of J as pairs (column, entry).
+    /// Returns J M⁻¹ Jᵀ, where M is the inertia matrix and J is the Jacobian of a length: the acceleration of this
+    /// length due to a unit force along it. Its reciprocal is the effective mass along the length. `J` lists the
+    /// nonzero entries of J as pairs (column, entry).
     pub(super) fn response(&self, J: &[(usize, f64)]) -> f64 {
         let l = Single::<f64, f64>::new(self.model);
         let mut u = vec![0.0; self.S.len()];
@@ -68,7 +69,7 @@ impl<'m> Reference<'m> {
     }
 
     /// Returns the joint efforts of a wrench along the axes of a frame, linear first. For an actuator at a site, these
-    /// efforts are the entries of J.
+    /// efforts are the entries of the actuator's Jacobian.
     pub(super) fn along(&self, frame: &Frame, gear: [f64; 6]) -> Vec<(usize, f64)> {
         if frame.body == 0 {
             return Vec::new();

@@ -4,7 +4,8 @@
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet};
 
-/// Sections. Elements of a section refer only to the same section, to earlier sections, or to the tree.
+/// Tags of the sections, in an order in which elements refer only to the same section, to earlier sections, or to the
+/// tree.
 const SECTIONS: [&str; 3] = ["tendon", "equality", "actuator"];
 
 /// Kind and name of an element.

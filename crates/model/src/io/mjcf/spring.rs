@@ -285,8 +285,9 @@ impl Line {
         model.armature[self.dof] += self.slope * self.slope * armature;
     }
 
-    /// Adds a spring with a rest length to this length l. If l − rest = k Δ = x, where Δ is a difference of positions,
-    /// the effort is −k (s₀ + s₁ x + s₂ x²) x.
+    /// Adds a spring with a rest length to this length l. The elongation of the spring is x = l − rest = k Δ, where Δ
+    /// is a difference of joint positions. With the stiffness coefficients s, the effort at the joint is −k (s₀ + s₁ x
+    /// + s₂ x²) x.
     pub(super) fn spring(self, model: &mut Model, [s0, s1, s2]: [f64; 3], rest: f64) {
         let k = self.slope;
         if k != 0.0 {

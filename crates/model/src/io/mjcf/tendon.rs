@@ -135,8 +135,8 @@ impl<'a> Tendon<'a> {
         let springs = on.spring && self.stiffness != [0.0; 3];
         let slack = self.rest[0] < self.rest[1];
         let line = self.line(lines);
-        // The armature of the tendon adds the matrix armature · c cᵀ to M, where c contains the coefficients of the
-        // joints. MuJoCo's M has no entries between joints on different branches.
+        // The armature of the tendon adds the matrix armature · c cᵀ to the inertia matrix M, where c contains the
+        // coefficients of the joints. MuJoCo's M has no entries between joints on different branches.
         let coupled = line.is_none() && self.armature != 0.0 && self.is_coupled(model, joints);
         if !coupled {
             for &(joint, coefficient) in &self.joints {

@@ -222,7 +222,8 @@ impl<'a> Drives<'a> {
                     }
                     _ => reference.response(&drive.moments(model, joints, tendons)),
                 });
-                // The gain is kv = 2 ratio √(kp m), where the effective mass m is given by 1/m = J M⁻¹ Jᵀ.
+                // The gain is kv = 2 ratio √(kp m), where the effective mass m is given by 1/m = J M⁻¹ Jᵀ, with the
+                // inertia matrix M and the Jacobian J of the length.
                 kv = if inverse > 0.0 { -kv * 2.0 * (kp / inverse).max(0.0).sqrt() } else { 0.0 };
             }
             if let Some(x) = [gain, bias, kp, kv].iter().chain(gear).find(|x| !x.is_finite()) {

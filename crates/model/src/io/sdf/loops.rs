@@ -15,8 +15,8 @@ impl Reader<'_> {
     /// prevent.
     ///
     /// A fixed joint constrains two frames, and a ball joint constrains two points. A revolute joint makes two
-    /// constraints, for two points 1 m apart on its axis. One of the six rows is redundant, because the distance
-    /// between the two points is constant.
+    /// constraints, for two points 1 m apart on its axis. One of the six rows of these two constraints is redundant,
+    /// because the distance between the two points is constant.
     pub(super) fn close(&mut self, builder: &mut ModelBuilder, edge: &Edge) -> Result<(), Error> {
         let Edge { element, item, parent, child, .. } = *edge;
         let scope = self.scopes.items[item].scope;

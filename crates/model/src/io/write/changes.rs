@@ -242,8 +242,8 @@ pub(super) fn close(a: f64, b: f64, rounding: f64) -> bool {
     a == b || tolerance.is_finite() && (a - b).abs() <= tolerance
 }
 
-/// Returns whether two inertias are equal up to rounding. The tolerance for m c is relative to its upper bound √(m tr
-/// Ī).
+/// Returns whether two inertias are equal up to rounding. The tolerance for the mass times the centre of mass, m c, is
+/// relative to its upper bound √(m tr Ī), where Ī is the rotational inertia.
 pub(super) fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
     let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
     let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));

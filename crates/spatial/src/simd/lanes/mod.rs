@@ -58,8 +58,8 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     /// Returns x in every lane.
     fn splat(x: T) -> Self;
     /// Returns 0 in every lane. Code that is compiled for any processor fills workspaces with this value. In such code,
-    /// an instruction of these registers would be a function call, as in [`splat`](Self::splat). Zero bits need no such
-    /// instruction.
+    /// each instruction for these registers would be a function call; [`splat`](Self::splat) uses such an instruction.
+    /// Setting all bits to zero needs no such instruction.
     fn zero() -> Self;
     /// Returns a + b.
     fn add(a: Self, b: Self) -> Self;

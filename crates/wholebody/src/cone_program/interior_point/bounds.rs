@@ -1,5 +1,5 @@
-//! Lower or upper bounds of all rows, with slack variables s = ±(G x − bound) ≥ 0 and multipliers z ≥ 0. All operations
-//! are element by element and vectorised.
+//! Lower or upper bounds of all rows G x of a program, with slack variables s = ±(G x − bound) ≥ 0 and multipliers z ≥
+//! 0. All operations are element by element and vectorised.
 
 use condyle_linalg::{Vector, Vectorized};
 
@@ -10,12 +10,12 @@ pub(super) struct Side {
     pub sign: f64,
     pub s: Vec<f64>,
     pub z: Vec<f64>,
-    /// 1 / s and 1 / z.
+    /// Reciprocals 1 / s of the slack variables. The field `inverse_z` has the reciprocals 1 / z of the multipliers.
     pub inverse_s: Vec<f64>,
     pub inverse_z: Vec<f64>,
-    /// z / s.
+    /// Quotients z / s of the multipliers and the slack variables.
     pub d: Vec<f64>,
-    /// ±(G x − bound) − s.
+    /// Residual ±(G x − bound) − s of each row.
     pub r: Vec<f64>,
     pub ds: Vec<f64>,
     pub dz: Vec<f64>,
@@ -35,14 +35,16 @@ impl Side {
     }
 }
 
-/// Computes r = ±(G x − bound) − s and d = z / s. Adds ±z to `multipliers`, and updates `sums`.
+/// Computes the residual r = ±(G x − bound) − s and the quotient d = z / s of multiplier and slack variable. Adds ±z to
+/// `multipliers`, and updates `sums`.
 pub(super) struct Residuals<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],
     pub bound: &'a [f64],
     pub Gx: &'a [f64],
     pub multipliers: &'a mut [f64],
-    /// Maximum of |r| / max(1, s), sum of s z, and sum of ±bound z.
+    /// Maximum of |r| / max(1, s), sum of s z, and sum of ±bound z, with the residual r, the slack variable s and the
+    /// multiplier z of each row.
     pub sums: &'a mut [f64; 3],
 }
 
@@ -77,8 +79,9 @@ impl Vectorized for Residuals<'_> {
     }
 }
 
-/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz. The term ds dz is only used if `second_order` is
-/// true.
+/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz. Here s is a slack variable, z its multiplier, d
+/// = z / s, and r the residual of s. ds and dz are the last directions, and σμ is the aim of the step
+/// for the product s z. The term ds dz is only used if `second_order` is true.
 pub(super) struct Target<'a> {
     pub side: &'a Side,
     pub has: &'a [f64],
@@ -101,8 +104,8 @@ impl Vectorized for Target<'_> {
     }
 }
 
-/// Computes the direction ds = ±G dx + r and dz = (ξ − z ds) / s with ξ as in [`Target`]. Also raises `inverse_step` to
-/// the greatest of −ds/s and −dz/z.
+/// Computes the directions of the slack variables s and of their multipliers z: ds = ±G dx + r and dz = (ξ − z ds) / s,
+/// with ξ and r as in [`Target`]. Also raises `inverse_step` to the greatest of −ds/s and −dz/z.
 pub(super) struct Direction<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],

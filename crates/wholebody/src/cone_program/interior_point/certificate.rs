@@ -21,17 +21,19 @@ pub(super) struct Candidate<'a> {
     pub x: &'a [f64],
     pub Kx: &'a [f64],
     pub Px: &'a [f64],
-    /// cᵀ x.
+    /// Linear part cᵀ x of the objective.
     pub linear: f64,
-    /// ‖Kᵀ z + E y‖∞.
+    /// Norm ‖Kᵀ z + Eᵀ y‖∞, with the multipliers z of the rows of K = [G; F] and y of the equalities E x = e.
     pub force: f64,
-    /// eᵀ y + lᵀ z₋ − uᵀ z₊ − hᵀ z.
+    /// Sum eᵀ y + lᵀ z₋ − uᵀ z₊ − hᵀ z of the right sides and bounds of all constraints, each times its multiplier.
     pub support: f64,
 }
 
 impl Candidate<'_> {
-    /// Returns the distance of the iterate from a proof that no x satisfies the constraints. Every feasible x satisfies
-    /// `support` ≤ (Kᵀ z + E y)ᵀ x. So a positive `support` with a `force` ‖Kᵀ z + E y‖ of zero is such a proof.
+    /// Returns the distance of the iterate from a proof that no x satisfies the constraints. The rows of E are the
+    /// equalities, the rows of K = [G; F] are the other constraints, and y and z are their multipliers. Every feasible
+    /// x satisfies `support` ≤ (Kᵀ z + Eᵀ y)ᵀ x. So a positive `support` with a `force` ‖Kᵀ z + Eᵀ y‖ of zero is such a
+    /// proof.
     pub(super) fn exclusion(&self) -> f64 {
         let size = max_abs(&self.x[..self.data.n]);
         if self.support > 0.0 { self.force * (1.0 + size) / self.support } else { f64::INFINITY }
@@ -46,8 +48,8 @@ impl Candidate<'_> {
         (size > FAR && self.linear < -FALL * size && self.is_ray(size)).then_some(Status::Unbounded)
     }
 
-    /// Returns whether the objective falls without bound along x: P x = 0, E x = 0, and all multiples of x keep G x and
-    /// F x within bounds and cones.
+    /// Returns whether the objective falls without bound along x: the quadratic cost P x is 0, the equalities E x are
+    /// 0, and all multiples of x keep the rows G x within their bounds and F x within the cones.
     fn is_ray(&self, size: f64) -> bool {
         let Self { data, x, Kx, Px, linear, .. } = *self;
         let (n, m) = (data.n, data.rows());

@@ -18,7 +18,7 @@ pub(super) fn margin(x: &[f64]) -> f64 {
     x[0] - tail(x, x).sqrt()
 }
 
-/// Returns xᵀ J x, without cancellation.
+/// Returns xᵀ J x = x₀² − ‖x₁‖², without cancellation.
 #[inline(always)]
 pub(super) fn determinant(x: &[f64]) -> f64 {
     let radius = tail(x, x).sqrt();
@@ -35,7 +35,8 @@ pub(super) fn tail(x: &[f64], y: &[f64]) -> f64 {
     sum
 }
 
-/// Returns η, and writes w and λ. Returns `None` if s or z is not in the interior of the cone.
+/// Computes the scaling of a pair (s, z): returns η, and writes w and the scaled variable λ. Returns `None` if s or z
+/// is not in the interior of the cone.
 #[inline(always)]
 pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -> Option<f64> {
     let (ds, dz) = (determinant(s), determinant(z));
@@ -56,7 +57,7 @@ pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -
     Some(eta)
 }
 
-/// Computes y = W x.
+/// Computes y = W x, with the scaling W of the cone.
 #[inline(always)]
 pub(super) fn apply(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     let inner = tail(w, x);
@@ -67,7 +68,7 @@ pub(super) fn apply(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// Computes y = W⁻¹ x.
+/// Computes y = W⁻¹ x, with the scaling W of the cone.
 #[inline(always)]
 pub(super) fn apply_inverse(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     let (inner, r) = (tail(w, x), eta.recip());

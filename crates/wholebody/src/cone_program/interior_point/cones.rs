@@ -18,20 +18,21 @@ macro_rules! by_dimension {
 }
 
 /// Slack variables s = h + F x and multipliers z of all cones. A tilde marks a scaled direction: d̃s = W⁻¹ ds, d̃z = W
-/// dz.
+/// dz, where W is the scaling of a cone.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cones {
     pub s: Vec<f64>,
     pub z: Vec<f64>,
-    /// h + F x − s.
+    /// Residuals h + F x − s.
     pub r: Vec<f64>,
     pub ds: Vec<f64>,
     pub dz: Vec<f64>,
-    /// w and η of each cone's W, and λ.
+    /// Vector w and number η of the scaling W of each cone, and the scaled variable λ: the fields `w`, `eta` and
+    /// `lambda`.
     w: Vec<f64>,
     eta: Vec<f64>,
     lambda: Vec<f64>,
-    /// λ \ ξ.
+    /// Solution p of λ ∘ p = ξ, where ξ is the right side of a step (see `target`).
     p: Vec<f64>,
     ds_tilde: Vec<f64>,
     dz_tilde: Vec<f64>,
@@ -57,7 +58,8 @@ impl Cones {
         }
     }
 
-    /// Computes r and the multipliers. Adds the contributions of the cones to `sums`, which are ‖r‖∞, sᵀ z and −hᵀ z.
+    /// Computes the residuals r = h + F x − s and the multipliers z. Adds the contributions of the cones to `sums`,
+    /// which are ‖r‖∞, sᵀ z and −hᵀ z.
     pub(super) fn residuals(&mut self, h: &[f64], Fx: &[f64], multipliers: &mut [f64], sums: &mut [f64; 3]) {
         for i in 0..h.len() {
             self.r[i] = h[i] + Fx[i] - self.s[i];
@@ -68,7 +70,8 @@ impl Cones {
         }
     }
 
-    /// Computes W and λ of each cone. Returns false if a pair (s, z) is not in the interior of its cone.
+    /// Computes the scaling W and the scaled variable λ = W z = W⁻¹ s of each cone. Returns false if a pair (s, z) is
+    /// not in the interior of its cone.
     pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
         cones.iter().enumerate().all(|(k, cone)| by_dimension!(cone.dim, dim => self.scale_one(k, cone.at, dim)))
     }
@@ -84,7 +87,7 @@ impl Cones {
         true
     }
 
-    /// Computes B = (W⁻¹ F)ᵀ in the rows of Fᵀ that have non-zero entries.
+    /// Computes B = (W⁻¹ F)ᵀ, with the scaling W of each cone, in the rows of Fᵀ that have non-zero entries.
     #[inline(always)]
     pub(super) fn scale_rows(&self, data: &Scaled, B: &mut [f64]) {
         let (ld, m) = (data.ld, data.rows());
@@ -115,7 +118,7 @@ impl Cones {
         }
     }
 
-    /// Computes x ← W⁻² x.
+    /// Computes x ← W⁻² x, with the scaling W of each cone.
     pub(super) fn weigh(&mut self, cones: &[Cone], x: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
             let at = cone.at..cone.at + cone.dim;
@@ -125,8 +128,9 @@ impl Cones {
         }
     }
 
-    /// Computes p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, and the target W⁻¹ (p − W⁻¹ r). The term d̃s ∘ d̃z is only
-    /// used if `second_order` is true.
+    /// Computes the solution p of λ ∘ p = ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, and the target W⁻¹ (p − W⁻¹ r). λ is the
+    /// scaled variable, d̃s and d̃z are the last scaled directions, W is the scaling, and r the residual. The term d̃s
+    /// ∘ d̃z is only used if `second_order` is true.
     pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
             by_dimension!(cone.dim, dim => self.target_one(k, cone.at, dim, centre, second_order, target));
@@ -159,8 +163,8 @@ impl Cones {
         apply_inverse(eta, w, y, &mut target[at]);
     }
 
-    /// Computes the direction ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds). Raises `inverse` to the inverse of the greatest
-    /// step length.
+    /// Computes the directions of the slack variables s and of the multipliers z: ds = F dx + r and dz = W⁻¹ (p − W⁻¹
+    /// ds), with p of `target`. Raises `inverse` to the inverse of the greatest step length.
     pub(super) fn direction(&mut self, cones: &[Cone], Fdx: &[f64], inverse: &mut f64) {
         for (k, cone) in cones.iter().enumerate() {
             by_dimension!(cone.dim, dim => self.direction_one(k, cone.at, dim, Fdx, inverse));
@@ -185,7 +189,7 @@ impl Cones {
         *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
     }
 
-    /// Computes s += α ds and z += α dz.
+    /// Adds the step: s += α ds and z += α dz, with the step length α.
     pub(super) fn advance(&mut self, rows: usize, step: f64) {
         for i in 0..rows {
             self.s[i] += step * self.ds[i];

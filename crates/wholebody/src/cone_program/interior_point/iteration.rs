@@ -74,8 +74,9 @@ impl Workspace {
             // Predictor: a step towards s ∘ z = 0.
             let inverse = self.direction(0.0, false, refinements);
             let shortfall = if inverse > 1.0 { 1.0 - inverse.recip() } else { 0.0 };
-            // Corrector: a step towards s ∘ z = σ μ e with Mehrotra's σ = (1 − α)³. `AIM` keeps the gap from becoming
-            // smaller than needed.
+            // Corrector: a step towards s ∘ z = σ μ e. Here s are the slack variables, z the multipliers, and μ the
+            // mean of their present products. Mehrotra's factor is σ = (1 − α)³, with the step length α of the
+            // predictor. `AIM` keeps the gap from becoming smaller than needed.
             let sigma = shortfall * shortfall * shortfall;
             let centre = (sigma * measure.mu).max(AIM * tolerance * measure.scale);
             let inverse = self.direction(centre, true, refinements);

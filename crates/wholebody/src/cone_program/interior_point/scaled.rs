@@ -17,7 +17,8 @@ use std::ops::Range;
 /// entry.
 const NO_CURVATURE: f64 = 1e-14;
 /// Maximum ratio of an unknown's unit to the value that the bounds allow if the other unknowns are zero. With a ratio
-/// of 1, programs with a singular P lose digits; from 1000 on, some programs with unreachable tasks have no solution.
+/// of 1, programs with a singular cost matrix P lose digits; from 1000 on, some programs with unreachable tasks have no
+/// solution.
 const ROOM: f64 = 30.0;
 /// Minimum of an unknown's unit after bounds have reduced the unit, relative to the size that the cost gives. P̂ⱼⱼ is
 /// then at least the square of this number, which exceeds rounding errors.
@@ -28,9 +29,9 @@ const NO_ROW_TOLERANCE: f64 = 1e-9;
 /// Origin of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
-    /// A row of A.
+    /// Row of A, with its index.
     Equality(usize),
-    /// A row of G.
+    /// Row of G, with its index.
     Row(usize),
     /// A row of F, for a cone of one dimension.
     Cone(usize),
@@ -46,7 +47,7 @@ pub(super) struct Cone {
     pub scale: f64,
 }
 
-/// Adjacent columns of K whose non-zero entries are in the same range of rows.
+/// Adjacent columns of Kᵀ, the rows of G and F, whose non-zero entries are in the same range of rows.
 #[derive(Clone, Debug)]
 struct Run {
     columns: Range<usize>,
@@ -60,35 +61,35 @@ fn range(mask: u64, n: usize, ld: usize) -> Range<usize> {
     if mask == 0 { 0..0 } else { block * first..n.min(block * end) }
 }
 
-/// Scaled program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The columns of K are the rows
-/// of G and of F.
+/// Scaled program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The matrix K = [G; F]
+/// contains the rows of G and of F. E and K are stored transposed.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scaled {
     /// Number of unknowns.
     pub n: usize,
     /// Offset from one column of a matrix to the next.
     pub ld: usize,
-    /// P, with both triangles.
+    /// Cost matrix P, with both triangles.
     pub P: Vec<f64>,
     pub c: Vec<f64>,
-    /// D, the unit of each unknown.
+    /// Units D of the unknowns.
     pub units: Vec<f64>,
     /// Scratch: inverse of a maximum for each unknown. The maximum is the value that rows with two bounds allow if the
     /// other unknowns are zero.
     inverse_limits: Vec<f64>,
-    /// Factor by which P and c were multiplied.
+    /// Factor by which the cost P and c was multiplied.
     pub cost: f64,
     /// Eᵀ, with a column for each equality and for each row of G with l = u.
     pub E: Vec<f64>,
     pub e: Vec<f64>,
     pub equality_sources: Vec<Source>,
     pub equality_scales: Vec<f64>,
-    /// [Gᵀ Fᵀ].
+    /// Kᵀ = [Gᵀ Fᵀ], with a column for each row of G and of F.
     pub K: Vec<f64>,
     /// Mask of the non-zero blocks of each column. The columns of one cone share the union of their masks.
     pub masks: Vec<u64>,
     runs: Vec<Run>,
-    /// l and u, 0 for a missing bound.
+    /// Bounds l and u of the rows of G; 0 for a missing bound.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
     /// 1 if the bound exists, otherwise 0.
@@ -149,7 +150,7 @@ impl Scaled {
         range(self.masks[column], self.n, self.ld)
     }
 
-    /// Computes y = Kᵀ x, which is G x and F x. The padding of x must be zero.
+    /// Computes y = K x, which is G x and F x. The padding of x must be zero.
     pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
         for Run { columns, rows } in &self.runs {
             let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
@@ -157,7 +158,7 @@ impl Scaled {
         }
     }
 
-    /// Computes y += K x.
+    /// Computes y += Kᵀ x, which is Gᵀ and Fᵀ times the two parts of x.
     pub(super) fn add_transposed(&self, x: &[f64], y: &mut [f64]) {
         for Run { columns, rows } in &self.runs {
             let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
@@ -165,7 +166,7 @@ impl Scaled {
         }
     }
 
-    /// Returns the number of columns of K, which are the rows of G and of F.
+    /// Returns the number of columns of Kᵀ, which are the rows of G and of F.
     pub(super) fn columns(&self) -> usize {
         self.rows() + self.h.len()
     }
@@ -233,7 +234,7 @@ impl Scaled {
         Ok(())
     }
 
-    /// Computes the masks of K's columns, and the runs of columns with equal ranges.
+    /// Computes the masks of the columns of Kᵀ, and the runs of columns with equal ranges.
     fn note_zeros(&mut self) {
         let (m, columns, ld) = (self.rows(), self.columns(), self.ld);
         self.masks.clear();

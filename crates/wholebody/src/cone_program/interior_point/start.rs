@@ -6,18 +6,19 @@ use super::solution::Solution;
 use super::workspace::Workspace;
 use condyle_linalg::{View, add_product_vector, max_abs};
 
-/// Weight ω of s² relative to the cost in a cold start. The ratio of z to s is then also ω.
+/// Weight ω, relative to the cost, of the squared slack variables s in a cold start. The ratio of the multipliers z to
+/// s is then also ω.
 const WEIGHT: f64 = 0.1;
 /// Distance to the boundary of a cone after a cold start has moved s into the cone.
 const INSIDE: f64 = 1.0;
-/// √μ of a warm start, relative to the error of the last solution in the new program. √μ is limited to the interval
-/// `CENTRE`.
+/// Square root of μ in a warm start, relative to the error of the last solution in the new program. μ is the product of
+/// a slack variable and its multiplier. √μ is limited to the interval `CENTRE`.
 const SHARE: f64 = 0.02;
 const CENTRE: [f64; 2] = [1e-10, 1e-2];
 
 impl Workspace {
-    /// Computes x as the minimiser of the cost plus ω / 2 sᵀ s, with s = h + F x. Then moves s and z = −ω s along e
-    /// into the cone.
+    /// Computes x as the minimiser of the cost plus ω / 2 sᵀ s, with the slack variables s = h + F x. Then moves s and
+    /// the multipliers z = −ω s along the axis of the cone into the cone.
     ///
     /// Source: Vandenberghe (2010), section 5.3, where ω = 1.
     pub(super) fn cold_start(&mut self) -> bool {
@@ -79,8 +80,8 @@ impl Workspace {
         true
     }
 
-    /// Takes x and y from the last solution, whose multipliers are z*. Computes s and z from s − z = (h + F x) − z* and
-    /// s ∘ z = μ e.
+    /// Takes x and y from the last solution, whose multipliers are z*. Computes the slack variables s and the
+    /// multipliers z from s − z = (h + F x) − z* and s ∘ z = μ e.
     ///
     /// Each pair (s, z) is exactly central. If s or z is large, the pair differs from the last pair by about μ / s
     /// only. The sizes of s and z are comparable, since all numbers are in units of size one. √μ is proportional to the
@@ -118,7 +119,7 @@ impl Workspace {
                 multipliers[m + at] = cones.z[at];
             }
         }
-        // Error of the last solution in the new program: the norms of P x + c − Kᵀ z − E y and of min(s, z).
+        // Error of the last solution in the new program: the norms of P x + c − Kᵀ z − Eᵀ y and of min(s, z).
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);

@@ -15,12 +15,13 @@ use condyle_linalg::{
     transposed_product_vector,
 };
 
-/// Regularisation added to diagonal entries of H. These entries have size one for costs of size one. Iterative
-/// refinement removes the effect of the regularisation.
+/// Regularisation added to diagonal entries of the matrix H of the linear system. These entries have size one for costs
+/// of size one. Iterative refinement removes the effect of the regularisation.
 const REGULARISATION: f64 = 1e-13;
 /// Regularisation relative to the diagonal entry, as large as a few rounding errors of a factorisation.
 const RELATIVE_REGULARISATION: f64 = 1e-15;
-/// Regularisation added to diagonal entries of X Xᵀ. These entries have size one for costs of size one.
+/// Regularisation added to diagonal entries of the Schur complement X Xᵀ of the equalities. These entries have size one
+/// for costs of size one.
 const DUAL_REGULARISATION: f64 = 1e-13;
 /// Factor by which the regularisation grows after a pivot that was not positive.
 const GROWTH: f64 = 1e3;
@@ -28,13 +29,13 @@ const ATTEMPTS: usize = 4;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// Lower triangle of [H; E], later overwritten by its factor.
+    /// Lower triangle of [H; E], the matrices of the linear system, later overwritten by its factor.
     H: Vec<f64>,
     ldh: usize,
     /// Inverse of the factor's diagonal.
     inverse: Vec<f64>,
-    /// Scaled columns of K (√D G and W⁻¹ F), then the columns of E. Only non-zero blocks of these columns are written
-    /// and multiplied.
+    /// Scaled rows of G and F (√D G and W⁻¹ F), then the rows of E. Only non-zero blocks of these rows are written and
+    /// multiplied.
     pub B: OuterProducts,
     n: usize,
     me: usize,
@@ -59,8 +60,8 @@ impl System {
         }
     }
 
-    /// Copies the sizes of a program and the non-zero blocks of its columns. Writes E, and writes zeros into the
-    /// columns of K.
+    /// Copies the sizes of a program and the non-zero blocks of its columns. Writes the rows of E, and writes zeros
+    /// into the rows of G and F.
     pub(super) fn prepare(&mut self, data: &Scaled) {
         let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
         (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
@@ -71,14 +72,15 @@ impl System {
         B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
         for k in 0..columns + me {
             let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
-            // W⁻¹ combines the rows of a cone: each resulting row has the union of the blocks of these rows.
+            // The scaling W⁻¹ combines the rows of a cone: each resulting row has the union of the blocks of these
+            // rows.
             let mask = if k < columns { data.masks[k] } else { mask(row) };
             B.multiply([k, k], [mask, mask]);
         }
     }
 
-    /// Factorises P + B Bᵀ, after the caller has written `B`. Returns false if the factorisation fails even with the
-    /// greatest regularisation.
+    /// Factorises the matrix P + B Bᵀ of the linear system, after the caller has written `B`. Returns false if the
+    /// factorisation fails even with the greatest regularisation.
     pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
         let Self { H, ldh, B, n, me, inverse, .. } = self;
         let (n, me, ldh, ld) = (*n, *me, *ldh, data.ld);
@@ -111,7 +113,7 @@ impl System {
         false
     }
 
-    /// Uses the factor to replace r₁ by dx and r₂ by dy.
+    /// Solves the linear system with the factor: replaces its right-hand sides r₁ by dx and r₂ by dy.
     fn solve_once(&mut self, data: &Scaled, x: &mut [f64], y: &mut [f64]) {
         let (n, me, ldh) = (self.n, self.me, self.ldh);
         let (L, (inverse, inverse_S)) = (View::new(&self.H, ldh), self.inverse[..n + me].split_at(n));
@@ -132,8 +134,8 @@ impl System {
         backward_solve(L, inverse, x);
     }
 
-    /// Replaces r₁ in `x` by dx and r₂ in `y` by dy, and writes K dx. In each refinement, `weigh` replaces K dx by [D G
-    /// dx; W⁻² F dx].
+    /// Solves the linear system: replaces its right-hand sides r₁ in `x` by dx and r₂ in `y` by dy. Also writes K dx,
+    /// which is G dx and F dx. In each refinement, `weigh` replaces K dx by [D G dx; W⁻² F dx].
     pub(super) fn solve(
         &mut self,
         data: &Scaled,
@@ -149,7 +151,7 @@ impl System {
         re[..me].copy_from_slice(&y[..me]);
         self.solve_once(data, x, y);
         for _ in 0..refinements {
-            // Compute the residuals r₁ − H dx + Eᵀ dy and r₂ − E dx.
+            // Compute the residuals r₁ − H dx + Eᵀ dy and r₂ − E dx of the linear system.
             data.multiply(x, Kdx);
             weigh(Kdx);
             for i in 0..n {

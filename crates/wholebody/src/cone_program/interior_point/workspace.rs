@@ -24,7 +24,7 @@ pub(super) struct Workspace {
     pub cones: Cones,
     pub x: Vec<f64>,
     pub y: Vec<f64>,
-    /// G x and F x.
+    /// Products G x and F x.
     pub Kx: Vec<f64>,
     pub dx: Vec<f64>,
     pub dy: Vec<f64>,
@@ -35,14 +35,14 @@ pub(super) struct Workspace {
     pub target: Vec<f64>,
     /// Sum of z / s over both sides of each row.
     pub D: Vec<f64>,
-    /// P x, Kᵀ z + E y, P x + c − Kᵀ z − E y, and E x − e: the fields `Px`, `forces`, `rd` and `re`.
+    /// P x, Kᵀ z + Eᵀ y, P x + c − Kᵀ z − Eᵀ y, and E x − e, with K = [G; F]: the fields `Px`, `forces`, `rd` and `re`.
     pub Px: Vec<f64>,
     pub forces: Vec<f64>,
     pub rd: Vec<f64>,
     pub re: Vec<f64>,
 }
 
-/// Computes D, and B with the rows √D G and W⁻¹ F.
+/// Computes the weights D, and B with the rows √D G and W⁻¹ F.
 struct Scale<'a> {
     data: &'a Scaled,
     sides: &'a [Side; 2],
@@ -72,7 +72,7 @@ pub(super) struct Measure {
     /// objective, divided by the same number.
     pub mu: f64,
     pub scale: f64,
-    /// ‖P x + c − Kᵀ z − E y‖∞.
+    /// Dual residual ‖P x + c − Kᵀ z − Eᵀ y‖∞, with K = [G; F].
     pub dual: f64,
     /// Greatest of the relative residuals and the relative gap. Each is relative to the terms from which it is
     /// computed. The result is NaN if a residual or the gap is not finite.
@@ -171,7 +171,8 @@ impl Workspace {
         }
     }
 
-    /// Computes D, W and B; returns false if a pair (s, z) is not in the interior of its cone.
+    /// Computes the weights D of the rows, the scalings W of the cones, and the scaled rows B. Returns false if a pair
+    /// (s, z) of slack variable and multiplier is not in the interior of its cone.
     pub(super) fn scale(&mut self) -> bool {
         let Self { data, sides, cones, D, system, .. } = self;
         if !cones.scale(&data.cones) {
@@ -181,8 +182,9 @@ impl Workspace {
         true
     }
 
-    /// Computes the direction towards s ∘ z = `centre` e. If `second_order` is true, corrects it by the second-order
-    /// term of the last direction. Returns the inverse of the greatest step length.
+    /// Computes the direction of a step towards s ∘ z = `centre` e, with slack variables s, multipliers z and the unit
+    /// e of the product ∘. If `second_order` is true, corrects it by the second-order term of the last direction.
+    /// Returns the inverse of the greatest step length.
     pub(super) fn direction(&mut self, centre: f64, second_order: bool, refinements: usize) -> f64 {
         let Self { data, system, sides, cones, dx, dy, Kdx, target, D, rd, re, .. } = self;
         let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());

@@ -40,8 +40,8 @@ fn projection_onto_a_cone() {
     }
 }
 
-/// Projects p onto a box and a plane: min ½ ‖x − p‖² with l ≤ x ≤ u, with and without Σ x = 1. The solution is p,
-/// shifted by the multiplier of the sum and then clipped.
+/// Projects a point p onto a box and a plane: min ½ ‖x − p‖² with l ≤ x ≤ u, with and without Σ x = 1. The solution is
+/// p, shifted by the multiplier of the sum and then clipped.
 #[test]
 fn projection_onto_a_box_and_a_plane() {
     let (p, lower, upper) = ([2.0, -1.0, 0.3, 0.5], [0.0, -0.5, 0.5, -9.0], [1.0, f64::INFINITY, 0.5, 9.0]);
@@ -72,9 +72,9 @@ fn projection_onto_a_box_and_a_plane() {
     }
 }
 
-/// Computes the force f on a block of mass m on an incline of angle α. Friction holds the block if tan α ≤ μ. The
-/// minimum of ½ ‖f − m g‖² over the friction cone is then f = m g. For larger α, f is the projection of m g onto the
-/// cone, of length m g cos(α − arctan μ) along the cone's edge.
+/// Computes the force f on a block of mass m on an incline of angle α, with the friction coefficient μ and the gravity
+/// g. Friction holds the block if tan α ≤ μ. The minimum of ½ ‖f − m g‖² over the friction cone is then f = m g. For
+/// larger α, f is the projection of m g onto the cone, of length m g cos(α − arctan μ) along the cone's edge.
 #[test]
 fn a_block_on_an_incline() {
     let (weight, friction) = (9.81 * 3.0, 0.6_f64);

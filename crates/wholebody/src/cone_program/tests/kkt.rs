@@ -13,7 +13,7 @@ fn radius(s: &[f64]) -> f64 {
 /// Errors in the Karush–Kuhn–Tucker conditions. Each error is relative to the terms from which it is computed.
 #[derive(Debug, Default)]
 pub(super) struct Errors {
-    /// P x + c − Aᵀ y − Gᵀ z − Fᵀ w.
+    /// Gradient of the Lagrangian, P x + c − Aᵀ y − Gᵀ z − Fᵀ w.
     pub stationarity: f64,
     /// Violation of the constraints.
     pub primal: f64,

@@ -15,7 +15,8 @@ fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
     }
 }
 
-/// Checks solutions when zeros of P, A, G and F become non-zero, and when they become zero again.
+/// Checks solutions when zeros of the matrices P, A, G and F of a program become non-zero, and when they become zero
+/// again.
 #[test]
 fn numbers_come_where_there_were_zeros() {
     for seed in 0..10 {

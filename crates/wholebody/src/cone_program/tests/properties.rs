@@ -9,8 +9,8 @@ use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, 
 const KKT_TOLERANCE: f64 = 1e-8;
 /// Tolerance of the objective, relative to 1 + |objective|. It covers the duality gaps of both solvers.
 const OBJECTIVE_TOLERANCE: f64 = 1e-6;
-/// Tolerance of x, whose numbers have size one. It applies to solutions with the settings [`SHARP`], if P has no
-/// eigenvalue below 0.1.
+/// Tolerance of x, whose numbers have size one. It applies to solutions with the settings [`SHARP`], if the cost matrix
+/// P has no eigenvalue below 0.1.
 const X_TOLERANCE: f64 = 1e-6;
 const SHARP: Settings = Settings { tolerance: 1e-12, max_iterations: 50, time_limit: f64::INFINITY };
 

@@ -17,7 +17,7 @@ pub(super) enum Kind {
     ZeroCones,
     /// A minimiser at a vertex: P is almost zero.
     Vertex,
-    /// P with half rank, all unknowns in a box.
+    /// Cost matrix P with half the full rank; bounds keep all unknowns in a box.
     Semidefinite,
     /// Rows and cones scaled by factors from 1e-4 to 1e4.
     BadlyScaled,
@@ -59,7 +59,7 @@ impl Draw {
         (0..n).map(|_| self.number()).collect()
     }
 
-    /// Sets P = R Rᵀ + a I with a random R of the given rank.
+    /// Sets the cost matrix P = R Rᵀ + a I with a random matrix R of the given rank.
     pub(super) fn cost(&mut self, program: &mut ConeProgram, rank: usize, a: f64) {
         let n = program.size.unknowns;
         let R = nalgebra::DMatrix::from_fn(n, rank, |_, _| self.number());
