@@ -156,6 +156,7 @@ ARGUMENTS = {
     "_Size": "WrenchCone.size Residual.center_of_pressure.size",
     "Activation": "activation",
     "Residual": "residual",
+    "Sequence[tuple[Sphere, Sphere]]": "Residual.distances.pairs",
     "Sequence[Cost]": "costs",
     "Sequence[Limit]": "limits",
     "dict[int, Sequence[Cost]]": "costs_at",

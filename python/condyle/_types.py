@@ -808,6 +808,17 @@ class Control(NamedTuple):
     """
 
 
+class Sphere(NamedTuple):
+    """A sphere that is fixed to a frame of a robot, or to the world; see `Residual.distances`."""
+
+    center: ArrayLike
+    """The centre in the coordinates of the frame (m), three numbers."""
+    radius: float = 0.0
+    """The radius (m), at least 0; a sphere with the radius 0 is a point."""
+    frame: str | int | None = None
+    """The frame, by name or by index in the model; None for the world."""
+
+
 class Ground(NamedTuple):
     """A plane on which a simulated robot stands, slides and lands, and the points of the robot that may touch the
     plane.
@@ -883,6 +894,7 @@ _MODULES = {
     "LqKnot": "optimal",
     "ConstraintRows": "optimal",
     "Outcome": "optimal",
+    "Sphere": "optimal",
     "Control": "simulation",
     "Ground": "simulation",
     "GroundContacts": "simulation",

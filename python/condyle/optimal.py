@@ -50,7 +50,7 @@ from ._condyle import (
     Unicycle,
     WrenchCone,
 )
-from ._types import ConstraintRows, Evaluation, Iteration, LqKnot, Outcome, Solution, SweepResult, Timings
+from ._types import ConstraintRows, Evaluation, Iteration, LqKnot, Outcome, Solution, Sphere, SweepResult, Timings
 
 __all__ = [
     "Action",
@@ -77,6 +77,7 @@ __all__ = [
     "ProblemError",
     "Residual",
     "Solution",
+    "Sphere",
     "Sweep",
     "SweepResult",
     "Timings",

@@ -8,7 +8,8 @@ use common::{HANGING, cartpole, limited_cartpole, random, random_knot, straight}
 use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, ContactInverseDynamics, ControlPolynomial, Cost, FreeAcceleration,
-    FreeDynamics, FrictionCone, GenericResidual, ImpulseDynamics, Integrator, Limit, OwnResidual, Residual, RobotState,
+    FreeDynamics, FrictionCone, GenericResidual, Geometry, GeometryPair, ImpulseDynamics, Integrator, Limit,
+    OwnResidual, Residual, RobotState, Shape,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
 use condyle_spatial::Scalar;
@@ -146,6 +147,10 @@ fn a_gait_allocates_nothing() {
     let cone = FrictionCone::new(0.7);
     let (lower, upper) = cone.bounds();
     let contact = || "LF_foot".to_owned();
+    let leg = |frame: &str| Geometry::on(frame, Shape::sphere([0.0; 3], 0.03));
+    let legs = ["LF_foot", "RF_foot", "LH_foot"].map(|frame| GeometryPair::new(leg(frame), leg("RH_foot")));
+    let ball = Geometry::in_world(Shape::sphere([0.4, 0.0, 0.2], 0.1));
+    let pairs = [legs.to_vec(), vec![GeometryPair::new(leg("LF_foot"), ball); 7]].concat(); // more than one slot
     let target = Motion::zero();
     let reference = ReferenceFrame::LocalWorldAligned;
     let quadratic = |name: &str, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
@@ -154,6 +159,7 @@ fn a_gait_allocates_nothing() {
             quadratic("state", 1e-1, Residual::State { reference: x0.clone() }),
             quadratic("com", 1e0, Residual::CenterOfMass { target: Vec3::new(0.0, 0.0, 0.4) }),
             quadratic("momentum", 1e-3, Residual::CentroidalMomentum { target: Force::zero() }),
+            quadratic("apart", 1e-2, Residual::Distances { pairs: pairs.clone() }),
             quadratic("speed", 1e-3, Residual::FrameVelocity { frame: "RF_foot".into(), target, reference }),
         ]
     };
@@ -218,10 +224,13 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
         Cost::new("effort", 1e-3, control(), Activation::Quadratic),
     ];
     let weak = Limit::new("weak", control(), vec![-30.0; 7], vec![30.0; 7]);
+    let ball = Geometry::in_world(Shape::sphere([0.5, 0.1, 0.4], 0.1));
+    let pair = GeometryPair::new(Geometry::on("tool", Shape::sphere([0.0; 3], 0.05)), ball);
+    let clear = Limit::new("clear", Residual::Distances { pairs: vec![pair] }, vec![0.0], vec![f64::INFINITY]);
     let target = Vec3::new(0.35, 0.2, 0.6);
     let reach = Residual::FrameTranslation { frame: "tool".into(), target };
     let reach = Limit::equality("reach", reach);
-    let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap().with_limits(vec![weak]).unwrap();
+    let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap().with_limits(vec![weak, clear]).unwrap();
     knot.set_limits(3, vec![]).unwrap();
     let us = knot.quasi_static(&x0).repeat(10);
     let end = FreeDynamics::terminal(arm, vec![]).unwrap().with_limits(vec![reach]).unwrap();

@@ -86,8 +86,8 @@ impl Activation {
 /// name: the name of the term for `Problem.set_weight` and in error messages.
 /// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
-/// activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone or a centre of pressure,
-///     the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
+/// activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone, a centre of pressure or
+///     distances, the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
 ///
 /// >>> from condyle.optimal import Cost, Residual
 /// >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -154,9 +154,9 @@ impl Cost {
 ///
 /// name: the name of the limit in error messages.
 /// residual: a `Residual`.
-/// lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
-///     centre of pressure has its own bounds, and every other r must be 0. An entry with equal lower and upper bounds
-///     is an equality.
+/// lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone, a centre
+///     of pressure and distances have their own bounds, and every other r must be 0. An entry with equal lower and
+///     upper bounds is an equality.
 ///
 /// >>> from condyle.optimal import Limit, Residual
 /// >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)

@@ -2,15 +2,16 @@
 
 use super::cones::{FrictionCone, WrenchCone, surface};
 use super::own::{Fault, Functions, MOST_SIZE, OwnFunction, Space, Way};
-use crate::arrays::{array, numbers, pose, rotation, three};
+use crate::arrays::{array, class, found_type, numbers, pose, rotation, three};
 use crate::exceptions::{ProblemError, within};
 use crate::functions::{Argument, Reference};
-use crate::model::{Model, frame_index};
+use crate::model::{Model, frame_index, members_of};
 use condyle::optimal::robot;
 use condyle::{Force, Motion};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::sync::Arc;
@@ -162,6 +163,26 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
+    /// Returns the signed distances between pairs of spheres, r = ‖p₁ − p₂‖ − radius₁ − radius₂ with the centres p₁ and
+    /// p₂ in the world, one number for each pair (m). A distance is negative while the spheres overlap.
+    ///
+    /// pairs: a list of pairs of `Sphere`s. At least one sphere of a pair is fixed to a frame of the robot; the other
+    ///     one is fixed to the world, or to a frame of the same robot.
+    ///
+    /// A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
+    /// distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If both centres of a
+    /// pair coincide, the derivatives are those of p₁ − p₂ along the world's z axis.
+    ///
+    /// >>> from condyle.optimal import Limit, Residual, Sphere
+    /// >>> tool, ball = Sphere([0.0, 0.0, 0.0], 0.05, "tool"), Sphere([0.4, 0.2, 0.5], 0.1)
+    /// >>> clear = Limit("clear", Residual.distances(arm, [(tool, ball)]), lower=[0.01])
+    #[staticmethod]
+    fn distances(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let pairs = members_of("pairs", "pairs of spheres", pairs)?;
+        let pairs = pairs.iter().enumerate().map(|(k, pair)| sphere_pair(model, k, pair)).collect::<PyResult<_>>()?;
+        Ok(Self::from(robot::Residual::Distances { pairs }))
+    }
+
     /// Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of the
     /// contact's rows: 1, 2, 3 or 6 numbers; target always has 6.
     #[staticmethod]
@@ -307,13 +328,14 @@ impl Residual {
         matches!(self.0, Kind::Number(_))
     }
 
-    /// Returns the residual's own bounds, which a cone or a centre of pressure has.
+    /// Returns the residual's own bounds, which a cone, a centre of pressure and distances have.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         let Kind::Given(inner) = &self.0 else { return None };
         match inner {
             robot::Residual::FrictionCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::WrenchCone { cone, .. } => Some(cone.bounds()),
             robot::Residual::CenterOfPressure { .. } => Some((vec![f64::NEG_INFINITY; 4], vec![0.0; 4])),
+            robot::Residual::Distances { pairs } => Some((vec![0.0; pairs.len()], vec![f64::INFINITY; pairs.len()])),
             _ => None,
         }
     }
@@ -358,6 +380,30 @@ pub(super) fn put_written(
 fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
     let model = &model.get().inner;
     Ok((&model.frames()[frame_index(model, frame)?]).into())
+}
+
+/// Reads pair k of spheres.
+fn sphere_pair(model: &Bound<'_, Model>, k: usize, pair: &Bound<'_, PyAny>) -> PyResult<robot::GeometryPair> {
+    let wrong = || PyTypeError::new_err(format!("pairs[{k}]: expected a pair of spheres, found {}", found_type(pair)));
+    let pair = pair.cast::<PyTuple>().map_err(|_| wrong())?;
+    if pair.len() != 2 {
+        return Err(PyTypeError::new_err(format!("pairs[{k}]: expected two spheres, found a tuple of {}", pair.len())));
+    }
+    let [first, second] = [0, 1].map(|side| sphere(model, &format!("pairs[{k}][{side}]"), &pair.get_item(side)?));
+    Ok(robot::GeometryPair::new(first?, second?))
+}
+
+/// Reads a `Sphere` of `condyle._types`; `name` names the sphere in error messages.
+fn sphere(model: &Bound<'_, Model>, name: &str, given: &Bound<'_, PyAny>) -> PyResult<robot::Geometry> {
+    if !given.is_instance(class!(given.py(), "Sphere")?)? {
+        return Err(PyTypeError::new_err(format!("{name}: expected a `Sphere`, found {}", found_type(given))));
+    }
+    let center = three(&format!("{name}.center"), &given.getattr("center")?)?;
+    let (radius, frame) = (given.getattr("radius")?, given.getattr("frame")?);
+    let wrong = |_| PyTypeError::new_err(format!("{name}.radius: expected a number, found {}", found_type(&radius)));
+    let radius = radius.extract().map_err(wrong)?;
+    let frame = if frame.is_none() { None } else { Some(frame_name(model, &frame)?) };
+    Ok(robot::Geometry { frame, shape: robot::Shape::sphere(center, radius) })
 }
 
 /// Reads six numbers, linear first; returns zeros if no numbers are given.

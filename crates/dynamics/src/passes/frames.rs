@@ -15,11 +15,13 @@
 
 use crate::passes::answers::answers;
 use crate::passes::kinematics::{Moving, World};
-use condyle_linalg::check_index;
+use condyle_linalg::{check, check_index};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::gate::{FusedF64, Rename};
-use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Motion, Scalar, Se3, Vec3, kernel, same_layout};
+use condyle_spatial::{
+    Act, Constant, Cross, Dense, DenseMatrix, Force, Mat3, Motion, Scalar, Se3, Vec3, kernel, same_layout,
+};
 use core::ops::Deref;
 
 /// Reference frame in which a velocity, an acceleration or a Jacobian of a frame or body is expressed.
@@ -268,6 +270,17 @@ kernel! {
 }
 
 kernel! {
+    /// Adds the joint efforts Jᵀ f of a force f on `body` to `tau`. The force and the Jacobian J are those of the
+    /// world's frame.
+    fn add_efforts<S, R>(of: Placements<'_, S, R>, body: usize, f: &Force<S>, tau: &mut [S]) {
+        for &c in Single::<S, R>::new(of.model).support(body) {
+            let column = &of.model.columns()[c];
+            tau[column.coordinate] += of.world.S[c].dot(*f) * S::splat(column.ratio); // τ += Sᵀ f
+        }
+    }
+}
+
+kernel! {
     /// Computes the rate dJ/dt of the Jacobian of a frame. The frame is fixed to `body` and has the pose oXf.
     fn jacobian_rate<S, R>(
         of: Velocities<'_, S, R>,
@@ -311,6 +324,33 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
             reference,
             columns("J", J, self.model.nv()),
         );
+    }
+
+    /// Adds the joint efforts Jᵀ f of a force on a body to `tau`, in O(depth). J is the body's Jacobian in the world's
+    /// frame. So f is the force along the world's axes, with its moment about the world's origin (N, N m). Allocates
+    /// nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, Force, Vec3, forward_kinematics, robots};
+    /// let arm = robots::arm7();
+    /// let (tool, mut data) = (arm.frame("tool")?, Data::new(&arm));
+    /// let placements = forward_kinematics(&arm, &mut data, &[0.3; 7]);
+    /// let push = Force::at_point(placements.frame(tool).translation, Vec3::new(0.0, 0.0, 10.0));
+    /// let mut tau = [0.0; 7];
+    /// placements.add_body_efforts(arm.frames()[tool].body, push, &mut tau);
+    /// assert!(tau[0].abs() < 1e-12); // the first axis is vertical
+    /// assert!(tau[1].abs() > 1.0);
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// Panics if the body does not exist, or `tau` does not have nv numbers.
+    #[inline(always)]
+    #[track_caller]
+    pub fn add_body_efforts(&self, body: usize, f: Force<S>, tau: &mut [S]) {
+        check_body(self.model, body);
+        check("tau", tau.len(), self.model.nv());
+        add_efforts(*self, body, &f, tau);
     }
 }
 

@@ -285,6 +285,9 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
                 o.numbers.extend_from_slice(o.three.as_slice());
                 o.numbers.extend_from_slice(&k.body_point_velocity(b, point).to_array());
                 o.numbers.extend_from_slice(&k.force_on_body(b, point, point).to_array());
+                o.v.fill(S::zero());
+                k.add_body_efforts(b, Force::at_point(point, point + point.cross(k.body(b).translation)), &mut o.v);
+                o.numbers.extend_from_slice(&o.v);
             }
         }),
         ("frame_jacobian_alone", |m, _, i, o| {

@@ -135,6 +135,24 @@ fn jacobian_rates() {
     }
 }
 
+/// Checks that the efforts of a force on a body are Jᵀ f, added to the given efforts.
+#[test]
+fn efforts_of_a_force_are_products_with_the_jacobian() {
+    let mut worst = Worst::new("τ + Jᵀ f", ROUNDING);
+    for (seed, model) in all_models(TREES).iter().enumerate() {
+        let State { q, v, f_ext, .. } = State::random(model, &mut rng(seed as u64));
+        let (mut data, mut J) = (Data::new(model), DMatrix::zeros(6, model.nv()));
+        let placements = forward_kinematics(model, &mut data, &q);
+        for (body, f) in f_ext.iter().enumerate() {
+            placements.body_jacobian(body, ReferenceFrame::World, &mut J);
+            let expected = DVector::from_column_slice(&v) + J.tr_mul(&DVector::from_row_slice(&f.to_array()));
+            let mut tau = v.clone();
+            placements.add_body_efforts(body, *f, &mut tau);
+            worst.see(model, &tau, expected.as_slice());
+        }
+    }
+}
+
 /// Checks the accelerations in each reference frame. The spatial acceleration is the rate of the spatial velocity, and
 /// the classical acceleration is the rate of a point's velocity.
 #[test]

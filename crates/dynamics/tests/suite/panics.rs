@@ -5,7 +5,7 @@ use crate::common::rng;
 use crate::common::table::{Input, Output, functions};
 use condyle_dynamics::ReferenceFrame::World;
 use condyle_dynamics::{
-    Batch, Cholesky, ConstraintSet, ContactConstraint, Data, DivideConquer, Ltdl, Mimic, ModelBuilder,
+    Batch, Cholesky, ConstraintSet, ContactConstraint, Data, DivideConquer, Force, Ltdl, Mimic, ModelBuilder,
     ProximalSettings, Scalar, Se3, Target, aba, aba_derivatives, body_jacobian, compute_all_terms,
     constrained_dynamics, forward_accelerations, forward_kinematics, frame_jacobian, jacobian, rnea, rnea_derivatives,
     robots,
@@ -88,6 +88,10 @@ fn missing_bodies_and_frames_are_named() {
     });
     assert_panic(HERE, &body, || placed.body_jacobian(n, World, J));
     assert_panic(HERE, &frame, || placed.frame_jacobian(n, World, J));
+    assert_panic(HERE, &body, || placed.add_body_efforts(n, Force::zero(), &mut [0.0; 7]));
+    assert_panic(HERE, "tau: expected length 7, found 6", || {
+        placed.add_body_efforts(0, Force::zero(), &mut [0.0; 6]);
+    });
     let moving = forward_accelerations(&arm, data, &q, &v, &v);
     assert_panic(HERE, &frame, || _ = moving.frame(n));
     assert_panic(HERE, &body, || _ = moving.body_velocity(n, World));

@@ -89,6 +89,7 @@ pub use own_constraint::OwnConstraint;
 pub use problem::{ControlBounds, Dynamics, Knot, RobotProblem};
 pub use residuals::autodiff::{GenericResidual, RobotState};
 pub use residuals::cones::{FrictionCone, WrenchCone};
+pub use residuals::distance::{Geometry, GeometryPair, Shape};
 pub use residuals::frame_name::FrameName;
 pub use residuals::own::{Inputs, OwnResidual, ResidualFunction};
 pub use residuals::residual::Residual;

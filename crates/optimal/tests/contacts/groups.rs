@@ -70,7 +70,7 @@ fn knots_with_costs_of_their_own_are_single_knots() {
     check_group(stance, &model, &mut rng);
 }
 
-fn check_group(mut action: impl GroupModel, model: &Model, rng: &mut StdRng) {
+pub(super) fn check_group(mut action: impl GroupModel, model: &Model, rng: &mut StdRng) {
     for count in [0, 1, 2, 3, 8, 21] {
         let knots: Vec<usize> = (0..count).collect();
         let xs = knots.iter().flat_map(|_| random_state(model, rng)).collect::<Vec<_>>();

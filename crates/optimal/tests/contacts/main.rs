@@ -3,6 +3,7 @@
 
 mod access;
 mod callers;
+mod distances;
 mod files;
 mod groups;
 mod implicit;

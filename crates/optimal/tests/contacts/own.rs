@@ -99,7 +99,7 @@ fn both(model: &Arc<Model>, frame: &str, nu: usize) -> [Vec<Cost>; 2] {
 }
 
 /// Compares costs and derivatives of two actions for a group of knots.
-fn compare(what: &str, mut a: impl GroupModel, mut b: impl GroupModel, model: &Model, rng: &mut StdRng) {
+pub(super) fn compare(what: &str, mut a: impl GroupModel, mut b: impl GroupModel, model: &Model, rng: &mut StdRng) {
     let (ndx, nx, nu, knots) = (a.ndx(), a.nx(), a.nu(), [0, 1, 2, 3, 4]);
     let xs: Vec<_> = knots.iter().flat_map(|_| random_state(model, rng)).collect();
     let us = random(nu * knots.len(), 1.0, rng);

@@ -11,7 +11,7 @@ use condyle_dynamics::{
     forward_velocities,
 };
 use condyle_spatial::block::{Block, Strided, gather_rows};
-use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
+use condyle_spatial::{Act, Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
 /// Group of knots whose residuals read the same quantities.
 pub(crate) struct KnotGroup<'a> {
@@ -54,7 +54,7 @@ impl KnotGroup<'_> {
         for (J, column) in [(by_v, 0), (by_q, width - nv)].into_iter().skip(usize::from(width == nv)) {
             let (strides, shape) = ([1, J.nrows()], [plan.n, nv]);
             let from = Strided { vectors: J.as_slice(), strides, shape, negative: false };
-            let at = plan.index * ROWS * nv + column;
+            let at = plan.slot * ROWS * nv + column;
             unpack_matrix(&from, self.data, width, |data| &mut data.residuals.kinematic[list].rows[at..]);
         }
     }
@@ -72,6 +72,8 @@ pub(crate) struct ResidualKernel<S> {
     Jcom: Matrix<S>,
     /// Vector of zeros. Shape: nv.
     zero: Vec<S>,
+    /// Row of the Jacobian of a distance. Shape: nv.
+    row: Vec<S>,
 }
 
 impl<S: Block<Number = f64>> ResidualKernel<S> {
@@ -84,12 +86,13 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
             J: [wide(6), wide(6)],
             Jcom: wide(3),
             zero: vec![S::zero(); nv],
+            row: vec![S::zero(); nv],
         }
     }
 
     /// Computes the kinematic residuals of the knots of `group` at (q, v), and the rows of their Jacobians.
     pub(crate) fn run(&mut self, model: &Model, data: &mut Data<S>, [q, v]: [&[S]; 2], group: &mut KnotGroup<'_>) {
-        let Self { t, r, J, Jcom, zero } = self;
+        let Self { t, r, J, Jcom, zero, row } = self;
         let requirements = group.terms[0].layout().requirements;
         if group.slopes && requirements.com {
             center_of_mass_jacobian(model, data, q, Jcom);
@@ -118,6 +121,9 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
             (data.placements(model).expect("kinematics place the bodies"), None)
         };
         group.each(|group, [list, i], residual, plan| {
+            if let Residual::Distances { .. } = residual {
+                return write_distances(placements, group, [list, i], plan, (t, r, row));
+            }
             let target = |k: usize| group.terms.get(k).and_then(|terms| terms.0[list].kinematic(i));
             let numbers: [_; WIDEST] =
                 core::array::from_fn(|k| target(k).map_or([0.0; 12], |(residual, ..)| residual.target_numbers()));
@@ -135,12 +141,39 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
                 }
                 _ => unreachable!("it does not look at kinematics"),
             }
-            let at = plan.index * STRIDE;
+            let at = plan.slot * STRIDE;
             unpack(r, group.data, |data| &mut data.residuals.kinematic[list].r[at..]);
             if group.slopes && residual.frame().is_some() {
                 group.write_rows(list, residual, plan, [&J[0], &J[1]]);
             }
         });
+    }
+}
+
+/// Computes the distances of residual i of a list, and the rows of their Jacobian. All knots of the group have the pairs
+/// of bodies of `plan`, but the geometries may differ.
+fn write_distances<S: Block<Number = f64>>(
+    placements: Placements<'_, S>,
+    group: &mut KnotGroup<'_>,
+    [list, i]: [usize; 2],
+    plan: &Plan,
+    (t, r, row): (&mut [S; 12], &mut [S; STRIDE], &mut [S]),
+) {
+    let nv = row.len();
+    for (k, pair) in plan.pairs.iter().enumerate() {
+        let numbers: [&[f64]; WIDEST] = core::array::from_fn(|knot| {
+            let terms = group.terms.get(knot).unwrap_or(&group.terms[0]);
+            terms.0[list].kinematic(i).map_or(&pair.numbers[..], |(.., plan)| &plan.pairs[k].numbers)
+        });
+        gather_rows(&numbers[..group.terms.len()], &mut t[..pair.numbers.len()]);
+        let [first, second] = pair.bodies;
+        sphere_distance(placements, first, second, t, r, group.slopes, row);
+        let at = plan.slot * STRIDE + k;
+        unpack(&r[..1], group.data, |data| &mut data.residuals.kinematic[list].r[at..]);
+        if group.slopes {
+            let at = plan.slot * ROWS * nv + k * nv;
+            unpack(row, group.data, |data| &mut data.residuals.kinematic[list].rows[at..]);
+        }
     }
 }
 
@@ -241,6 +274,35 @@ kernel! {
         if slopes {
             velocities.frame_jacobian(frame, reference, &mut J[0]);
             velocities.frame_velocity_derivative(frame, reference, &mut J[1]);
+        }
+    }
+}
+
+/// Square of the distance below which two centres coincide (m²). Above it, the square of a distance has full precision.
+const COINCIDENT: f64 = 1e-300;
+
+kernel! {
+    /// Computes the signed distance ‖p₁ − p₂‖ − radius₁ − radius₂ of two spheres on bodies, and the row nᵀ (J₁ − J₂) of
+    /// its Jacobian. `t` contains the centres in the bodies' coordinates, and the sum of the radii.
+    fn sphere_distance<S>(
+        placements: Placements<'_, S>, first: usize, second: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
+        row: &mut [S],
+    ) {
+        let p = placements.body(first).act(vector(t, 0));
+        let d = p - placements.body(second).act(vector(t, 3));
+        let square = d.norm_squared();
+        let distance = square.sqrt();
+        r[0] = distance - t[6];
+        if slopes {
+            row.fill(S::zero());
+            let coincident = square.lt(S::splat(COINCIDENT));
+            let inverse = S::select(coincident, S::one(), distance).recip();
+            let entry = |d: S, z: f64| S::select(coincident, S::splat(z), d * inverse);
+            let n = Vec3::new(entry(d.x, 0.0), entry(d.y, 0.0), entry(d.z, 1.0));
+            // the line of the force n contains both centres, so one moment about the origin serves for both bodies
+            let f = Force::at_point(p, n);
+            placements.add_body_efforts(first, f, row); // J₁ᵀ n
+            placements.add_body_efforts(second, -f, row);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! offset of its entries.
 #![allow(non_snake_case)] // names follow the literature: W
 
+use super::distance::PairPlan;
 use super::residual::{Part, Residual};
 use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::Model;
@@ -15,10 +16,12 @@ pub(crate) struct Plan {
     pub n: usize,
     /// Offset of the residual's entries: the number of entries of all terms before this one.
     pub first: usize,
-    /// Index of a kinematic residual among the kinematic residuals of the knot.
-    pub index: usize,
+    /// Index of the first slot of a kinematic residual among the slots of the knot's kinematic residuals.
+    pub slot: usize,
     /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
+    /// Pairs of geometries whose distances are the entries of the residual; empty for other residuals.
+    pub pairs: Vec<PairPlan>,
     /// Range in λ of the rows of the residual's contact.
     pub rows: Range<usize>,
     /// Whether the knot has contacts.
@@ -38,8 +41,26 @@ impl Plan {
             Residual::UndrivenEffort => capabilities.undriven.clone(),
             _ => residual.force_rows(rows.len()),
         };
+        let pairs = match residual {
+            Residual::Distances { pairs } => PairPlan::all(model, pairs)?,
+            _ => Vec::new(),
+        };
         let in_contact = !capabilities.contacts.is_empty();
-        Ok(Self { n, first: 0, index: 0, frame, rows, in_contact, W })
+        Ok(Self { n, first: 0, slot: 0, frame, pairs, rows, in_contact, W })
+    }
+
+    /// Returns the number of slots that a kinematic residual occupies. Slots are consecutive, so a residual with many
+    /// entries is stored without gaps.
+    pub(crate) fn slots(&self) -> usize {
+        self.n.div_ceil(STRIDE)
+    }
+
+    /// Returns whether two kinematic residuals of the same kind read the same frame and the same pairs of bodies.
+    pub(crate) fn reads_the_bodies_of(&self, other: &Self) -> bool {
+        let bodies = |plan: &Self, k: usize| plan.pairs[k].bodies;
+        self.frame == other.frame
+            && self.pairs.len() == other.pairs.len()
+            && (0..self.pairs.len()).all(|k| bodies(self, k) == bodies(other, k))
     }
 }
 
@@ -56,8 +77,9 @@ pub(crate) struct KnotLayout {
     pub longest: usize,
     /// Number of Jacobian rows with respect to (u, v, q), and number of Jacobian rows with respect to only q.
     pub rows: [usize; 2],
-    /// Number of kinematic residuals.
+    /// Number of kinematic residuals, and number of their slots.
     pub kinematic: usize,
+    pub slots: usize,
     /// Whether a residual reads contact forces.
     pub forces: bool,
     /// Whether a residual is user-defined; the next field tells whether a user-defined residual has second derivatives.
@@ -75,18 +97,19 @@ impl KnotLayout {
             Part::Diagonal => [0, 0],
         };
         let kinematic = usize::from(residual.is_kinematic());
+        let slots = kinematic * plan.slots();
         let forces = residual.output() == Some(Output::Force);
         let requirements = Requirements::of(residual, plan.in_contact);
         let own = matches!(residual, Residual::Own(_));
         let curved = matches!(residual, Residual::Own(own) if own.has_hessian());
-        Self { longest: plan.n, rows, kinematic, forces, own, curved, requirements }
+        Self { longest: plan.n, rows, kinematic, slots, forces, own, curved, requirements }
     }
 
     /// Returns a layout that is large enough for either of two knots.
     pub(crate) fn or(self, other: Self) -> Self {
         let most = |a: [usize; 2], b: [usize; 2]| [a[0].max(b[0]), a[1].max(b[1])];
-        let kinematic = self.kinematic.max(other.kinematic);
-        Self { rows: most(self.rows, other.rows), kinematic, ..self + other }
+        let (kinematic, slots) = (self.kinematic.max(other.kinematic), self.slots.max(other.slots));
+        Self { rows: most(self.rows, other.rows), kinematic, slots, ..self + other }
     }
 }
 
@@ -99,6 +122,7 @@ impl Add for KnotLayout {
             longest: self.longest.max(other.longest),
             rows: sum(self.rows, other.rows),
             kinematic: self.kinematic + other.kinematic,
+            slots: self.slots + other.slots,
             forces: self.forces | other.forces,
             own: self.own | other.own,
             curved: self.curved | other.curved,
@@ -133,6 +157,7 @@ impl Requirements {
             Residual::CentroidalMomentum { .. } => (all.momentum, all.velocities) = (true, true),
             Residual::FrameVelocity { .. } => all.velocities = true,
             Residual::ImpulseCenterOfMass => all.impulse_com = true,
+            Residual::Distances { .. } => all.placements = true,
             _ => all.placements = residual.frame().is_some(),
         }
         all
@@ -154,9 +179,10 @@ impl BitOr for Requirements {
     }
 }
 
-/// Stride of kinematic residuals: the distance between the first entries of consecutive residuals.
+/// Number of entries of a slot. A residual with more entries occupies several slots.
 pub(crate) const STRIDE: usize = 8;
-/// Number of Jacobian entries of a residual per coordinate: six rows with respect to v, and six with respect to q.
+/// Number of Jacobian entries of a slot per coordinate: six rows with respect to v and six with respect to q, or up to
+/// `STRIDE` rows with respect to only q.
 pub(crate) const ROWS: usize = 12;
 
 /// Quantities that the residuals of a knot read. A quantity is not written if no term of the knot requires it.
@@ -177,7 +203,7 @@ pub(crate) struct ResidualData {
     pub is_written: bool,
 }
 
-/// Kinematic residuals and the rows of their Jacobians. The `index` of a residual's plan gives its slot.
+/// Kinematic residuals and the rows of their Jacobians. The `slot` of a residual's plan gives its first slot.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct KinematicData {
     pub r: Vec<f64>,
@@ -187,10 +213,10 @@ pub(crate) struct KinematicData {
 impl ResidualData {
     /// Allocates memory for the residuals of costs and of limits, if the present memory is too small.
     pub(crate) fn reserve(&mut self, nv: usize, layouts: [KnotLayout; 2]) {
-        for (data, KnotLayout { kinematic, .. }) in self.kinematic.iter_mut().zip(layouts) {
-            if data.r.len() < kinematic * STRIDE {
-                data.r.resize(kinematic * STRIDE, 0.0);
-                data.rows.resize(kinematic * ROWS * nv, 0.0);
+        for (data, KnotLayout { slots, .. }) in self.kinematic.iter_mut().zip(layouts) {
+            if data.r.len() < slots * STRIDE {
+                data.r.resize(slots * STRIDE, 0.0);
+                data.rows.resize(slots * ROWS * nv, 0.0);
             }
         }
         let requirements = layouts[0].requirements | layouts[1].requirements;
@@ -207,12 +233,12 @@ impl ResidualData {
 impl KinematicData {
     /// Returns the entries of a residual.
     pub(crate) fn residual(&self, plan: &Plan) -> &[f64] {
-        &self.r[plan.index * STRIDE..][..plan.n]
+        &self.r[plan.slot * STRIDE..][..plan.n]
     }
 
     /// Returns the rows of the Jacobian of a residual.
     pub(crate) fn rows(&self, nv: usize, residual: &Residual, plan: &Plan) -> core::slice::ChunksExact<'_, f64> {
         let width = row_width(nv, residual);
-        self.rows[plan.index * ROWS * nv..][..plan.n * width].chunks_exact(width)
+        self.rows[plan.slot * ROWS * nv..][..plan.n * width].chunks_exact(width)
     }
 }

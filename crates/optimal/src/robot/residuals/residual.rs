@@ -1,6 +1,7 @@
 //! Residuals of costs and limits.
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
+use super::distance::{GeometryPair, PairPlan};
 use super::frame_name::FrameName;
 use super::own::{Inputs, OwnResidual};
 use super::target::check_rotation;
@@ -87,6 +88,53 @@ pub enum Residual {
         /// Frame in which the velocity and its target are expressed.
         reference: ReferenceFrame,
     },
+    /// Signed distances between geometries on the robot and obstacles in the world, or other geometries of the same
+    /// robot (m). Each pair of geometries has one entry. For two spheres with centres p₁ and p₂ the entry is r = ‖p₁ −
+    /// p₂‖ − radius₁ − radius₂, which is negative while the spheres overlap.
+    ///
+    /// The Jacobian of an entry is nᵀ (∂p₁/∂q − ∂p₂/∂q) with the unit vector n from p₂ to p₁. If the centres coincide,
+    /// no such vector exists. Then n is the world's z axis, so that the derivatives stay finite and move the spheres
+    /// apart.
+    ///
+    /// A [`Limit`](crate::robot::Limit) with lower bounds and infinite upper bounds keeps the geometries apart. It
+    /// applies only at knots, so a short Δt or a margin must exclude collisions between two knots.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, Vec3, forward_kinematics, robots};
+    /// use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Geometry, GeometryPair, Limit, Residual, Shape};
+    /// use condyle_optimal::{AugmentedLagrangian, Problem, Status};
+    /// use std::sync::Arc;
+    /// # let (arm, x0) = (Arc::new(robots::arm7()), [vec![-0.6, 0.9, 0.0, 1.2, 0.0, 0.4, 0.0], vec![0.0; 7]].concat());
+    /// // the arm turns about its vertical axis; its tool must pass a ball of radius 0.1 m with a margin of 0.01 m
+    /// let tool = arm.frame("tool")?;
+    /// let place = |q: &[f64]| forward_kinematics(&arm, &mut Data::new(&arm), q).frame(tool).translation;
+    /// let goal = [vec![0.6], x0[1..].to_vec()].concat();
+    /// let ball = Shape::sphere(place(&[vec![0.0], x0[1..7].to_vec()].concat()), 0.1);
+    /// let pair = GeometryPair::new(Geometry::on("tool", Shape::sphere(Vec3::zero(), 0.05)), Geometry::in_world(ball));
+    /// let clear = Residual::Distances { pairs: vec![pair] };
+    /// let cost = |name, weight, residual| Cost::new(name, weight, residual, Activation::Quadratic);
+    /// let costs = vec![
+    ///     cost("rest", 1e-1, Residual::State { reference: goal.clone() }),
+    ///     cost("effort", 1e-4, Residual::Control { reference: vec![0.0; 7] }),
+    /// ];
+    /// let limit = Limit::new("clear", clear, vec![0.01], vec![f64::INFINITY]);
+    /// let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs)?.with_limits(vec![limit])?;
+    /// let us = knot.quasi_static(&x0).repeat(20);
+    /// let end = FreeDynamics::terminal(arm.clone(), vec![cost("goal", 1e2, Residual::State { reference: goal })])?;
+    /// let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 20], Box::new(end))?;
+    /// let mut solver = AugmentedLagrangian::new(&problem);
+    /// let solution = solver.solve(&mut problem, &x0.repeat(21), &us)?;
+    /// assert_eq!(solution.status, Status::Converged);
+    /// let Shape::Sphere { center, .. } = ball else { unreachable!() };
+    /// let nearest = solution.xs.chunks(14).map(|x| (place(&x[..7]) - center).norm_squared().sqrt() - 0.15);
+    /// let nearest = nearest.fold(f64::INFINITY, f64::min);
+    /// assert!(nearest > 0.01 - 1e-6 && nearest < 0.02);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    Distances {
+        /// Pairs of geometries, one for each entry.
+        pairs: Vec<GeometryPair>,
+    },
     /// Error λ − λ_ref of a contact's force or impulse along the axes of the contact's rows: 1, 2, 3 or 6 entries,
     /// linear first.
     ContactForce {
@@ -159,7 +207,8 @@ impl Residual {
             Self::CenterOfMass { .. }
             | Self::FramePlacement { .. }
             | Self::FrameTranslation { .. }
-            | Self::FrameRotation { .. } => Part::Positions,
+            | Self::FrameRotation { .. }
+            | Self::Distances { .. } => Part::Positions,
             Self::Own(own) if own.inputs() == Inputs::POSITIONS => Part::Positions,
             _ => Part::All,
         }
@@ -184,11 +233,13 @@ impl Residual {
 
     /// Returns whether the residual reads only kinematics.
     pub(crate) fn is_kinematic(&self) -> bool {
-        self.frame().is_some() || matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. })
+        let whole =
+            matches!(self, Self::CenterOfMass { .. } | Self::CentroidalMomentum { .. } | Self::Distances { .. });
+        whole || self.frame().is_some()
     }
 
-    /// Returns whether the residual and `other` differ only in their targets. Callers must compare the frames of both
-    /// residuals.
+    /// Returns whether the residual and `other` differ only in their targets. Callers must compare the frames and the
+    /// pairs of bodies of both residuals.
     pub(crate) fn differs_in_target(&self, other: &Self) -> bool {
         core::mem::discriminant(self) == core::mem::discriminant(other) && self.reference() == other.reference()
     }
@@ -278,6 +329,7 @@ impl Residual {
                 return Err("only an impact changes velocities at once".to_owned());
             }
             Self::ImpulseCenterOfMass => 3,
+            Self::Distances { pairs } => PairPlan::all(model, pairs)?.len(),
             Self::Own(own) => own.check(model, nu).map(|()| own.size())?,
         };
         match self.output() {

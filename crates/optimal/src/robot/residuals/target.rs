@@ -76,7 +76,7 @@ impl Target<'_> {
 }
 
 /// Returns an error if an entry of `numbers` is not finite; the error contains `name`.
-fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
+pub(super) fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     match numbers.iter().position(|x| !x.is_finite()) {
         None => Ok(()),
         Some(k) if numbers[k].is_nan() => Err(format!("its {name} holds a NaN")),

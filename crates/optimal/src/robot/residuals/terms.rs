@@ -44,7 +44,7 @@ impl<T> Default for Terms<T> {
 impl<T: Term> Terms<T> {
     /// Adds a term with the plan of its residual.
     pub(crate) fn push(&mut self, term: T, mut plan: Plan) {
-        (plan.first, plan.index) = (self.len(), self.kinematic.len());
+        (plan.first, plan.slot) = (self.len(), self.layout.slots);
         if term.residual().is_kinematic() {
             self.kinematic.push(self.all.len());
         }
@@ -59,7 +59,7 @@ impl<T: Term> Terms<T> {
         let (old, before) = (&mut self.all[k], &mut self.plans[k]);
         let same = KnotLayout::of(term.residual(), &plan) == KnotLayout::of(old.residual(), before);
         if same {
-            (*old, *before) = (term, Plan { first: before.first, index: before.index, ..plan });
+            (*old, *before) = (term, Plan { first: before.first, slot: before.slot, ..plan });
         }
         same
     }
@@ -161,7 +161,7 @@ impl KnotTerms<'_> {
         let alike = |a: &dyn KinematicTerms, b: &dyn KinematicTerms| {
             a.layout().kinematic == b.layout().kinematic
                 && (0..a.layout().kinematic).all(|i| match (a.kinematic(i), b.kinematic(i)) {
-                    (Some((a, _, own)), Some((b, _, its))) => own.frame == its.frame && a.differs_in_target(b),
+                    (Some((a, _, own)), Some((b, _, its))) => own.reads_the_bodies_of(its) && a.differs_in_target(b),
                     _ => false,
                 })
         };
