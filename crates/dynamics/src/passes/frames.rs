@@ -270,7 +270,7 @@ kernel! {
 }
 
 kernel! {
-    /// Adds the joint efforts Jᵀ f of a force f on `body` to `tau`. The force and the Jacobian J are those of the
+    /// Adds the joint efforts Jᵀ f of a force f on `body` to `tau`. The force f and the Jacobian J are expressed in the
     /// world's frame.
     fn add_efforts<S, R>(of: Placements<'_, S, R>, body: usize, f: &Force<S>, tau: &mut [S]) {
         for &c in Single::<S, R>::new(of.model).support(body) {

@@ -2,7 +2,8 @@
 //! at an impact.
 //!
 //! - A [`Cost`] is a weighted [`Activation`] of a [`Residual`]. An action has a sum of costs, each with a name. A
-//!   [`Limit`] keeps a residual within bounds, or at zero.
+//!   [`Limit`] keeps a residual within bounds, or at zero. [`Residual::Distances`] keeps spheres on the robot away from
+//!   obstacles and from each other; a [`GeometryPair`] names two [`Geometry`] values, each with a [`Shape`].
 //! - [`FreeDynamics`] and [`ContactDynamics`] are knots with a duration. [`ImpulseDynamics`] is an impact, a knot
 //!   without duration. In [`FreeInverseDynamics`] the controls are the accelerations; in [`ContactInverseDynamics`]
 //!   they are the accelerations and the contact forces. An [`Actuation`] maps controls to joint efforts, an

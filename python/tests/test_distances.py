@@ -1,0 +1,106 @@
+"""Tests of distances between spheres: values and derivatives, limits, files, errors."""
+
+import pickle
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.optimal import (
+    Activation,
+    AugmentedLagrangian,
+    Cost,
+    FreeDynamics,
+    Limit,
+    Problem,
+    ProblemError,
+    Residual,
+    Sphere,
+)
+
+ARM = condyle.robots.arm7()
+X0 = np.r_[-0.6, 0.9, 0.0, 1.2, 0.0, 0.4, 0.0, np.zeros(7)]
+# Tolerance of sums of a few products, and of central differences with a step of 1e-6.
+ROUNDING, DIFFERENCES = 1e-12, 1e-8
+
+
+def total(residual: Residual, x: np.ndarray) -> tuple[float, np.ndarray]:
+    """Returns the sum of the residual's entries at the state x, and the gradient of this sum."""
+    terminal = FreeDynamics(ARM, None, [Cost("sum", 1.0, residual, Activation.sum())])
+    problem = Problem(x, [], [], terminal)
+    return problem.evaluate(x[None], []).cost, problem.derivatives(x[None], [])[0].q
+
+
+def pose(x: np.ndarray, frame: str | int) -> np.ndarray:
+    return condyle.frame_placement(ARM, condyle.Data(ARM), x[:7], frame)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_distance_is_that_of_the_centres_less_the_radii(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    x, (a, b, c) = np.r_[rng.uniform(-1.0, 1.0, 7), np.zeros(7)], rng.uniform(-0.3, 0.3, (3, 3))
+    tool = Sphere(a, 0.1, "tool")
+    residual = Residual.distances(ARM, [(tool, Sphere(b, 0.2)), (Sphere(c, frame=3), tool)])
+
+    def expected(x: np.ndarray) -> float:
+        p, q = (X[:3, :3] @ center + X[:3, 3] for X, center in ((pose(x, "tool"), a), (pose(x, 3), c)))
+        return float(np.linalg.norm(p - b) - 0.3 + np.linalg.norm(q - p) - 0.1)
+
+    value, gradient = total(residual, x)
+    assert abs(value - expected(x)) < ROUNDING
+    numeric = [(expected(x + h) - expected(x - h)) / 2e-6 for h in 1e-6 * np.eye(14)]
+    assert np.abs(gradient - numeric).max() < DIFFERENCES
+
+
+def test_an_arm_keeps_its_tool_out_of_a_ball() -> None:
+    goal, between = np.r_[0.6, X0[1:]], np.r_[0.0, X0[1:]]
+    ball = Sphere(pose(between, "tool")[:3, 3], 0.1)
+    clear = Limit("clear", Residual.distances(ARM, [(Sphere(np.zeros(3), 0.05, "tool"), ball)]), lower=[0.01])
+    costs = [Cost("rest", 0.1, Residual.state(goal)), Cost("effort", 1e-4, Residual.control(np.zeros(7)))]
+    knot = FreeDynamics(ARM, 0.05, costs, limits=[clear])
+    problem = Problem(X0, [knot], [0] * 20, FreeDynamics(ARM, None, [Cost("goal", 1e2, Residual.state(goal))]))
+    xs, us = np.tile(X0, (21, 1)), np.tile(knot.quasi_static(X0), (20, 1))
+    solution = AugmentedLagrangian(problem).solve(xs, us)
+    assert solution.status == "converged"
+    nearest = min(np.linalg.norm(pose(x, "tool")[:3, 3] - ball.center) - 0.15 for x in solution.xs)
+    assert abs(nearest - 0.01) < 1e-5
+    again = Problem.from_json(problem.to_json())
+    assert np.array_equal(AugmentedLagrangian(again).solve(xs, us).xs, solution.xs)
+
+
+def test_no_bounds_mean_no_overlap() -> None:
+    far, near = Sphere([5.0, 0.0, 0.0], 0.1), Sphere(pose(X0, "tool")[:3, 3], 0.1)
+    residual = Residual.distances(ARM, [(Sphere([0.0, 0.0, 0.1], 0.1, "tool"), other) for other in (far, near)])
+    terminal = FreeDynamics(ARM, None, [Cost("apart", 2.0, residual)])
+    # the spheres of the second pair overlap by 0.1 m, the spheres of the first pair do not
+    assert abs(Problem(X0, [], [], terminal).evaluate(X0[None], []).cost - 0.1**2) < ROUNDING
+    _, (*_, lower, upper) = Limit("apart", residual).__reduce__()
+    assert (lower, upper) == ([0.0, 0.0], [np.inf, np.inf])
+
+
+def test_distances_are_copied_with_their_frames() -> None:
+    residual = Residual.distances(ARM, [(Sphere([0.0, 0.0, 0.1], 0.1, "tool"), Sphere([0.5, 0.0, 0.5]))])
+    assert pickle.loads(pickle.dumps(residual)) == residual
+    assert repr(residual).startswith('<condyle.optimal.Residual {"distances":{"pairs":[{"first":{"frame":')
+    sphere = Sphere([1.0, 2.0, 3.0], 0.5)
+    assert pickle.loads(pickle.dumps(sphere)) == sphere
+    assert repr(sphere) == "Sphere(center=[1.0, 2.0, 3.0], radius=0.5, frame=None)"
+
+
+def test_what_is_wrong_is_named() -> None:
+    good = Sphere([0.0, 0.0, 0.1], 0.1, "tool")
+
+    def refused(kind: type[Exception], text: str, pairs: object) -> None:
+        with pytest.raises(kind, match=text):
+            FreeDynamics(ARM, None, [Cost("apart", 1.0, Residual.distances(ARM, pairs))])  # type: ignore[arg-type]
+
+    refused(TypeError, r"pairs: expected a list of pairs of spheres, found an int", 3)
+    refused(TypeError, r"pairs\[0\]: expected two spheres, found a tuple of 3", [good])
+    refused(TypeError, r"pairs\[0\]: expected a pair of spheres, found a float", [1.0])
+    refused(TypeError, r"pairs\[1\]\[1\]: expected a `Sphere`, found a float", [(good, good), (good, 1.0)])
+    refused(ValueError, r"pairs\[0\]\[1\].center", [(good, Sphere([0.0, 1.0]))])
+    refused(TypeError, r"pairs\[0\]\[0\].radius: expected a number", [(Sphere([0.0] * 3, "r", "tool"), good)])  # type: ignore[arg-type]
+    refused(condyle.ModelError, "`tol`", [(good, Sphere([0.0] * 3, 0.1, "tol"))])
+    refused(ProblemError, r"cost `apart`: its pairs\[0\].second.radius is -0.1", [(good, Sphere([0.0] * 3, -0.1))])
+    refused(ProblemError, r"its pairs\[0\].first.center holds a NaN", [(Sphere([np.nan] * 3, 0.1, "tool"), good)])
+    refused(ProblemError, r"its pairs\[0\] has no frame", [(Sphere([0.0] * 3), Sphere([1.0] * 3))])
