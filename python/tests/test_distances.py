@@ -24,11 +24,11 @@ X0 = np.r_[-0.6, 0.9, 0.0, 1.2, 0.0, 0.4, 0.0, np.zeros(7)]
 ROUNDING, DIFFERENCES = 1e-12, 1e-8
 
 
-def total(residual: Residual, x: np.ndarray) -> tuple[float, np.ndarray]:
-    """Returns the sum of the residual's entries at the state x, and the gradient of this sum."""
-    terminal = FreeDynamics(ARM, None, [Cost("sum", 1.0, residual, Activation.sum())])
-    problem = Problem(x, [], [], terminal)
-    return problem.evaluate(x[None], []).cost, problem.derivatives(x[None], [])[0].q
+def at(x: np.ndarray, cost: Cost) -> tuple[float, np.ndarray]:
+    """Returns the value and the gradient of a cost at the state x of a terminal knot."""
+    problem = Problem(x, [FreeDynamics(ARM, 0.1, [])], [0], FreeDynamics(ARM, None, [cost]))
+    xs, us = np.tile(x, (2, 1)), np.zeros((1, 7))
+    return problem.evaluate(xs, us).cost, problem.derivatives(xs, us)[1].q
 
 
 def pose(x: np.ndarray, frame: str | int) -> np.ndarray:
@@ -46,7 +46,7 @@ def test_a_distance_is_that_of_the_centres_less_the_radii(seed: int) -> None:
         p, q = (X[:3, :3] @ center + X[:3, 3] for X, center in ((pose(x, "tool"), a), (pose(x, 3), c)))
         return float(np.linalg.norm(p - b) - 0.3 + np.linalg.norm(q - p) - 0.1)
 
-    value, gradient = total(residual, x)
+    value, gradient = at(x, Cost("sum", 1.0, residual, Activation.sum()))
     assert abs(value - expected(x)) < ROUNDING
     numeric = [(expected(x + h) - expected(x - h)) / 2e-6 for h in 1e-6 * np.eye(14)]
     assert np.abs(gradient - numeric).max() < DIFFERENCES
@@ -71,9 +71,8 @@ def test_an_arm_keeps_its_tool_out_of_a_ball() -> None:
 def test_no_bounds_mean_no_overlap() -> None:
     far, near = Sphere([5.0, 0.0, 0.0], 0.1), Sphere(pose(X0, "tool")[:3, 3], 0.1)
     residual = Residual.distances(ARM, [(Sphere([0.0, 0.0, 0.1], 0.1, "tool"), other) for other in (far, near)])
-    terminal = FreeDynamics(ARM, None, [Cost("apart", 2.0, residual)])
     # the spheres of the second pair overlap by 0.1 m, the spheres of the first pair do not
-    assert abs(Problem(X0, [], [], terminal).evaluate(X0[None], []).cost - 0.1**2) < ROUNDING
+    assert abs(at(X0, Cost("apart", 2.0, residual))[0] - 0.1**2) < ROUNDING
     _, (*_, lower, upper) = Limit("apart", residual).__reduce__()
     assert (lower, upper) == ([0.0, 0.0], [np.inf, np.inf])
 

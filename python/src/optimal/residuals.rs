@@ -175,7 +175,7 @@ impl Residual {
     ///
     /// >>> from condyle.optimal import Limit, Residual, Sphere
     /// >>> tool, ball = Sphere([0.0, 0.0, 0.0], 0.05, "tool"), Sphere([0.4, 0.2, 0.5], 0.1)
-    /// >>> clear = Limit("clear", Residual.distances(arm, [(tool, ball)]), lower=[0.01])
+    /// >>> clear = Limit("clear", Residual.distances(condyle.robots.arm7(), [(tool, ball)]), lower=[0.01])
     #[staticmethod]
     fn distances(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>) -> PyResult<Self> {
         let pairs = members_of("pairs", "pairs of spheres", pairs)?;

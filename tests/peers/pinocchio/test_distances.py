@@ -54,8 +54,10 @@ def test_distances_are_those_of_placed_frames(name: str) -> None:
         distance = np.linalg.norm(away)
         x = np.r_[q, np.zeros(theirs.nv)]
         cost = Cost("distance", 1.0, Residual.distances(ours, [(first, second)]), Activation.sum())
-        problem = Problem(x, [], [], FreeDynamics(ours, None, [cost]))
-        assert abs(problem.evaluate(x[None], []).cost - (distance - first.radius - second.radius)) < SAME
-        row = problem.derivatives(x[None], [])[0].q
+        knot = FreeDynamics(ours, 0.1, [])
+        problem = Problem(x, [knot], [0], FreeDynamics(ours, None, [cost]))
+        xs, us = np.tile(x, (2, 1)), knot.quasi_static(x)
+        assert abs(problem.evaluate(xs, us[None]).cost - (distance - first.radius - second.radius)) < SAME
+        row = problem.derivatives(xs, us[None])[1].q
         expected = np.r_[away / distance @ (jacobians[0] - jacobians[1]), np.zeros(theirs.nv)]
         assert np.abs(row - expected).max() < SAME / min(distance, 1.0)
