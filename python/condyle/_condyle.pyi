@@ -3,7 +3,7 @@
 # Written by python/stubs.py from the extension module. Do not edit.
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np
@@ -47,6 +47,7 @@ from ._types import (
     RneaHessian,
     RneaSecondDerivatives,
     Solution,
+    Sphere,
     Spring,
     SweepResult,
 )
@@ -80,6 +81,7 @@ __all__ = [
     "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
+    "InteriorPoint",
     "Joint",
     "Limit",
     "Lqr",
@@ -295,11 +297,11 @@ def aba(
     """Computes the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) (forward dynamics), nv numbers (rad/s², m/s²);
     O(n).
 
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
+    q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`.
 
-    Raises `ModelError` if M is singular at every position. M may also be singular only at this position, as for a point
-    mass on the axis about which it turns. Then the result is not finite, or is a large number caused by rounding
-    errors.
+    Raises `ModelError` if M is singular at every position. M may also be singular at this position only, for example if
+    a point mass lies on the axis of its joint. Then the acceleration is not finite, or is a large number caused by
+    rounding errors.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -320,8 +322,9 @@ def aba_derivatives(
     """Computes the acceleration of `aba` and its exact derivatives with respect to q, v and τ, as `AbaDerivatives(a,
     da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent
-    space: the change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+    q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`, constant in the
+    bodies' frames. ∂q̈/∂q is taken in the tangent space, as the derivative of q̈ at `integrate(q, δ)` with respect to
+    δ, at δ = 0. out: four arrays, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)
@@ -333,7 +336,7 @@ def aba_derivatives(
 def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
@@ -346,7 +349,7 @@ def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _
     """Computes the joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n
     depth).
 
-    q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
+    q: position, nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 
     >>> arm = condyle.robots.arm7()
     >>> M = condyle.crba(arm, condyle.Data(arm), [0.3] * 7)
@@ -367,10 +370,10 @@ def forward_dynamics(
     """Computes forward dynamics, like `aba`, by the method that `method` names: the acceleration q̈, nv numbers (rad/s²,
     m/s²).
 
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', a
-    dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros of the tree, O(n d²) for depth d; None, the
-    fastest of these: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to
-    rounding.
+    q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`. method: 'aba', the
+    articulated-body algorithm, O(n) for n coordinates; 'dense', a dense factor of M, O(n³); 'sparse', a factor of M
+    that keeps the zeros of the tree, O(n d²) for depth d of the tree. None selects 'sparse' for a robot with mimic
+    joints, and 'aba', the fastest method, for all other robots. All methods give the same numbers, up to rounding.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -382,7 +385,7 @@ def forward_dynamics(
 def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the gravity efforts g(q) that hold the robot still, nv numbers: the efforts of `rnea` with v = a = 0.
 
-    q: nq numbers.
+    q: position, nq numbers.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> g = condyle.gravity(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -394,7 +397,7 @@ def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _
     """Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled. M itself is not
     computed.
 
-    q: nq numbers.
+    q: position, nq numbers.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q = condyle.Data(arm), [0.3] * 7
@@ -405,7 +408,7 @@ def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _
 def nonlinear_effects(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
     """
 
 def rnea(
@@ -420,8 +423,9 @@ def rnea(
     """Computes the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a (inverse dynamics),
     nv numbers (N m, N); O(n).
 
-    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m). It acts at the body's origin and
-    is expressed in the body's frame; row 0 belongs to the world.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: (nbodies, 6), a force on each body
+    (N, then N m). Each force acts at the origin of its body and is expressed in the body's frame; row 0 belongs to the
+    world.
 
     >>> arm = condyle.robots.arm7()
     >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
@@ -441,8 +445,9 @@ def rnea_derivatives(
     """Computes the exact derivatives of `rnea` with respect to q, v and a in O(n depth), as `RneaDerivatives(dtau_dq,
     dtau_dv, dtau_da)`, each (nv, nv).
 
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent space:
-    the change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: as for `rnea`, constant in the
+    bodies' frames. ∂τ/∂q is taken in the tangent space, as the derivative of τ at `integrate(q, δ)` with respect to δ,
+    at δ = 0. out: three arrays, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
@@ -456,7 +461,7 @@ def static_torque(
     """Computes the efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N);
     O(n).
 
-    q: nq numbers; f_ext: as for `rnea`. The result equals `rnea` with v = a = 0.
+    q: position, nq numbers; f_ext: as for `rnea`. The result equals `rnea` with v = a = 0.
     """
 
 @final
@@ -470,9 +475,9 @@ class ModelBuilder:
     """A builder that makes a `Model` body by body, parents first.
 
     Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass.
-    Pinocchio's composite, universal and spherical ZYX joints are a `chain` of bodies here. The chain has the same q and
-    v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext include these
-    bodies.
+    A builder makes Pinocchio's composite, universal and spherical ZYX joints as a `chain` of bodies. The chain has the
+    same q and v, but each joint except the last adds a body without mass. `nbodies`, `names` and the rows of f_ext
+    include these bodies.
 
     name: the name of the robot.
 
@@ -504,17 +509,18 @@ class ModelBuilder:
         force: tuple[float, float] | None = None,
     ) -> None:
         """Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. Limits, armature and
-        damping belong to the joints; an actuator does not change them.
+        damping belong to the joints; an actuator does not change these values.
 
         joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
         tendon: the tendon's name, if the actuator drives a tendon.
-        gear: one to six numbers; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1 if
-        both are 0, as for a motor. control, force: (minimum, maximum); None for no limits.
+        gear: one to six numbers; None is 1. gain: the force per unit of control. None means kp if kp is not 0, else kv
+        if kv is not 0. If both are 0, None means 1, as for a motor. control, force: (minimum, maximum); None for no
+        limits.
         """
 
     def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
-        """Adds a whole robot. The pose of its world in the frame of `parent` is `placement`. `prefix` is added before all
-        its names.
+        """Adds all bodies of another robot. The other robot's world has the pose `placement` in the frame of `parent`.
+        `prefix` is added before all names of the other robot.
 
         >>> from condyle import ModelBuilder, WORLD
         >>> two = ModelBuilder("two arms")
@@ -558,8 +564,8 @@ class ModelBuilder:
         """
 
     def build(self) -> Model:
-        """Builds the model: checks all data and numbers the bodies depth first, and siblings in the order of the calls
-        that added them. The builder cannot be used afterwards.
+        """Builds the model, and checks all data. The bodies are numbered depth first, and siblings in the order of the
+        calls that added them. The builder cannot be used afterwards.
 
         Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
         joint with an invalid leader.
@@ -567,11 +573,11 @@ class ModelBuilder:
 
     def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
         """Adds a body at the end of a chain of joints: a composite joint. The placement of each joint is relative to the
-        frame of the joint before.
+        frame of the previous joint.
 
         The coordinates of the joints follow one another in q and v. Bodies without mass, named `name#1`, `name#2`, and
-        so on, connect the joints. Returns the last body, which has `inertia`. A universal joint about unit vectors a
-        and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+        so on, connect the joints. Returns the last body, to which `inertia` belongs. A universal joint about unit
+        vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
 
         joints: a list of (joint, placement).
         """
@@ -580,7 +586,7 @@ class ModelBuilder:
         self, body: BodyId, ratio: float = 1.0, part: Inertia | None = None, placement: ArrayLike | None = None
     ) -> None:
         """Supports a fraction of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
-        mass. If the inertia of the body changes later, the force changes with it.
+        mass. If the inertia of the body changes later, the force changes with the inertia.
 
         ratio: the supported fraction of the weight; 1 supports the whole weight.
         part: None for the whole body, or the inertia of the part of the body to which `ratio` applies. The inertia of
@@ -607,8 +613,8 @@ class ModelBuilder:
         """
 
     def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
-        """Makes a joint follow another one: the follower's position is ratio q + offset, where q is the leader's position.
-        The follower has no coordinate in q.
+        """Makes a joint follow another joint: the follower's position is ratio q + offset, where q is the leader's
+        position. The follower has no coordinate in q.
 
         follower, leader: the bodies that the joints carry.
         """
@@ -616,14 +622,15 @@ class ModelBuilder:
     def spherical_zyx(
         self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
     ) -> BodyId:
-        """Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y, then by q₂ about the new x; v
-        = q̇.
+        """Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y axis, then by q₂ about the new
+        x axis; v = q̇.
 
         M is singular where q₁ = ±π/2. `Joint.spherical` has no singular position.
         """
 
     def spring(self, body: BodyId, stiffness: ArrayLike, rest: ArrayLike) -> None:
-        """Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
+        """Adds a spring to a joint: τ = −(k₀ + k₁ Δ + k₂ Δ²) Δ with the displacement Δ = q ⊖ rest. For joints with several
+        degrees of freedom, the brackets contain |Δ| instead of Δ.
 
         body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
         spring is at rest, with as many numbers as the joint has in q.
@@ -660,7 +667,7 @@ def _casadi_hold_knot(of: Any, t: int | None) -> str:
     """
 
 def _casadi_release(name: str) -> None:
-    """Ends a hold of a slot; the slot stays in use as long as CasADi has objects for its functions."""
+    """Ends a hold of a slot; the slot stays in use as long as CasADi has objects for the slot's functions."""
 
 def centroidal_map(
     model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
@@ -668,8 +675,8 @@ def centroidal_map(
     """Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the centroidal inertia, the centre of mass and
     its Jacobian, in O(n), as `CentroidalMap(Ag, Ig, com, Jcom)`.
 
-    q: nq numbers. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass. out:
-    four arrays, such as an earlier result.
+    q: position, nq numbers. Bodies fixed to the world are not included. The results are NaN if no moving body has a
+    mass. out: four arrays, such as an earlier result.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> map = condyle.centroidal_map(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -687,30 +694,30 @@ def centroidal_map_rate(
     """Computes the centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
     `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 
-    q: nq numbers; v: nv. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass.
-    out: seven arrays, such as an earlier result.
+    q: position, nq numbers; v: velocity, nv numbers. Bodies fixed to the world are not included. The results are NaN if
+    no moving body has a mass. out: seven arrays, such as an earlier result.
     """
 
 def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6
     numbers (kg m/s, then kg m²/s); O(n).
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
     """
 
 def centroidal_momentum_rate(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). It equals
-    the sum of the weight and of the external forces about the centre of mass.
+    """Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). The rate
+    equals the sum of the weight and the external forces about the centre of mass.
 
-    q: nq numbers; v, a: nv.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each.
     """
 
 def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 
-    q: nq numbers. Bodies fixed to the world are not included. The result is NaN if no moving body has a mass.
+    q: position, nq numbers. Bodies fixed to the world are not included. The result is NaN if no moving body has a mass.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -724,27 +731,27 @@ def com_acceleration(
     """Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s²);
     O(n). Gravity is not subtracted.
 
-    q: nq numbers; v, a: nv.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each.
     """
 
 def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 
-    q: nq numbers. The result is also a member of `centroidal_map`.
+    q: position, nq numbers. The result is also a member of `centroidal_map`.
     """
 
 def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
     """
 
 def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
     """Computes all terms of the equations of motion in O(n depth), with one pass from the root to the tips and one back,
     as `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
 
-    q: nq numbers; v: nv. Up to rounding, the numbers equal `crba`, `nonlinear_effects`, `centroidal_map_rate`,
-    `kinetic_energy` and `potential_energy`.
+    q: position, nq numbers; v: velocity, nv numbers. Up to rounding, the numbers equal `crba`, `nonlinear_effects`,
+    `centroidal_map_rate`, `kinetic_energy` and `potential_energy`.
 
     >>> arm = condyle.robots.arm7()
     >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
@@ -755,7 +762,7 @@ def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> A
 def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
     """Computes the kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v = condyle.Data(arm), [0.3] * 7, np.full(7, 0.5)
@@ -766,13 +773,13 @@ def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> floa
 def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
     """Computes the mechanical energy E = T + V (J); O(n).
 
-    q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
+    q: position, nq numbers; v: velocity, nv numbers. The rate of E is the power of the efforts and the external forces.
     """
 
 def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
     """Computes the potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 
-    q: nq numbers.
+    q: position, nq numbers.
     """
 
 def _generate(
@@ -786,21 +793,22 @@ def _generate(
     inputs: list[str] = ...,
     partitions: int | None = None,
 ) -> tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]:
-    """Generates the code of functions of a robot; returns its name, its files, and its functions with their arguments and
-    results.
+    """Generates the code of functions of a robot. Returns the name of the code, the files, and the functions with their
+    arguments and results.
     """
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
-    """Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations it is the shortest such vector.
+    """Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations, v is the shortest vector with
+    this property.
 
-    q0, q1: nq numbers.
+    q0, q1: positions, nq numbers each.
     """
 
 def difference_jacobian(
     model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
 ) -> _Array:
-    """Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. It depends
-    only on the difference of the positions.
+    """Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. The
+    Jacobian depends only on the difference of the positions.
 
     d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
     """
@@ -808,13 +816,13 @@ def difference_jacobian(
 def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
     """Computes the distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) have equal weight.
 
-    q0, q1: nq numbers.
+    q0, q1: positions, nq numbers each.
     """
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: tangent vector, nv numbers.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q0 = condyle.neutral(quadruped)
@@ -826,16 +834,16 @@ def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = Non
 def integrate_jacobian(
     model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
 ) -> _Array:
-    """Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not
-    depend on q.
+    """Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. The Jacobian does
+    not depend on q.
 
-    v: nv numbers; argument: 'position' for q or 'velocity' for v.
+    v: tangent vector, nv numbers; argument: 'position' for q or 'velocity' for v.
     """
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
     """Computes the position q₀ ⊕ t (q₁ ⊖ q₀) on the path from q₀ (t = 0) to q₁ (t = 1) at constant velocity, nq numbers.
 
-    q0, q1: nq numbers; t: a number, which may be below 0 or above 1.
+    q0, q1: positions, nq numbers each; t: a number, which may be below 0 or above 1.
 
     >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
     array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
@@ -849,10 +857,10 @@ def neutral(model: Model) -> _Array:
     """
 
 def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument
-    itself does not change unless it is `out`.
+    """Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument q
+    does not change unless q is also `out`.
 
-    q: nq numbers.
+    q: position, nq numbers.
 
     Raises `ModelError` for a quaternion or a pair whose length is 0 or not finite.
 
@@ -873,8 +881,8 @@ def random_configuration(model: Model, seed: int | None = None) -> _Array:
 def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
     """Transports the columns of X, which are tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 
-    v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
-    equals `transport` with −v.
+    v: tangent vector, nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies X by ∂(q ⊕ v)/∂q
+    instead. Its result equals `transport` with −v.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> v = np.full(18, 0.1)
@@ -891,13 +899,15 @@ class ConstraintSet:
     Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
     set.
 
-    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. In the first iteration λ' is 0, in each later one it is
-    the previous λ. Redundant constraints then share the forces so that the forces are smallest. Choose μ small compared
-    with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
-    Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
+    With a regularisation μ > 0, the constraint forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. J is the Jacobian of the
+    constraints, M the inertia matrix, and b the right-hand side without regularisation. In the first iteration λ' is 0;
+    in each later iteration λ' is the previous λ. Redundant constraints then share the forces, with the smallest norm of
+    λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on
+    earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained
+    dynamic equations (2021).
 
     model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
-    to 10000; none of them is skipped.
+    to 10000; all of them are computed.
 
     Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
     the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is
@@ -933,8 +943,8 @@ class ConstraintSet:
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
     ) -> None:
-        """Changes the target of constraint k: placement, velocity and acceleration of its frame. Members that are not
-        given do not change.
+        """Changes the target of constraint k: placement, velocity and acceleration of the constraint's frame. Members that
+        are not given do not change.
 
         Raises `ModelError` for numbers that are not finite and for an invalid placement; then the old target is kept.
         """
@@ -950,11 +960,12 @@ def constrained_dynamics(
     out: Constrained | Sequence[_Array] | None = None,
 ) -> Constrained:
     """Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
-    dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
+    dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`. J is the Jacobian of the
+    constraints. γ contains J̇ v, the stabilisation, and the constraints' target accelerations with a minus sign.
 
-    constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. If constraints contradict each
-    other, or a constraint cannot be satisfied at a singular posture, the results are finite and `residual` is above
-    zero.
+    constraints: a `ConstraintSet`; q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as
+    for `rnea`. If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the
+    results are finite and `residual` is above zero.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -978,8 +989,9 @@ def constrained_dynamics_derivatives(
     """Computes the result of `constrained_dynamics` and its exact derivatives with respect to q, v and τ, as
     `ConstrainedDerivatives`.
 
-    constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces
-    move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
+    constraints: a `ConstraintSet`, whose targets are fixed; q: position, nq numbers; v, tau: velocity and efforts, nv
+    numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space. out: one
+    array for each member, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -1003,10 +1015,11 @@ def constrained_dynamics_equations(
 
         M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 
-    `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
-    `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`;
-    the forces move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an
-    earlier result.
+    Symbols are as for `constrained_dynamics`. `constrained_dynamics_derivatives` solves these equations; this function
+    does not solve them. constraints: a `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position,
+    nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames.
+    ∂/∂q is taken in the tangent space.
+    out: one array for each member, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -1025,10 +1038,10 @@ def impulse_dynamics(
     out: Impulse | Sequence[_Array] | None = None,
 ) -> Impulse:
     """Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
-    lambda_, residual, redundant)`.
+    lambda_, residual, redundant)`. J is the Jacobian of the constraints, and M the inertia matrix.
 
-    constraints: a `ConstraintSet`; its gains, and the velocities and accelerations of its targets are ignored; q: nq
-    numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
+    constraints: a `ConstraintSet`, whose gains and targets of velocity and acceleration are ignored; q: position, nq
+    numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> touchdown = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint("LF_foot", "point")])
@@ -1064,9 +1077,9 @@ def impulse_dynamics_derivatives(
 class Data:
     """Scratch memory of the algorithms for one model: made once, and used by one thread at a time.
 
-    It can be used with all models that have the same bodies and joints, even with other gravity, armature or inertias.
-    No algorithm reads results of an earlier call, so the order of calls does not matter. Use from two threads at once
-    is a `RuntimeError`; use with another robot's model is a `ValueError`.
+    A `Data` can be used with all models that have the same bodies and joints. Gravity, armature and inertias may
+    differ. No algorithm reads results of an earlier call, so the order of calls does not matter. Use from two threads
+    at once is a `RuntimeError`; use with another robot's model is a `ValueError`.
 
     model: the robot; threads: the number of threads for calls with many states (q of shape (N, nq)), at most 1024. Such
     calls also compute several states at once in SIMD lanes, and release the interpreter's lock.
@@ -1091,9 +1104,9 @@ def aba_hessian(
     """Computes the exact Hessian of λᵀ q̈(q, v, τ), with q̈ of `aba`, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv,
     nv); the other blocks are zero.
 
-    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is
-    the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. Derivatives with
-    respect to q are derivatives with respect to δ at `integrate(q, δ)`.
+    q: position, nq numbers; v, tau, lambda_: velocity, efforts and λ, nv numbers each; f_ext: as for `rnea`, constant
+    in the bodies' frames. Entry [j, k] of dvdq is the derivative with respect to v_j and q_k, entry [j, k] of dtaudq
+    with respect to τ_j and q_k. Derivatives with respect to q are derivatives with respect to δ at `integrate(q, δ)`.
     """
 
 def aba_input_derivative(
@@ -1109,7 +1122,8 @@ def aba_input_derivative(
     """Computes the derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers other than q, v and τ; exact, at
     most O(n²) per column.
 
-    q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
+    q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; wrt: as for `rnea_input_derivative`; f_ext:
+    as for `rnea`.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
@@ -1131,7 +1145,8 @@ def body_acceleration_derivatives(
     """Computes the derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
     `frame_acceleration_derivatives` of the body's own frame.
 
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; body: as for `body_jacobian`; reference:
+    as for `frame_jacobian`.
     """
 
 def body_velocity_derivative(
@@ -1145,7 +1160,7 @@ def body_velocity_derivative(
 ) -> _Array:
     """Computes the derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of the body's own frame.
 
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
 def centroidal_derivatives(
@@ -1159,7 +1174,7 @@ def centroidal_derivatives(
     """Computes the exact derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and
     a in O(n), as `CentroidalDerivatives`.
 
-    q: nq numbers; v, a: nv. The accelerations do not include gravity.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each. The accelerations do not include gravity.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
@@ -1174,7 +1189,7 @@ def coriolis_derivatives(
     """Computes the exact derivatives of C(q, v) v, the Coriolis and centrifugal efforts, in O(n depth), as
     `CoriolisDerivatives(dq, dv)`, each (nv, nv).
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.1] * 7
@@ -1193,7 +1208,7 @@ def energy_derivatives(
     """Computes the exact derivatives of kinetic energy T and potential energy V in O(n), as `EnergyDerivatives(dT_dq,
     dT_dv, dV_dq)`, nv numbers each.
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
     """
 
 def frame_acceleration_derivatives(
@@ -1209,7 +1224,8 @@ def frame_acceleration_derivatives(
     """Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). The
     derivative with respect to the joint accelerations is the frame's Jacobian.
 
-    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+    reference: as for `frame_jacobian`.
     """
 
 def frame_classical_acceleration_derivatives(
@@ -1225,7 +1241,8 @@ def frame_classical_acceleration_derivatives(
     """Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). The
     derivative with respect to the joint accelerations is the frame's Jacobian.
 
-    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+    reference: as for `frame_jacobian`.
     """
 
 def frame_velocity_derivative(
@@ -1240,7 +1257,8 @@ def frame_velocity_derivative(
     """Computes the derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. The derivative with respect to v is
     the frame's Jacobian.
 
-    q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: as for
+    `frame_jacobian`.
 
     >>> arm = condyle.robots.arm7()
     >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
@@ -1261,9 +1279,10 @@ def rnea_hessian(
     """Computes the exact Hessian of λᵀ τ(q, v, a), with τ of `rnea`, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv,
     dadq)`, each (nv, nv); the other blocks are zero.
 
-    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is the
-    derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. Derivatives with respect
-    to q are derivatives with respect to δ at `integrate(q, δ)`.
+    q: position, nq numbers; v, a, lambda_: velocity, acceleration and λ, nv numbers each; f_ext: as for `rnea`,
+    constant in the bodies' frames. Entry [j, k] of dvdq is the derivative with respect to v_j and q_k, entry [j, k] of
+    dadq with respect to a_j and q_k. Derivatives with respect to q are derivatives with respect to δ at `integrate(q,
+    δ)`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -1285,10 +1304,11 @@ def rnea_input_derivative(
     """Computes the derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers other than q, v and a; exact, at
     most O(n) per column.
 
-    q: nq numbers; v, a: nv; wrt: the input; f_ext: as for `rnea`. Values of wrt: 'gravity', the acceleration of free
-    fall, 3 numbers; 'armature', nv numbers; 'damping', nv numbers, as if `passive_torque` were added to τ; ('force',
-    body), the external force on a body in the body's frame, 6 numbers; ('inertia', body), the 10 inertial parameters of
-    a body; or ('friction', smoothing), nv numbers, with the smoothing of `passive_torque`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; wrt: the input; f_ext: as for `rnea`.
+    Values of wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', nv numbers; 'damping', nv numbers,
+    as if `passive_torque` were added to τ; ('force', body), the external force on a body in the body's frame, 6
+    numbers; ('inertia', body), the 10 inertial parameters of a body; or ('friction', smoothing), nv numbers, with the
+    smoothing of `passive_torque`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
@@ -1309,8 +1329,9 @@ def rnea_second_derivatives(
     """Computes the exact second derivatives of `rnea` as full tensors in O(n² depth), as `RneaSecondDerivatives(dqdq,
     dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. If the product of
-    the tensors with a vector is enough, `rnea_hessian` is many times faster.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: as for `rnea`. Each Hessian has
+    the index order of `rnea_hessian`. If the product of the tensors with a vector is enough, `rnea_hessian` is many
+    times faster.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
@@ -1323,15 +1344,15 @@ def rnea_second_derivatives(
 def static_torque_derivative(
     model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
 ) -> _Array:
-    """Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces it is also
-    the derivative of `gravity`.
+    """Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces, ∂τ/∂q is
+    also the derivative of `gravity`.
 
-    q: nq numbers; f_ext: as for `rnea`; the forces move with the bodies.
+    q: position, nq numbers; f_ext: as for `rnea`, constant in the bodies' frames.
     """
 
 def _borrowed(capsule: Any) -> tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]:
-    """Describes the array that a DLPack capsule lends. The caller keeps the capsule as long as it uses the array;
-    ownership is not taken.
+    """Describes the array that a DLPack capsule lends. The caller must keep the capsule alive while it uses the array.
+    This function does not take ownership of the array.
     """
 
 def _lend(
@@ -1345,9 +1366,9 @@ def _lend(
 class Cholesky:
     """The factor M = L Lᵀ of any symmetric positive definite matrix.
 
-    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`: it has the same
-    methods, and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm
-    4.2.1.
+    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, use `Ltdl`, which has the
+    same methods and skips the zeros of the tree. Source: Golub and Van Loan, Matrix Computations (4th edition),
+    algorithm 4.2.1.
 
     n: the number of rows of M, at most 4096.
 
@@ -1366,8 +1387,9 @@ class Cholesky:
         """Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
         cost.
 
-        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
-        signal handler, such as KeyboardInterrupt, stops the computation between rows. Then no factor exists.
+        M is not checked: if M is not positive definite, solutions are wrong or not finite. An exception of a
+        signal handler, such as KeyboardInterrupt, stops the computation between rows. After that no factor is
+        available.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
@@ -1389,12 +1411,13 @@ class Cholesky:
 class DivideConquer:
     """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and scratch memory.
 
-    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
-    joining two pieces costs about six times as much as eliminating a body. With two threads and two runs, the algorithm
-    is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with mimic joints,
-    the passes run once with all joints free, and once more for each joint that shares a coordinate. The results are
-    bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for
-    parallel O(log(n)) calculation of rigid-body dynamics (1999).
+    The robot is assembled from runs: groups of at most `grain` adjacent bodies, which are eliminated one after the
+    other. With `grain` = 1 the algorithm takes O(log n) steps for n bodies. But joining two parts of the robot costs
+    about six times as much as eliminating a body. With two threads and two runs, the algorithm is faster than `aba`
+    from about 200 bodies on. With one thread it is always slower. For a robot with mimic joints, the passes run once
+    with all joints free, and once more for each joint that shares a coordinate. The results are bit-identical for any
+    number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel O(log(n))
+    calculation of rigid-body dynamics (1999).
 
     model: the robot; grain: the maximum number of bodies in a run.
 
@@ -1410,7 +1433,7 @@ class DivideConquer:
     def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
     @property
     def size(self) -> AssemblySize:
-        """The numbers of operations of the assembly, and the depth of its pieces, which run one after the other, as
+        """The numbers of operations of the assembly, and the number of steps that must be computed one after the other, as
         `AssemblySize`.
         """
 
@@ -1423,10 +1446,11 @@ class DivideConquer:
         f_ext: ArrayLike | None = None,
         out: _Array | None = None,
     ) -> _Array:
-        """Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
-        + grain) steps.
+        """Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding. For n bodies, the work is
+        O(n) and the number of steps O(log n + grain).
 
-        model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
+        model: the planned model, or another model with the same bodies and joints; q: position, nq numbers; v, tau:
+        velocity and efforts, nv numbers each;
         f_ext: as for `rnea`.
         """
 
@@ -1471,8 +1495,9 @@ class Ltdl:
         """Computes the factor of M, a symmetric positive definite matrix. The docstring of the class states the
         cost.
 
-        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception of a
-        signal handler, such as KeyboardInterrupt, stops the computation between rows. Then no factor exists.
+        M is not checked: if M is not positive definite, solutions are wrong or not finite. An exception of a
+        signal handler, such as KeyboardInterrupt, stops the computation between rows. After that no factor is
+        available.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
@@ -1497,12 +1522,12 @@ class Ltdl:
 
 @final
 class HyperDual:
-    """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
-    directions, and the mixed second derivative.
+    """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. The number carries its derivatives in
+    two directions, and the mixed second derivative.
 
-    Store these numbers in NumPy arrays of objects. Arithmetic and NumPy's elementary functions accept such arrays. All
-    functions of a model and a state accept them, too, and then return such arrays. Comparisons use `re`.
-    `condyle.jacobian`, `gradient` and `hessian` create these numbers and read the derivatives.
+    Store these numbers in NumPy arrays of objects. Arithmetic, NumPy's elementary functions, and all functions of a
+    model and a state accept such arrays, and then return such arrays. Comparisons use `re`. `condyle.jacobian`,
+    `gradient` and `hessian` create these numbers and read the derivatives.
 
     Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 
@@ -1515,19 +1540,19 @@ class HyperDual:
     def __new__(cls, re: float, eps1: float = 0.0, eps2: float = 0.0, eps1eps2: float = 0.0) -> HyperDual: ...
     @property
     def eps1(self) -> float:
-        """The derivative in the first direction."""
+        """The derivative of the number in the first direction."""
 
     @property
     def eps1eps2(self) -> float:
-        """The mixed second derivative."""
+        """The mixed second derivative of the number in the two directions."""
 
     @property
     def eps2(self) -> float:
-        """The derivative in the second direction."""
+        """The derivative of the number in the second direction."""
 
     @property
     def re(self) -> float:
-        """The value."""
+        """The value of the number, without derivatives."""
 
     def __abs__(self, /) -> HyperDual: ...
     def __add__(self, value: _Number, /) -> HyperDual: ...
@@ -1544,7 +1569,7 @@ class HyperDual:
     def __pow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
     def __radd__(self, value: _Number, /) -> HyperDual: ...
     def __reduce__(self) -> tuple[Any, ...]:
-        """Returns the parts of a pickle."""
+        """Returns the class and the arguments from which `pickle` makes an equal number."""
 
     def __rmul__(self, value: _Number, /) -> HyperDual: ...
     def __rpow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
@@ -1625,9 +1650,10 @@ class HyperDual:
         """Returns the hyperbolic tangent of self."""
 
 def check(inertia: Inertia) -> None:
-    """Checks that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
+    """Checks that a body of positive density can have this inertia: its pseudo-inertia J must be positive definite. Raises
+    `NotPhysicalError` otherwise.
 
-    Point masses, rods and plates have no volume: their J is singular, and they are refused.
+    Point masses, rods and plates have no volume. The J of such bodies is singular, so this function rejects them.
 
     >>> from condyle import inertial_parameters
     >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
@@ -1647,8 +1673,8 @@ def from_inertia(inertia: Inertia) -> _Array:
     """
 
 def from_log_cholesky(theta: ArrayLike) -> Inertia:
-    """Returns the `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of
-    `log_cholesky`.
+    """Returns the `Inertia` with the log-Cholesky parameters θ. The inertia is physical for all values of θ. This function
+    is the inverse of `log_cholesky`.
 
     theta: 10 numbers; α within ±32 and dᵢ within ±64.
     """
@@ -1682,10 +1708,10 @@ def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     """
 
 def pseudo_inertia(inertia: Inertia) -> _Array:
-    """Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
-    kg m and kg.
+    """Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], (4, 4), in kg m², kg m and kg, with the mass m and the centre of
+    mass c. J is the integral of the products of (x, y, z, 1) over the mass; Σ contains the products of x, y and z.
 
-    J is linear in the parameters. It is positive definite if and only if a body of positive density can have this
+    J is linear in the parameters. J is positive definite if and only if a body of positive density can have this
     inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
     identification (2018).
 
@@ -1698,12 +1724,12 @@ def pseudo_inertia(inertia: Inertia) -> _Array:
 def to_inertia(pi: ArrayLike) -> Inertia:
     """Returns the `Inertia` with the ten parameters π; the inverse of `from_inertia`.
 
-    pi: 10 numbers.
+    pi: the ten parameters π.
     """
 
 @final
 class Joint:
-    """The kind of a joint, with its axis and pitch if it has them.
+    """The kind of a joint, with its axis and pitch if the joint has these.
 
     | | q | v |
     | --- | --- | --- |
@@ -1734,7 +1760,7 @@ class Joint:
 
     @property
     def pitch(self) -> float | None:
-        """The metres along the axis per radian about it; None unless the joint is helical."""
+        """The translation along the axis per rotation about the axis (m/rad); None unless the joint is helical."""
 
     @staticmethod
     def continuous(axis: ArrayLike) -> Joint:
@@ -1742,13 +1768,13 @@ class Joint:
 
     @staticmethod
     def free_flyer() -> Joint:
-        """Returns a joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the
-        body's frame.
+        """Returns a joint that does not restrict the motion of its body: q = [position, quaternion (x, y, z, w)], v =
+        [linear, angular] in the body's frame.
         """
 
     @staticmethod
     def helical(axis: ArrayLike, pitch: float) -> Joint:
-        """Returns a screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis per radian about it."""
+        """Returns a screw joint: q = [θ], v = [θ̇], with a translation along the axis of `pitch` metres per radian."""
 
     @staticmethod
     def planar() -> Joint:
@@ -1783,7 +1809,8 @@ def body_acceleration(
     """Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_acceleration` of the body's own
     frame; O(n).
 
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; body: as for `body_jacobian`; reference:
+    as for `frame_jacobian`.
     """
 
 def body_classical_acceleration(
@@ -1799,7 +1826,8 @@ def body_classical_acceleration(
     """Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of the
     body's own frame; O(n).
 
-    q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; body: as for `body_jacobian`; reference:
+    as for `frame_jacobian`.
     """
 
 def body_jacobian(
@@ -1807,8 +1835,8 @@ def body_jacobian(
 ) -> _Array:
     """Computes the Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 
-    q: nq numbers; body: its index or its joint's name, 0 being the world; reference: as for `frame_jacobian`, for the
-    body's own frame.
+    q: position, nq numbers; body: the index of the body, or the name of its joint; index 0 is the world; reference: as
+    for `frame_jacobian`, for the body's own frame.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q = condyle.Data(arm), [0.3] * 7
@@ -1828,7 +1856,7 @@ def body_jacobian_rate(
 ) -> _Array:
     """Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of the body's own frame.
 
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
 def body_point_jacobian(
@@ -1836,7 +1864,7 @@ def body_point_jacobian(
 ) -> _Array:
     """Computes the Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
 
-    q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    q: position, nq numbers; body: as for `body_jacobian`; point: position in the frame of the body, 3 numbers (m).
     """
 
 def body_point_velocity(
@@ -1845,7 +1873,8 @@ def body_point_velocity(
     """Computes the velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of
     the body's own frame.
 
-    q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; point: position in the frame of the
+    body, 3 numbers (m).
     """
 
 def body_velocity(
@@ -1859,15 +1888,15 @@ def body_velocity(
 ) -> _Array:
     """Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of the body's own frame; O(n).
 
-    q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v: velocity, nv numbers; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
 def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
     """Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 
-    q: nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is the
-    world. The pose of a frame f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also
-    `frame_placement`.
+    q: position, nq numbers. Joint i carries body i; the frame of a body is the frame of its link in the URDF. Body 0 is
+    the world. The pose of a frame f is the pose of its body times the placement of the frame: `poses[f.body] @
+    f.placement`. See also `frame_placement`.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data = condyle.Data(quadruped)
@@ -1885,10 +1914,11 @@ def frame_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). It is the rate of the frame's
-    spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
+    """Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²); O(n). The spatial acceleration is the
+    rate of the frame's spatial velocity as seen from the world, expressed in the reference. Gravity is not subtracted.
 
-    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+    reference: as for `frame_jacobian`.
     """
 
 def frame_classical_acceleration(
@@ -1905,7 +1935,8 @@ def frame_classical_acceleration(
     body's point at the origin of the reference; the angular acceleration follows (rad/s²). In 'local_world_aligned' the
     linear part is p̈ of the frame's origin p.
 
-    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame: the frame's name or index;
+    reference: as for `frame_jacobian`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
@@ -1921,8 +1952,8 @@ def frame_jacobian(
 ) -> _Array:
     """Computes the Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 
-    q: nq numbers; frame: its name or index. reference: 'local', the velocity of the frame's origin, along the frame's
-    axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
+    q: position, nq numbers; frame: the frame's name or index. reference: 'local', the velocity of the frame's origin,
+    along the frame's axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
     'local_world_aligned', the velocity of the frame's origin, along the world's axes.
 
     >>> arm = condyle.robots.arm7()
@@ -1941,16 +1972,16 @@ def frame_jacobian_rate(
 ) -> _Array:
     """Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 
-    q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-    acceleration for 'local' and 'world'. For 'local_world_aligned', whose origin moves with the frame, it is the
-    classical acceleration.
+    q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: as for
+    `frame_jacobian`. dJ v + J a is the spatial acceleration for 'local' and 'world'. For 'local_world_aligned', whose
+    origin moves with the frame, this sum is the classical acceleration.
     """
 
 def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
     """Computes the pose oXf of a frame in the world: a homogeneous matrix (4, 4) that maps coordinates in the frame to
     coordinates in the world; O(n).
 
-    q: nq numbers; frame: its name or index.
+    q: position, nq numbers; frame: the frame's name or index.
 
     >>> arm = condyle.robots.arm7()
     >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
@@ -1964,8 +1995,9 @@ def frame_point_jacobian(
     """Computes the Jacobian J of a point of a frame, (3, nv): the point's velocity along the axes of the world is J v
     (m/s).
 
-    q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, where p is the point
-    in the world's frame and S has a column (S_v, S_ω) for each joint between the world and the frame.
+    q: position, nq numbers; frame: the frame's name or index; point: position in the frame, 3 numbers (m). J = S_v +
+    S_ω × p, where p is the point in the world's frame and S has a column (S_v, S_ω) for each joint between the world
+    and the frame.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
@@ -1979,7 +2011,8 @@ def frame_point_velocity(
 ) -> _Array:
     """Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s).
 
-    q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
+    q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; point: position in the frame, 3
+    numbers (m).
     """
 
 def frame_velocity(
@@ -1994,7 +2027,8 @@ def frame_velocity(
     """Computes the velocity of a frame, 6 numbers: the velocity of the body's point at the origin of the reference (m/s),
     then the angular velocity (rad/s); O(n).
 
-    q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
+    q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: as for
+    `frame_jacobian`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
@@ -2005,11 +2039,11 @@ def frame_velocity(
 
 @final
 class Model:
-    """A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
+    """A robot: bodies, joints, frames, inertias, limits. A model never changes and may be shared between threads.
 
     Body 0 is the world. The other bodies are numbered as in Pinocchio: depth first, parents before children, and
     siblings by the names of their joints. A model is read from a file, built by a `ModelBuilder`, or taken from
-    `condyle.robots`; it can be pickled.
+    `condyle.robots`; a model can be pickled.
 
     >>> arm = condyle.robots.arm7()
     >>> arm.nq, arm.nv, arm.names[:3]
@@ -2024,7 +2058,7 @@ class Model:
 
     @property
     def armature(self) -> _Array:
-        """The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm."""
+        """The inertia of the rotor as seen at each joint, nv numbers (kg m², kg). Every algorithm adds the armature to M."""
 
     @property
     def body_names(self) -> list[str]:
@@ -2032,26 +2066,26 @@ class Model:
 
     @property
     def damping(self) -> _Array:
-        """The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
-        and in a `Simulation` that includes it.
+        """The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). Damping acts only in
+        `passive_torque` and in a `Simulation` with passive torques.
         """
 
     @property
     def damping_polynomial(self) -> _Array:
         """The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
-        with d₀ in `damping`. It is used by the same functions as `damping`.
+        with d₀ in `damping`. The functions that use `damping` also use these coefficients.
         """
 
     @property
     def frames(self) -> list[Frame]:
-        """The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed one, there are two
-        frames: one of the joint and one of its link.
+        """The frames, as `Frame(name, kind, body, placement)`. For each joint of the URDF, also a fixed joint, there are
+        two frames: the joint's frame and the frame of its child link.
         """
 
     @property
     def friction(self) -> _Array:
-        """The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and in a
-        `Simulation` that includes it.
+        """The Coulomb friction of each degree of freedom, nv numbers (N m, N). Friction acts only in `passive_torque` and
+        in a `Simulation` with passive torques.
         """
 
     @property
@@ -2061,20 +2095,17 @@ class Model:
     @property
     def gravity_compensation(self) -> list[GravityCompensation]:
         """The supported fractions of the weights of bodies, as `GravityCompensation(body, mass, mass_com, ratio)`:
-        MuJoCo's `gravcomp`. They act only in `passive_torque` and in a `Simulation` that includes them.
+        MuJoCo's `gravcomp`. The supporting forces act only in `passive_torque` and in a `Simulation` with passive
+        torques.
         """
 
     @property
     def idx_qs(self) -> list[int]:
-        """The index in q at which each joint's position begins; for a mimic joint, the index for the joint that it
-        follows.
-        """
+        """The index in q at which each joint's position begins. For a mimic joint this is the index of its leader."""
 
     @property
     def idx_vs(self) -> list[int]:
-        """The index in v at which each joint's velocity begins; for a mimic joint, the index for the joint that it
-        follows.
-        """
+        """The index in v at which each joint's velocity begins. For a mimic joint this is the index of its leader."""
 
     @property
     def inertial_parameters(self) -> _Array:
@@ -2085,8 +2116,8 @@ class Model:
 
     @property
     def inertias(self) -> list[Inertia]:
-        """The inertia of each body in the body's frame, as `Inertia`. It includes the links that fixed joints attach to
-        the body.
+        """The inertia of each body in the body's frame, as `Inertia`. The inertia includes the links that fixed joints
+        attach to the body.
         """
 
     @property
@@ -2123,7 +2154,7 @@ class Model:
 
     @property
     def mimics(self) -> list[Mimic | None]:
-        """The rule by which each mimic joint follows another one, as `Mimic(ratio, offset)`; None for other joints."""
+        """The rule by which each mimic joint follows another joint, as `Mimic(ratio, offset)`; None for other joints."""
 
     @property
     def name(self) -> str:
@@ -2135,7 +2166,7 @@ class Model:
 
     @property
     def nbodies(self) -> int:
-        """The number of bodies, the world included. It is the number of rows of f_ext and of the result of
+        """The number of bodies, the world included. This is also the number of rows of f_ext and of the result of
         `forward_kinematics`.
         """
 
@@ -2145,7 +2176,7 @@ class Model:
 
     @property
     def nqs(self) -> list[int]:
-        """The number of coordinates that each joint has in q: 0 if it mimics another joint, and 0 for the world."""
+        """The number of coordinates that each joint has in q: 0 for mimic joints and for the world."""
 
     @property
     def nv(self) -> int:
@@ -2153,7 +2184,7 @@ class Model:
 
     @property
     def nvs(self) -> list[int]:
-        """The number of coordinates that each joint has in v: 0 if it mimics another joint, and 0 for the world."""
+        """The number of coordinates that each joint has in v: 0 for mimic joints and for the world."""
 
     @property
     def parents(self) -> list[int]:
@@ -2167,8 +2198,8 @@ class Model:
 
     @property
     def springs(self) -> list[Spring]:
-        """The springs of joints, as `Spring(joint, stiffness, rest)`. They act only in `passive_torque` and in a
-        `Simulation` that includes them.
+        """The springs of joints, as `Spring(joint, stiffness, rest)`. Springs act only in `passive_torque` and in a
+        `Simulation` with passive torques.
         """
 
     @property
@@ -2180,23 +2211,23 @@ class Model:
         """The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
         `line`.
 
-        They report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in the
-        file, and contents that a model cannot represent.
+        Warnings report implausible inertias and limits, joints that make the inertia matrix singular, unknown names in
+        the file, and contents that a model cannot represent.
         """
 
     def __copy__(self) -> Model:
-        """Returns the model itself, since it never changes."""
+        """Returns the model itself, since a model never changes."""
 
     def __deepcopy__(self, memo: object) -> Model:
-        """Returns the model itself, since it never changes."""
+        """Returns the model itself, since a model never changes."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Returns the parts of a pickle."""
+        """Returns the function and the bytes from which `pickle` makes an equal model."""
 
     def append(
         self, frame: str | int | None, model: Model, placement: ArrayLike | None | None = None, prefix: str = ""
     ) -> Model:
-        """Returns this robot with another one attached to one of its frames, as a new model.
+        """Returns a new model: this robot with another robot attached to one of its frames.
 
         The new bodies are numbered as by Pinocchio's `appendModel`: after all existing descendants of the body to which
         they are attached. The result has the name and the gravity of this robot.
@@ -2240,7 +2271,7 @@ class Model:
     def from_json(text: str) -> Model:
         """Reads a model from the JSON that `to_json` returns.
 
-        Raises `ParseError`, with line and column.
+        Raises `ParseError` for an invalid text; the error contains line and column.
         """
 
     @staticmethod
@@ -2262,7 +2293,7 @@ class Model:
 
         path: a path, as text or `os.PathLike`.
         mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2; its `polycoef` must then be linear.
-            Otherwise it is one of the `constraints`, which the tree does not include.
+            Otherwise the coupling is one of the `constraints`, which are not part of the tree.
         strict: whether a warning (`warnings`) is an error.
         weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
             `warnings`. Otherwise it is an error.
@@ -2293,12 +2324,13 @@ class Model:
     def from_mujoco(
         model: Any, mimic: bool = False, strict: bool = False, *, allow: Sequence[_Kind] | None = None
     ) -> Model:
-        """Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
+        """Converts a `mujoco.MjModel`, which is a robot compiled by MuJoCo. The numbers stay the same.
 
-        The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. The results of
-        MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`. If numbers were
-        changed after compilation, the changed numbers are used. Contents that a model cannot represent are reported in
-        `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not imported.
+        The names, q and v are the same as with `from_mjcf`. Named `<frame>`s are missing, because MuJoCo does not keep
+        them. The results of MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`.
+        If numbers were changed after compilation, the changed numbers are used. Contents that a model cannot represent
+        are reported in `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not
+        imported.
 
         mimic, strict, allow: as for `from_mjcf`.
 
@@ -2337,7 +2369,7 @@ class Model:
 
         path: a path, as text or `os.PathLike`.
         root_joint: as for `from_urdf`.
-        mimic: whether an axis with a `<mimic>` follows another axis. Otherwise it moves freely.
+        mimic: whether an axis with a `<mimic>` follows another axis. Otherwise the axis moves freely.
         strict: whether a warning (`warnings`) is an error.
         packages, allow: as for `from_urdf`; `packages` are also searched for `model://` addresses.
         model: the name of the one model to read; None reads all models of the file.
@@ -2424,12 +2456,13 @@ class Model:
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
         """Returns the same robot with some joints locked at their positions in q.
 
-        Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
-        joint that it follows. A locked joint still contributes to the length of a tendon. If a linear coupling connects
-        it to another joint, that joint is held, too. Warnings about the file are kept.
+        The bodies of locked joints are merged into their parent bodies and remain as frames. A mimic joint is locked
+        together with the joint that it follows. A locked joint still contributes to the length of a tendon. If a linear
+        coupling connects a locked joint to another joint, the other joint is locked, too. Warnings about the file are
+        kept.
 
         joints: a list of names or indices of bodies.
-        q: nq numbers.
+        q: position, nq numbers.
 
         >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
@@ -2443,14 +2476,14 @@ class Model:
         nq numbers each.
 
         Joints that a state does not mention stay as in `neutral`. For a joint that turns without limits, the state may
-        give the angle. If states of several groups have the same name, they form one position. All other contents of
-        the file are ignored.
+        give the angle. States of several groups with the same name form one position. All other contents of the file
+        are ignored.
 
         path: a path, as text or `os.PathLike`.
-        strict: whether a joint that the robot does not have is an error. Without `strict` it is ignored, since robots
-        with fewer joints often share an SRDF.
+        strict: whether a joint that the robot does not have is an error. Without `strict` such a joint is ignored,
+        since robots with fewer joints often share an SRDF.
 
-        Raises `ParseError`, with file, line and element.
+        Raises `ParseError` for an invalid file; the error contains file, line and element.
         """
 
     def reference_configurations_str(self, text: str, strict: bool = False) -> dict[str, _Array]:
@@ -2466,7 +2499,7 @@ class Model:
         """Returns the model as JSON, with all digits; `from_json` returns an equal model. An infinite limit is written as
         `null`.
 
-        The text may be edited; its contents are checked when it is read.
+        The text may be edited; `from_json` checks its contents.
 
         >>> arm = condyle.robots.arm7()
         >>> condyle.Model.from_json(arm.to_json()).to_json() == arm.to_json()
@@ -2510,7 +2543,7 @@ class Model:
         """
 
     def with_frame(self, name: str, parent: str | int | None, placement: ArrayLike | None = None) -> Model:
-        """Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
+        """Returns the same robot with one more frame of kind 'user', which is the last of `frames`. All other contents are
         unchanged.
 
         name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the
@@ -2575,8 +2608,9 @@ class Model:
         """
 
     def with_mimic(self, follower: str | int, leader: str | int, ratio: float = 1.0, offset: float = 0.0) -> Model:
-        """Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's
-        position. It has no coordinate in q. The limits of the leader's coordinate then apply to both joints.
+        """Returns the same robot with one more mimic joint: the follower's position is ratio q + offset, where q is the
+        leader's position. The follower has no coordinate in q. The limits of the leader's coordinate then apply to both
+        joints.
 
         follower, leader: the joints' names, or the indices of their bodies.
 
@@ -2605,8 +2639,8 @@ class Model:
 
         Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
         new file gives this model again, up to rounding. `original` and `path` may be the same file. If fixed joints
-        merge several links into one body, changes of its inertia are written to the link that the moving joint carries.
-        An armature becomes the rotor inertia of a `<transmission>`.
+        merge several links into one body, changes of the body's inertia are written to the link that the moving joint
+        carries. An armature becomes the rotor inertia of a `<transmission>`.
 
         path: the new file. original: the file from which the robot was read.
 
@@ -2615,14 +2649,14 @@ class Model:
         """
 
 def _model_from_bytes(data: bytes) -> Model:
-    """Reads the model in a pickle."""
+    """Creates the model from the bytes of a pickle."""
 
 @final
 class Action:
     """An action written in Python.
 
     nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; the next state may be None only at the
+    calc: a function of (t, x, u) that returns the next state x⁺ and the cost ℓ; the next state may be None only at the
         terminal knot.
     calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
         ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without calc_diff, calc is called with arrays of
@@ -2704,29 +2738,39 @@ class AugmentedLagrangian:
     """The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 
     The method repeats two steps. First FDDP minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖² with z = g + μ y, where
-    ℓ is the cost of a knot, g its limits, y their multipliers, and Π the projection onto the bounds. Then, if the
-    limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. The method ends when the violation of limits and the
-    gradient of ℓ + yᵀg are below the tolerances.
+    ℓ is the cost of a knot, g its limits, y their multipliers, and Π the projection onto the bounds. If FDDP found no
+    minimum, it continues. If the limits hold well enough, or the penalty 1/μ is at its maximum, y ← (z − Π z) / μ.
+    Otherwise μ is reduced. The method ends when the violation of limits and the gradient of ℓ + yᵀg are below the
+    tolerances.
 
-    `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve, unless
-    the last solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
-    multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. The status is
-    "constraints_violated" if the penalty reached its maximum and the limits do not hold. This does not prove that no
-    solution exists: another warm start may find one. The status is "infeasible" if the initial state itself violates a
-    limit of knot 0 that no control can change. `outcome.worst` contains the knot, the limit and the amount of the
-    largest violation. The cost of the solution includes the penalties of the limits; the cost of `outcome` does not.
-    The solution's trace and gains are from the last inner solve, its timings from the whole solve. Controls of a warm
-    start are moved into their bounds.
+    The penalty of a row lower < r < upper is divided by the square of its smaller finite bound other than 0, if that
+    bound exceeds 1 in absolute value. Tolerances, violations and multipliers are in the units of the row.
 
-    problem: the problem to solve; all memory is allocated for its shape, once.
+    `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve. If the
+    last solve failed, they are from the solve before it. They start again after two failed solves in succession, or
+    after "not_finite". `shift` also shifts the multipliers. Between `solve` and `resume`, `settings` and `inner` may be
+    assigned.
+
+    A solution is "converged" when the residuals of `outcome` are below the tolerances. The status is
+    "constraints_violated" if limits do not hold at minima of the largest penalty, and updates of the multipliers do not
+    help. This does not prove that no solution exists: another warm start may find one. The status is
+    "regularisation_limit" if an inner solve found no acceptable step, and did not end at a minimum. The status is
+    "infeasible" if the initial state itself violates a limit of knot 0 that no control can change. `outcome.worst`
+    contains the knot, the limit and the amount of the largest violation. The cost of the solution includes the
+    penalties of the limits; the cost of `outcome` does not. The solution's trace and gains are from the last inner
+    solve, its timings from the whole solve. Controls of a warm start are moved into their bounds.
+
+    problem: the problem to solve. All memory is allocated once, for the size of this problem.
     inner: a dict of settings of `Fddp` for the inner solves. The tolerances of inner solves are chosen automatically;
         `time_budget` applies to the whole solve.
-    settings: any of these, by name. `tolerance`: the largest accepted distance of a limit from its bounds.
-        `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the maximum number
-        of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its maximum,
-        and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem with limits or
-        bounds once (default: yes). The second solve starts from the initial state, held still at all knots. A solve
-        fails if it is not finite, or violates limits at the largest penalty. The better result is returned.
+    settings: any of the following settings, by name. `tolerance`: the largest accepted distance of a limit from its
+        bounds. `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the
+        maximum number of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve,
+        its maximum, and the factor by which it increases; an equal `penalty_start` and `penalty_max` fix the penalty.
+        `restart`: whether to repeat a failed `solve` of a problem
+        with limits or bounds once (default: yes). The second solve starts from the initial state, held still at all
+        knots. A solve fails if it is not finite, violates limits at the largest penalty, or finds no acceptable step
+        while limits are violated. The better result is returned.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2746,13 +2790,33 @@ class AugmentedLagrangian:
         cls, problem: Problem, inner: dict[str, Any] | None = None, **settings: float
     ) -> AugmentedLagrangian: ...
     @property
+    def inner(self) -> Mapping[str, Any]:
+        """All settings of the inner solves by name, as a read-only mapping. An assignment changes the settings that it
+        names, as for `settings`.
+        """
+
+    @inner.setter
+    def inner(self, inner: Mapping[str, Any]) -> None: ...
+    @property
     def outcome(self) -> Outcome:
         """The violation of limits and other results of the last solve, as an `Outcome`."""
 
     @property
+    def settings(self) -> Mapping[str, Any]:
+        """All settings by name, as a read-only mapping.
+
+        An assignment of a mapping changes the settings that it names; the others stay. The next `solve` or
+        `resume` uses them: `solver.settings = {"tolerance": 1e-4}`.
+
+        Raises `ProblemError` for an invalid number; then no setting changes.
+        """
+
+    @settings.setter
+    def settings(self, settings: Mapping[str, Any]) -> None: ...
+    @property
     def solution(self) -> Solution | None:
-        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
-        None before the first solve.
+        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
+        ("interrupted"); None before the first solve.
         """
 
     @staticmethod
@@ -2776,9 +2840,9 @@ class AugmentedLagrangian:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from it. At a second
-        shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
-        controls would diverge.
+        model has for all knots. The last control is repeated, and the last state follows from this control. At
+        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
+        repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -2795,14 +2859,15 @@ class AugmentedLagrangian:
     ) -> Solution:
         """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
 
-        Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-        an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
-        Then `solution` is the best iterate, from which `resume` continues.
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+        phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+        KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+        `resume` continues.
 
-        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        xs: states, (N + 1, nx), which need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
-        callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
+        callback: a function that is called with the `Iteration` after each iteration. If the function returns
+            False, the solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
         verbose: whether to print a line for each iteration.
         progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
 
@@ -2811,10 +2876,11 @@ class AugmentedLagrangian:
 
 @final
 class ConstrainedAction:
-    """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
+    """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `InteriorPoint` and `AugmentedLagrangian`
+    enforce.
 
-    `Fddp` alone treats the constraint as a cost of values outside the bounds. For residuals of a robot, `Limit` is
-    faster.
+    `Fddp` without `AugmentedLagrangian` treats the constraint as a cost of values outside the bounds. For residuals of
+    a robot, `Limit` is faster.
 
     action: the action.
     size: the number of entries of g, at most 4096.
@@ -2844,7 +2910,8 @@ class ConstrainedAction:
 
 @final
 class ContactDynamics:
-    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as for `FreeDynamics`.
+    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ and J q̈ + γ = 0, with the contact forces λ, the Jacobian J of
+    the contacts, and γ as for `constrained_dynamics`. Integrator and cost are as for `FreeDynamics`.
 
     model: the robot.
     contacts: a dict of `ContactConstraint`s by name, which may be empty. Residuals refer to a contact by this name.
@@ -2891,17 +2958,19 @@ class ContactInverseDynamics:
     = (q̈, λ), and τ = M q̈ + h − Jᵀλ. Integrator and cost are as for `FreeDynamics`.
 
     By default the knot has two kinds of `Limit`, which keep a residual at zero. The limit named `undriven efforts`
-    keeps Nᵀτ = 0, where Nᵀ S = 0; for a floating base these are the first 6 efforts. A limit named `contact` and the
-    contact's name keeps J q̈ + γ = 0. `AugmentedLagrangian` enforces both; `Fddp` alone treats them as costs. No matrix
-    is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
-    `DifferentialActionModelContactInvDynamics`, and without contacts as in `DifferentialActionModelFreeInvDynamics`.
+    keeps Nᵀτ = 0. The columns of N are the directions without actuators, Nᵀ S = 0 with the actuation S. For a floating
+    base, Nᵀτ are the first 6 efforts. A limit named `contact` and the contact's name keeps J q̈ + γ = 0, as in
+    `constrained_dynamics`. `InteriorPoint` and `AugmentedLagrangian` enforce both limits; `Fddp` without
+    `AugmentedLagrangian` treats them as costs. No matrix is inverted, so contacts may be redundant. The equations are
+    the same as in Crocoddyl's `DifferentialActionModelContactInvDynamics`, and without contacts as in
+    `DifferentialActionModelFreeInvDynamics`.
 
     model: the robot.
-    contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. May be empty.
+    contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. The dict may be empty.
     dt: Δt in seconds.
-    costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.contact_force` on λ.
+    costs: a list of `Cost`. In these costs, `Residual.joint_effort` depends on τ, and `Residual.contact_force` on λ.
     costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`. The actuation
-        defines which efforts have actuators. Bounds apply to all controls: nv accelerations and the rows of λ.
+    defines which efforts have actuators. Bounds apply to all controls: nv accelerations and the rows of λ.
 
     Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot.
 
@@ -2938,11 +3007,11 @@ class ContactInverseDynamics:
 class Cost:
     """A term of a cost: weight times an activation of a residual.
 
-    name: used by `Problem.set_weight` and in errors.
+    name: the name of the term for `Problem.set_weight` and in error messages.
     weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
-    activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone or a centre of pressure,
-        the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
+    activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone, a centre of pressure or
+        distances, the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
 
     >>> from condyle.optimal import Cost, Residual
     >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -2953,7 +3022,8 @@ class Cost:
 
 @final
 class DifferentialAction:
-    """An action whose accelerations and cost per second are written in Python; it advances by a time step.
+    """An action whose accelerations and cost per second are written in Python. An integrator advances the state by a time
+    step.
 
     The state is x = (q, v). With semi-implicit Euler, v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt ℓ,
     where ℓ is the cost per second.
@@ -3003,32 +3073,45 @@ class Fddp:
     """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or plain, with the equations and
     constants of Crocoddyl.
 
-    If controls are bounded, the solver has the equations of Crocoddyl's box solvers.
+    If controls are bounded, the solver uses the equations of Crocoddyl's box solvers.
 
-    problem: the problem to solve; all memory is allocated for its shape, once.
-    settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or
-        "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics
-        if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse
-        dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
+    problem: the problem to solve. All memory is allocated once, for the size of this problem.
+    settings: any of the following settings, by name. `method`: "fddp" (default), whose trial steps keep a fraction of
+        the gaps, or "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of
+        the dynamics if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations
+        of inverse dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
         `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
         yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
-        has used it up returns its current result, with the status "time_limit". The first iteration always runs, unless
-        the budget is 0. A later phase of an iteration runs only if the median of its last five durations fits into the
-        budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the number of
-        segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep uses as many
-        threads as are available. The number of segments changes the results by rounding errors; the number of threads
-        does not change them. `threads`: the number of threads that share an iteration on a robot (derivatives and
-        gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical. `max_iterations`,
-        `tolerance`, `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+        has used up the budget returns its current result, with the status "time_limit". The first iteration always
+        runs, unless the budget is 0. In later iterations, each phase (derivatives, backward sweep, rollout) runs only
+        if the median of its last five durations fits into the budget. If a solve takes longer than the budget,
+        `timings.overrun` is the excess. `segments`: the number of segments of the horizon on which a sweep works at the
+        same time, at most 1024, default 1. The sweep uses as many threads as are available. The number of segments
+        changes the results by rounding errors; the number of threads does not change them. `threads`: the number of
+        threads that share an iteration on a robot (derivatives and gains, in parallel with the sweep), at most 1024,
+        default 1. The results are bit-identical for any number of these threads. `max_iterations`, `tolerance`,
+        `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
         `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
         `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
     """
 
     def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
     @property
+    def settings(self) -> Mapping[str, Any]:
+        """All settings by name, as a read-only mapping.
+
+        An assignment of a mapping changes the settings that it names; the others stay. The next `solve` or
+        `resume` uses them: `solver.settings = {"tolerance": 1e-4}`.
+
+        Raises `ProblemError` for an invalid number; then no setting changes.
+        """
+
+    @settings.setter
+    def settings(self, settings: Mapping[str, Any]) -> None: ...
+    @property
     def solution(self) -> Solution | None:
-        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
-        None before the first solve.
+        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
+        ("interrupted"); None before the first solve.
         """
 
     @staticmethod
@@ -3052,9 +3135,9 @@ class Fddp:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from it. At a second
-        shift without a solver step in between, the last state is repeated, too, because a rollout with repeated
-        controls would diverge.
+        model has for all knots. The last control is repeated, and the last state follows from this control. At
+        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
+        repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3071,14 +3154,15 @@ class Fddp:
     ) -> Solution:
         """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
 
-        Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-        an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
-        Then `solution` is the best iterate, from which `resume` continues.
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+        phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+        KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+        `resume` continues.
 
-        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        xs: states, (N + 1, nx), which need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
-        callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
-            solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
+        callback: a function that is called with the `Iteration` after each iteration. If the function returns
+            False, the solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
         verbose: whether to print a line for each iteration.
         progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
 
@@ -3095,12 +3179,12 @@ class FreeDynamics:
     model: the robot.
     dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
     costs: a list of `Cost`.
-    costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve several
-        knots of a phase.
+    costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve all
+        knots of a contact phase.
     actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
-    limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
+    limits: a list of `Limit`, or None; `InteriorPoint` and `AugmentedLagrangian` enforce them.
     limits_at: lists of `Limit` by index of the knot. At these knots they replace `limits`.
     controls: the polynomial that the controls follow within a knot: 'constant', 'linear' or 'quadratic'. The knot then
         has nu, 2 nu or 3 nu controls: one value of u; values at the times 0 and Δt/2; or values at 0, Δt/2 and Δt
@@ -3135,7 +3219,7 @@ class FreeInverseDynamics:
 
     model: the robot.
     dt: Δt in seconds.
-    costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
+    costs: a list of `Cost`. In these costs, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
         efforts without actuators.
     integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 
@@ -3160,8 +3244,8 @@ class FreeInverseDynamics:
 
 @final
 class FrictionCone:
-    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper for a force
-    f.
+    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n of a force f with tangential part f_t and normal component f_n, as a pyramid.
+    The pyramid and the bounds on the normal force are the rows lower ≤ A f ≤ upper.
 
     mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
     rotation: the surface's axes in the contact's axes, (3, 3), with the surface's normal as z axis; least, greatest:
@@ -3193,10 +3277,10 @@ class FrictionCone:
 
 @final
 class ImpulseDynamics:
-    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
-    w a(r), as for `FreeDynamics` without Δt.
+    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, with the
+    inertia matrix M and the Jacobian J of the contacts. The cost is Σ w a(r), as for `FreeDynamics` without Δt.
 
-    There are no controls.
+    An impact has no controls.
 
     model: the robot.
     contacts: a dict of `ContactConstraint`s by name.
@@ -3223,16 +3307,167 @@ class ImpulseDynamics:
         """Returns an empty array, since an impact has no controls."""
 
 @final
+class InteriorPoint:
+    """The primal–dual interior point method with multiple shooting: for robots with `Limit`s, bounds on controls, and
+    `ConstrainedAction`s.
+
+    A slack variable s replaces each limited number. The method replaces each bound by a barrier term −μ log(s − lower)
+    or −μ log(upper − s). It makes Newton steps for states, controls, slack variables and multipliers, while μ falls to
+    zero. Each step is a single sweep over the horizon, which costs little more than a sweep without limits. A filter
+    accepts a step if either the violation or the cost with barrier terms decreases enough. If no step is accepted, a
+    restoration reduces the violation alone.
+
+    Use `InteriorPoint` for problems with limits, and `tick` for model predictive control with limits. It takes fewer
+    iterations than `AugmentedLagrangian`, but its trajectory has gaps until it converges. Use `AugmentedLagrangian`
+    if `InteriorPoint` does not converge, or if the result of each iteration must satisfy the dynamics. Use `Fddp` if
+    there are no limits.
+
+    `solve` computes the first slack variables and multipliers from the warm start. `resume` and `tick` begin with the
+    slack variables and multipliers of the last solve, and `shift` also shifts them. `settings` may be assigned before
+    each of these calls. The status is "converged" if the
+    gradient of the Lagrangian, the complementarity and the gaps are below the tolerance, and the violation is below a
+    tenth of it. A violated limit is never reported as "converged". The status is "infeasible" if the restoration ended
+    where no small step reduces the violation, or if the initial state itself violates a limit of knot 0 that no control
+    can change. The first case does not prove that no solution exists: another warm start may find one. `outcome.worst`
+    contains the knot, the limit and the amount of the largest violation. "regularisation_limit", "max_iterations",
+    "time_limit", "interrupted" and "not_finite" have the same meanings as for `Fddp`; the solution is then the best
+    iterate. The costs of the solution and of `outcome` are equal and do not include terms of the limits.
+
+    The gains K contain the limits. Near a bound, the feedback is stiff in the direction of this bound. With μ near
+    zero, active rows are equations: K does not move a control that is at its bound, and keeps other active limits at
+    their bounds for small deviations of the state. Rows that are not active do not change K.
+
+    problem: the problem to solve. All memory is allocated once, for the size of this problem.
+    settings: any of the following settings, by name. `tolerance`: see above, default 1e-6; the gradient and the
+        complementarity are scaled as in IPOPT. `max_iterations`: default 300. `barrier_start`: μ of the first
+        iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `second_order`:
+        whether to use the curvature of the dynamics near the solution, if the models provide it. This saves iterations
+        if this curvature is large compared with the costs. `inverse_dynamics_form`, `time_budget` (s), `threads`: as
+        for `Fddp`; the results are bit-identical for any number of threads. `regularisation_min`, `regularisation_max`:
+        the smallest and the largest regularisation; a solve that reaches the largest one stops.
+
+    >>> from condyle.optimal import Cost, FreeDynamics, InteriorPoint, Limit, Problem, Residual
+    >>> arm = condyle.robots.arm7()
+    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
+    >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
+    >>> solver = InteriorPoint(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
+    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
+    ('converged', True, True)
+    >>> solver.shift(0)
+    >>> problem.set_x0(solution.xs[1])
+    >>> solver.tick(2).us.shape
+    (10, 7)
+    """
+
+    def __new__(cls, problem: Problem, **settings: float | None) -> InteriorPoint: ...
+    @property
+    def outcome(self) -> Outcome:
+        """The violation of limits and other results of the last solve or tick, as an `Outcome`."""
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """All settings by name, as a read-only mapping.
+
+        An assignment of a mapping changes the settings that it names; the others stay. The next `solve` or
+        `resume` uses them: `solver.settings = {"tolerance": 1e-4}`.
+
+        Raises `ProblemError` for an invalid number; then no setting changes.
+        """
+
+    @property
+    def solution(self) -> Solution | None:
+        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
+        ("interrupted"); None before the first solve.
+        """
+
+    @staticmethod
+    def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> InteriorPoint: ...
+    def resume(
+        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+    ) -> Solution:
+        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+        `Solution`.
+
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
+        least one iteration.
+
+        callback, verbose, progress: as for `solve`.
+
+        Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def shift(self, last: int) -> None:
+        """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
+
+        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
+        limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
+        model has for all knots. The last control is repeated, and the last state follows from this control. At
+        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
+        repeated controls would diverge.
+
+        last: the index of the new last knot's model.
+
+        Raises `ProblemError` if the model does not exist.
+        """
+
+    def solve(
+        self,
+        xs: ArrayLike,
+        us: _Controls,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+    ) -> Solution:
+        """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
+
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+        phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+        KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+        `resume` continues.
+
+        xs: states, (N + 1, nx), which need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays if knots differ in nu.
+        callback: a function that is called with the `Iteration` after each iteration. If the function returns
+            False, the solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
+        verbose: whether to print a line for each iteration.
+        progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
+
+        Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
+        """
+
+    def tick(self, sweeps: int = 2) -> Solution:
+        """Makes one linearisation at the last trajectory and up to `sweeps` Newton steps for its quadratic program, as a
+        controller does in each period. Returns a `Solution`.
+
+        No step length is searched, so the time is known in advance. The result is close to the optimum only if the last
+        trajectory is: begin with a `solve`, then `shift`, `set_x0` and `tick` in each period. Other threads can run
+        meanwhile. The status is "max_iterations" if all steps were made, "converged" if fewer steps solved the quadratic
+        program, and "time_limit" if the `time_budget` ended the steps. The first step is always made. The cost, the gap
+        and `outcome` belong to the trajectory before the tick, and `outcome.dual` is infinite, because a tick does not
+        measure it. The gains belong to the last step.
+
+        sweeps: the maximum number of steps, at least 1. Two steps follow changes of the active limits better than one.
+
+        Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
+        """
+
+@final
 class Limit:
-    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
+    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `InteriorPoint` and `AugmentedLagrangian` enforce.
 
-    Limits apply at the beginning of a knot. `Fddp` alone treats them as costs of values outside the bounds.
+    Limits apply at the beginning of a knot. `Fddp` without `AugmentedLagrangian` treats limits as costs of values
+    outside the bounds.
 
-    name: used in errors.
+    name: the name of the limit in error messages.
     residual: a `Residual`.
-    lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
-        centre of pressure has its own bounds, and every other r must be 0. An entry with equal lower and upper bounds
-        is an equality.
+    lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone, a centre
+        of pressure and distances have their own bounds, and every other r must be 0. An entry with equal lower and
+        upper bounds is an equality.
 
     >>> from condyle.optimal import Limit, Residual
     >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
@@ -3271,19 +3506,21 @@ class Lqr:
 
 @final
 class Problem:
-    """An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
+    """An optimal control problem: a sequence of knots that begins at the state x0, and a terminal knot. Each knot has one
+    of the models.
 
     x0: the initial state, nx numbers.
     models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
         `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-    knot_models: for each knot the index of its model; None if knot t has model t. Consecutive knots are computed
-        as a group if they have the same model, or if their models belong to one robot and differ only in their
-        costs and limits.
+    knot_models: for each knot, the index of the knot's model; None if knot t has model t. Consecutive knots are
+        computed as a group in two cases: they have the same model, or their models belong to one robot and differ only
+        in costs and limits.
     terminal: the model of the terminal knot, without controls.
 
     Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
-    is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, more than 4096 numbers in a state or in
-    the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together.
+    is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, and for more than 4096 numbers in a state
+    or in the controls of a knot. The matrices [A B], the derivatives of the next states, may have at most 2²⁸ numbers
+    in all knots together.
     """
 
     def __new__(
@@ -3291,7 +3528,7 @@ class Problem:
     ) -> Problem: ...
     @property
     def horizon(self) -> int:
-        """The number of knots before the terminal one, N."""
+        """The number N of knots before the terminal knot."""
 
     @property
     def ndx(self) -> int:
@@ -3318,9 +3555,10 @@ class Problem:
         """
 
     def evaluate(self, xs: ArrayLike, us: _Controls) -> Evaluation:
-        """Computes the cost of given states and controls, and the results of the dynamics for them, as an `Evaluation`.
+        """Computes the cost of given states and controls, and the results of the dynamics for these states and controls,
+        as an `Evaluation`.
 
-        xs: states, (N + 1, nx); they need not satisfy the dynamics.
+        xs: states, (N + 1, nx), which need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
         """
 
@@ -3334,8 +3572,8 @@ class Problem:
 
     def quasi_static(self, xs: ArrayLike) -> _Array | list[_Array]:
         """Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
-        (N, nu), or a list of N arrays if knots differ in nu. For robots they are computed by statics, for other actions
-        by Newton's method.
+        (N, nu), or a list of N arrays if knots differ in nu. The controls of robots are computed by statics, the
+        controls of other actions by Newton's method.
 
         xs: states, (N + 1, nx).
         """
@@ -3343,7 +3581,7 @@ class Problem:
     def rollout(self, us: _Controls) -> _Array:
         """Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
-        us: (N, nu), or a list of N arrays if knots differ in nu.
+        us: controls, (N, nu), or a list of N arrays if knots differ in nu.
 
         Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
         between knots.
@@ -3353,7 +3591,7 @@ class Problem:
         """Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs
         move with the knot. Call this method between solves.
 
-        knot: its index, 0 to N; N is the terminal knot.
+        knot: the index of the knot, 0 to N; N is the terminal knot.
         costs: a list of `Cost`.
 
         Raises `ProblemError` if a term does not fit the robot, or if the knot's action does not belong to a robot.
@@ -3363,7 +3601,7 @@ class Problem:
         """Sets the duration of a single knot; the knot's model keeps its duration at all other knots. Call this method
         between solves. The solver's next iterations do not allocate.
 
-        knot: its index, 0 to N − 1.
+        knot: the index of the knot, 0 to N − 1.
         dt: the duration (s).
 
         Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
@@ -3373,15 +3611,15 @@ class Problem:
         """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
         between solves. The solver's next iterations do not allocate.
 
-        knot: its index, 0 to N − 1.
-        model: the new model, with as many states and controls as the old one. Costs that the model has for single
-            knots belong to the knots of this problem with the same index.
+        knot: the index of the knot, 0 to N − 1.
+        model: the new model, whose state and controls have the same sizes as in the old model. Costs that the model has
+            for single knots belong to the knots of this problem with the same index.
 
         Raises `ProblemError` if the model does not fit.
         """
 
     def set_weight(self, name: str, weight: float) -> None:
-        """Changes the weight of all cost terms with this name, in all knots including the terminal one. Call this method
+        """Changes the weight of all cost terms with this name, in all knots including the terminal knot. Call this method
         between solves.
 
         Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
@@ -3407,8 +3645,8 @@ class Residual:
 
     A frame is given by its name or index in a model. A contact is given by its name in `ContactDynamics`,
     `ContactInverseDynamics` or `ImpulseDynamics`. A residual stores the name of its frame. In a problem of another
-    robot it uses the frame with the same name; if this robot has no such frame, it is an error. A target that is not
-    given is zero; a target rotation is the identity.
+    robot, the residual uses the frame with the same name. A robot without such a frame is an error. A target that is
+    not given is zero; a target rotation is the identity.
 
     >>> from condyle.optimal import Residual
     >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -3438,8 +3676,9 @@ class Residual:
 
     @staticmethod
     def contact_acceleration(contact: str) -> Residual:
-        """Returns the acceleration of a contact, r = J q̈ + γ, for actions whose controls include the accelerations: 1, 2,
-        3 or 6 numbers along the axes of the contact's rows. It is 0 while the contact holds.
+        """Returns the acceleration of a contact, r = J q̈ + γ as in `constrained_dynamics`: 1, 2, 3 or 6 numbers along the
+        axes of the contact's rows. Only actions whose controls include the accelerations have this residual. The
+        acceleration is 0 while the contact holds.
         """
 
     @staticmethod
@@ -3454,19 +3693,38 @@ class Residual:
 
     @staticmethod
     def control_gravity() -> Residual:
-        """Returns r = τ − g(q) + Jᵀλ, nv numbers: the excess of the actual efforts and forces over the efforts and forces
-        that hold the robot still.
+        """Returns r = τ − g(q) + Jᵀλ, nv numbers, with joint efforts τ, gravity efforts g, contact forces λ and their
+        Jacobian J. r is zero if efforts and contact forces hold the robot still.
+        """
+
+    @staticmethod
+    def distances(model: Model, pairs: Sequence[tuple[Sphere, Sphere]]) -> Residual:
+        """Returns the signed distances between pairs of spheres, r = ‖p₁ − p₂‖ − radius₁ − radius₂ with the centres p₁ and
+        p₂ in the world, one number for each pair (m). A distance is negative while the spheres overlap.
+
+        pairs: a list of pairs of `Sphere`s. At least one sphere of a pair is fixed to a frame of the robot; the other
+            one is fixed to the world, or to a frame of the same robot.
+
+        A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
+        distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
+        pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
+
+        >>> from condyle.optimal import Limit, Residual, Sphere
+        >>> tool, ball = Sphere([0.0, 0.0, 0.0], 0.05, "tool"), Sphere([0.4, 0.2, 0.5], 0.1)
+        >>> clear = Limit("clear", Residual.distances(condyle.robots.arm7(), [(tool, ball)]), lower=[0.01])
         """
 
     @staticmethod
     def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is
-        a homogeneous 4 × 4 matrix.
+        """Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf) with the pose oMf of the frame in
+        the world, 6 numbers, linear first; target is a homogeneous 4 × 4 matrix.
         """
 
     @staticmethod
     def frame_rotation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """Returns the deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix."""
+        """Returns the deviation of a frame's rotation R from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3
+        matrix.
+        """
 
     @staticmethod
     def frame_translation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
@@ -3486,7 +3744,9 @@ class Residual:
 
     @staticmethod
     def impulse_center_of_mass() -> Residual:
-        """Returns the jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
+        """Returns the jump of the centre of mass's velocity at an impact: r = J_c (v⁺ − v), 3 numbers (m/s), with the
+        Jacobian J_c of the centre of mass and the velocity v⁺ after the impact.
+        """
 
     @staticmethod
     def joint_acceleration(reference: ArrayLike) -> Residual:
@@ -3539,8 +3799,9 @@ class Residual:
 
     @staticmethod
     def undriven_effort() -> Residual:
-        """Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base,
-        6 numbers: the force on the base. They are 0 in a feasible motion.
+        """Returns the efforts of inverse dynamics in the directions without actuators: r = Nᵀτ, where Nᵀ S = 0 with the
+        actuation matrix S. For a floating base, these are 6 numbers, the force on the base. The efforts are 0 in a
+        feasible motion.
         """
 
     @staticmethod
@@ -3552,11 +3813,11 @@ class Sweep:
     """The backward Riccati sweep over a horizon of linear-quadratic knots: an iteration of `Fddp` without derivatives and
     line search.
 
-    knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal one, without
+    knots: a list of `LqKnot`s, as `Problem.derivatives` returns them; the last knot is the terminal knot, without
     controls.
 
-    Raises `ProblemError` if the shapes of the knots do not fit together. `run` raises it for a knot with constraint
-    rows, which the sweep does not treat.
+    Raises `ProblemError` if the shapes of the knots do not fit together. `run` raises `ProblemError` for a knot with
+    constraint rows, because the sweep does not support them.
 
     >>> from condyle.optimal import Lqr, Problem, Sweep
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[2.0]])
@@ -3570,7 +3831,8 @@ class Sweep:
     def run(self, regularisation: float = 0.0) -> SweepResult:
         """Computes the feedback and the value functions, as a `SweepResult`.
 
-        regularisation: the number added to the diagonals of Quu and Vxx, at least 0.
+        regularisation: the number added to the diagonals of Quu and Vxx, at least 0. Quu is the Hessian of the
+        cost-to-go with respect to the controls, and Vxx the Hessian of the value function.
 
         Raises `ProblemError` if Quu of a knot is not positive definite.
         """
@@ -3622,8 +3884,9 @@ def joint_torque_regressor(
     """Computes the joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
     `Model.inertial_parameters`; O(n depth).
 
-    q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors, τ = Y π + armature · a. For the
-    linear coordinates of a free joint, armature · (a + ω × v) replaces armature · a.
+    q: position, nq numbers; v, a: velocity and acceleration, nv numbers each. Each body except the world has ten
+    columns. With rotors, τ = Y π + armature · a. For the linear coordinates of a free joint, armature · (a + ω × v)
+    replaces armature · a.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -3636,18 +3899,19 @@ def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLik
     """Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers; O(n). T = y · π is `kinetic_energy` without
     the rotors, as a linear function of π, the `Model.inertial_parameters`.
 
-    q: nq numbers; v: nv.
+    q: position, nq numbers; v: velocity, nv numbers.
     """
 
 def passive_torque(model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
     """Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
     damping coefficient is d = d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 
-    q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. The effort of a
-    spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for joints with several
-    degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. The only
-    exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of
-    actuators. No other function of a model includes passive torques: add them to τ where needed.
+    q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0, a speed (rad/s, m/s); at the speed ε, friction
+    is tanh 1 = 76 % of f. A spring with the coefficients k₀, k₁ and k₂ has the effort −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ
+    is the displacement from its rest position. For joints with several degrees of freedom, the brackets contain |Δ|
+    instead of Δ. The equations are the same as for MuJoCo's `qfrc_passive`, with two exceptions. MuJoCo treats friction
+    as a constraint. For joints with `actuatorgravcomp`, MuJoCo counts gravity compensation among the efforts of
+    actuators. No other function of a model includes passive torques: add passive torques to τ where needed.
 
     >>> arm = condyle.robots.arm7()
     >>> q, v = np.zeros(7), np.ones(7)
@@ -3660,8 +3924,9 @@ def passive_torque_derivatives(
 ) -> PassiveDerivatives:
     """Computes the exact derivatives of `passive_torque`, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
 
-    q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal, except for free joints with friction or
-    polynomial damping. ∂τ/∂q has a block for each spring, and couples joints if gravity is compensated.
+    q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal, except for free
+    joints with friction or polynomial damping. ∂τ/∂q has a block for each spring, and couples joints if gravity is
+    compensated.
 
     >>> arm = condyle.robots.arm7()
     >>> d = condyle.passive_torque_derivatives(arm, np.zeros(7), np.ones(7), 1e-3)
@@ -3673,7 +3938,7 @@ def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Arr
     """Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers; O(n). V = y · π is `potential_energy` as a
     linear function of π, the `Model.inertial_parameters`.
 
-    q: nq numbers.
+    q: position, nq numbers.
     """
 
 def arm7() -> Model:
@@ -3705,13 +3970,13 @@ class Simulation:
     A motion is q(t) = q₀ ⊕ ξ(t), with a tangent vector ξ(t). The equations of motion are q̇ = v, with the velocity v in
     the body's frame, and v̇ = aba(q, v, τ). τ and the external forces are constant during a step.
 
-    model: the robot; it starts at rest at `neutral`, at time 0.
+    model: the robot, which starts at rest at `neutral`, at time 0.
     integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
         momentum is conserved up to rounding.
     dt: h, the length of a step (s), above 0.
     passive: the smoothing ε (rad/s, m/s) of `passive_torque`, which is then added to τ: damping, friction, springs and
-        gravity compensation. None leaves it out.
+        gravity compensation. None leaves the passive torque out.
     tolerance: for 'variational', Newton's method ends when the imbalance of the momenta is at most this fraction of the
         sum of the momenta.
     max_iterations: the maximum number of iterations of Newton's method.
@@ -3753,7 +4018,7 @@ class Simulation:
 
     @property
     def q(self) -> _Array:
-        """The position, nq numbers."""
+        """The position of the robot, nq numbers."""
 
     @property
     def time(self) -> float:
@@ -3761,20 +4026,20 @@ class Simulation:
 
     @property
     def v(self) -> _Array:
-        """The velocity, nv numbers."""
+        """The velocity of the robot, nv numbers."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Returns the parts of a pickle: the constructor's arguments, and the state."""
+        """Returns the class, the constructor's arguments, and the state, from which `pickle` makes an equal simulation."""
 
     def __setstate__(self, state: tuple[float, list[float], list[float], list[float]]) -> None:
-        """Restores the state of a pickle."""
+        """Restores the state that a pickle contains."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
         """Makes a number of steps, and calls a control law before each step. If a step fails, ends early and returns the
         status of this step. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
 
-        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
-            efforts; then other Python threads can run meanwhile.
+        control: a function that takes a `Control` and sets the numbers of `tau` and `f_ext` of this `Control` in place.
+            None means zero efforts. Other Python threads can run during the steps if control is None.
 
         An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
         step is kept.
@@ -3807,11 +4072,11 @@ class _SpelledData:
 
     @property
     def _given(self) -> int:
-        """The number of vectors among q, v and a that the last `forwardKinematics` was given."""
+        """The number of the vectors q, v and a that were passed to the last call of `forwardKinematics`."""
 
     @property
     def _ours(self) -> Data:
-        """The `condyle.Data`."""
+        """The wrapped `condyle.Data`."""
 
     @property
     def _poses(self) -> _Array:
@@ -3823,11 +4088,11 @@ class _SpelledData:
 
     @property
     def com(self) -> list[_Array]:
-        """The centre of mass, in a list."""
+        """The stored centre of mass, as a list with one array."""
 
     @property
     def hg(self) -> Force:
-        """The centroidal momentum."""
+        """The stored centroidal momentum."""
 
     def _leave(self, com: _Array, hg: Force) -> None:
         """Stores a centre of mass and a centroidal momentum."""
@@ -3839,7 +4104,7 @@ class _SpelledModel:
     def __new__(cls, model: Model) -> _SpelledModel: ...
     @property
     def ours(self) -> Model:
-        """The `condyle.Model`."""
+        """The wrapped `condyle.Model`."""
 
 def centerOfMass(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
@@ -3852,7 +4117,9 @@ def computeCentroidalMomentum(model: _SpelledModel, data: _SpelledData, q: Array
     """Computes the centroidal momentum, also stored as data.hg."""
 
 def computeCoriolisMatrix(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes the Coriolis matrix C, also stored as data.C. C v + g = h, and Ṁ − 2 C is skew-symmetric."""
+    """Computes the Coriolis matrix C, also stored as data.C. C v + g = h, with gravity efforts g and nonlinear effects
+    h; Ṁ − 2 C is skew-symmetric, with the inertia matrix M.
+    """
 
 def computeFrameJacobian(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, frame_id: int, frame: ReferenceFrame | None = None
@@ -3863,21 +4130,23 @@ def computeGeneralizedGravity(model: _SpelledModel, data: _SpelledData, q: Array
     """Computes the gravity efforts g, also stored as data.g."""
 
 def computeMinverse(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """Computes M⁻¹, also stored as data.Minv."""
+    """Computes the inverse M⁻¹ of the inertia matrix, also stored as data.Minv."""
 
 def _spelled_crba(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """Computes M with both triangles, also stored as data.M."""
+    """Computes the inertia matrix M with both triangles, also stored as data.M."""
 
 def _spelled_difference(model: _SpelledModel, q0: ArrayLike, q1: ArrayLike) -> _Array:
-    """Computes q₁ ⊖ q₀."""
+    """Computes the tangent vector q₁ ⊖ q₀."""
 
 def forwardKinematics(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
 ) -> None:
-    """Computes data.oMi; with v and a also data.v and data.a, in the bodies' frames."""
+    """Computes the poses data.oMi; with v and a also the velocities data.v and the accelerations data.a, in the bodies'
+    frames.
+    """
 
 def framesForwardKinematics(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> None:
-    """Computes data.oMi and data.oMf."""
+    """Computes the bodies' poses data.oMi and the frames' poses data.oMf."""
 
 def getAcceleration(
     model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
@@ -3916,7 +4185,7 @@ def getVelocity(
     """Returns the velocity of a joint's body at the last forwardKinematics."""
 
 def _spelled_integrate(model: _SpelledModel, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes q ⊕ v."""
+    """Computes the position q ⊕ v."""
 
 def jacobianCenterOfMass(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
     """Computes the Jacobian of the centre of mass, (3, nv), also stored as data.Jcom."""
@@ -3925,15 +4194,15 @@ def nonLinearEffects(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: 
     """Computes the nonlinear effects C v + g, also stored as data.nle."""
 
 def updateFramePlacements(model: _SpelledModel, data: _SpelledData) -> None:
-    """Computes data.oMf from the positions of the last forwardKinematics."""
+    """Computes the frames' poses data.oMf from the bodies' poses of the last forwardKinematics."""
 
 @final
 class FrictionContact:
     """A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
-    ‖f_t‖ ≤ μ f_n.
+    ‖f_t‖ ≤ μ f_n, with the tangential part f_t and the normal component f_n of the force.
 
-    `ContactTarget.activation` defines at each tick whether the contact touches, and how far it is loaded. The
-    constructor of `WholeBodyController` checks the numbers.
+    `ContactTarget.activation` defines at each tick whether the contact touches, and which fraction of the full load the
+    contact carries. The constructor of `WholeBodyController` checks the numbers.
 
     Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
     max_force: bounds on the normal force of the whole contact (N).
@@ -3988,10 +4257,11 @@ class FrictionContact:
         min_force: float = 0.0,
         max_force: float = ...,
     ) -> FrictionContact:
-        """Returns a point contact: the frame's origin is held, the frame may turn about it.
+        """Returns a point contact: the frame's origin is held, and the frame may turn about its origin.
 
-        normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is z, level ground.
-        axes: the axes of the normal: 'world' for a constant normal, or 'frame' for a normal that turns with the frame.
+        normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is the z axis, for
+        level ground. axes: the axes of the normal: 'world' for a constant normal, or 'frame' for a normal that turns
+        with the frame.
         """
 
     @staticmethod
@@ -4028,29 +4298,29 @@ class FrictionContact:
         forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
             about the normal; or 'corners', a force with a friction cone at each corner.
         normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
-            None is z.
-        yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔ μ r, where r is the
-            radius of the largest circle in the polygon about the mean of the corners; for an edge of length 2 l it is ½
-            μ l.
+            None is the z axis.
+        yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n, with the normal force f_n. For a
+            polygon, None means ⅔ μ r, where r is the radius of the largest circle in the polygon about the mean of the
+            corners. For an edge of length 2 l, None means ½ μ l.
         """
 
 @final
 class Plan:
-    """A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
-    touch in each interval.
+    """A planned motion with N + 1 knots: states at given times, efforts and gains between these times, and the contacts
+    that touch in each interval.
 
-    `WholeBodyController.track` converts it to references. Between knots, q is interpolated with constant velocity (as
-    by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at this
-    time (an impact).
+    `WholeBodyController.track` converts a plan to references. Between knots, q is interpolated with constant velocity
+    (as by `interpolate`), v linearly, and a = Δv / Δt. Two knots may have the same time: then the velocity jumps at
+    this time (an impact).
 
     model: the robot.
-    times: N + 1 times in ascending order (s); two may be equal.
+    times: N + 1 times in ascending order (s); two consecutive times may be equal.
     states: (q, v) of the knots, (N + 1, nq + nv).
     touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
     controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
         free-flyer's), (N, nu); None for no controls.
     gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
-    fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it ends to touch.
+    fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it stops touching.
 
     Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
     or pairs (cos, sin) do not have length 1.
@@ -4078,15 +4348,15 @@ class Plan:
         """The times of the first and the last knot (s)."""
 
     def activation(self, contact: int, t: float) -> float:
-        """Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after it begins and
-        before it ends to touch, else 1. contact: the index of the contact.
+        """Returns the activation of a contact at a time: 0 while the contact does not touch, a ramp after the contact
+        begins and before it ends, else 1. contact: the index of the contact.
         """
 
     def feedback(self, t: float, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-        """Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers; they are 0 for
-        a free-flyer.
+        """Computes the efforts τ = ū + K (x ⊖ x̄) of the plan's controls and gains at a state, nv numbers. The efforts of
+        a free-flyer are 0.
 
-        t: the time (s); q: nq numbers; v: nv.
+        t: the time (s); q: position, nq numbers; v: velocity, nv numbers.
 
         Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose
         quaternions or pairs (cos, sin) do not have length 1.
@@ -4094,16 +4364,17 @@ class Plan:
 
 @final
 class Task:
-    """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+    """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v), where
+    J is the Jacobian of the quantity x.
 
     The `References` contain the target of the task. Tasks of priority 0 come first. Tasks of priority 1 only use the
     freedom that tasks of priority 0 leave, and so on. Within a priority, only the ratios of the weights matter. The
     constructor of `WholeBodyController` checks the numbers.
 
     Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
-    is `Gains.critical(100.0)`. mask: for each number of the task, whether it is controlled; None controls all numbers.
-    axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame, of the
-    world); or ('frame', name), the axes of another frame.
+    is `Gains.critical(100.0)`. mask: for each number of the task, whether the number is controlled; None controls all
+    numbers. axes: the axes of these numbers: 'world'; 'local', the axes of the task's frame (for tasks without a frame,
+    of the world); or ('frame', name), the axes of another frame.
     priority: 0 is the first priority; at most 2.
 
     >>> from condyle.wholebody import Task
@@ -4121,7 +4392,7 @@ class Task:
 
     @property
     def gains(self) -> Gains:
-        """The gains k and d, `Gains`."""
+        """The gains k and d of the task, as `Gains`."""
 
     @property
     def joints(self) -> _Array:
@@ -4133,7 +4404,7 @@ class Task:
 
     @property
     def mask(self) -> list[bool]:
-        """The mask: for each number of the task, whether it is controlled."""
+        """The mask: for each number of the task, whether the number is controlled."""
 
     @property
     def priority(self) -> int:
@@ -4141,7 +4412,7 @@ class Task:
 
     @property
     def weight(self) -> float:
-        """The weight w."""
+        """The weight w of the task."""
 
     @staticmethod
     def angular_momentum(
@@ -4152,7 +4423,7 @@ class Task:
         priority: int = 0,
     ) -> Task:
         """Returns a task for the rate of the angular momentum about the centre of mass: 3 numbers; weight 0.1. Only the gain d
-        acts.
+        is used.
         """
 
     @staticmethod
@@ -4169,9 +4440,9 @@ class Task:
     def contact_force(
         frame: str, weight: float | None = None, mask: Sequence[bool] | None = None, priority: int = 0
     ) -> Task:
-        """Returns a task for the force of this frame's contact; weight 1e-3. It has 6 numbers: force and moment at the
-        contact's centre, along the contact's axes (t₁, t₂, n); for a point contact, the first 3 of them. The task has
-        no gains, and does not act while the contact is off.
+        """Returns a task for the force of this frame's contact; weight 1e-3. The task has 6 numbers: force and moment at
+        the contact's centre, along the contact's axes (t₁, t₂, n); for a point contact, only the 3 numbers of the
+        force. The task has no gains, and does not act while the contact is off.
         """
 
     @staticmethod
@@ -4225,14 +4496,14 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """Returns a task for the velocity of a frame's origin and rotation: 6 numbers, linear first; weight 10. The pose does
-        not matter: only the gain d acts.
+        """Returns a task for the velocity of a frame's origin and rotation: 6 numbers, linear first; weight 10. The pose has
+        no effect: only the gain d is used.
         """
 
 @final
 class WholeBodyController:
-    """A whole-body controller. At each tick it solves a cone program for the accelerations, contact forces and joint
-    efforts that fulfil the tasks best.
+    """A whole-body controller. At each tick the controller solves a cone program for the accelerations, contact forces and
+    joint efforts that fulfil the tasks best.
 
         x = (q̈, f)
         minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
@@ -4244,8 +4515,12 @@ class WholeBodyController:
                      −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
                      bounds on q̈                         from limits of position and velocity: `JointLimits`
 
-    Positions, velocities and accelerations of tasks and contacts are in the world's axes; accelerations are classical.
-    All memory is allocated in the constructor.
+    J and J_c are the Jacobians of tasks and contacts; in Jᵀ f, J belongs to the contact forces. a* is the desired
+    acceleration of a task, and w are weights. f are the contact forces: f_n is the normal component of a force, f₁ and
+    f₂ the tangential components. p is the centre of pressure, τ_n the moment about the normal, and X the pose of a
+    contact. Sᵤ selects the coordinates without motors, S the coordinates with motors. Positions, velocities and
+    accelerations of tasks and contacts are in the world's axes; accelerations are classical. All memory is allocated in
+    the constructor.
 
     model: the robot.
     contacts: a list of `FrictionContact`, each of a different frame; empty for a robot in free fall.
@@ -4285,7 +4560,7 @@ class WholeBodyController:
         """Returns the `References` that keep the robot at rest at a position: all tasks keep their current values, all
         contacts touch and are held, and the contacts share the weight equally.
 
-        q: nq numbers.
+        q: position, nq numbers.
 
         Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) whose length is
         not 1.
@@ -4294,29 +4569,29 @@ class WholeBodyController:
     def kkt_residuals(self, q: ArrayLike, v: ArrayLike, references: References) -> KktResiduals:
         """Returns the distance of the last step from the optimum of its first-priority program, as `KktResiduals`: the
         errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the state and references
-        of the last step again. Use this method in tests: it assembles the program anew.
+        of the last step again. Use this method only in tests, because the method assembles the program anew.
 
-        q: nq numbers; v: nv.
+        q: position, nq numbers; v: velocity, nv numbers.
         references: `References` of this controller.
         """
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
-        """Computes the `Command` at a state. It always returns a command: without a solution, a safe command whose status
-        shows the cause. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an
-        invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the joint or the frame.
-        Other Python threads can run meanwhile.
+        """Computes the `Command` at a state. The method always returns a command. If no solution is found, this is a safe
+        command whose status shows the cause. The status is 'not_finite' for a number that is not finite. The status is
+        'invalid_state' for an invalid quaternion, pair (cos, sin) or rotation of a reference; then `reason` names the
+        joint or the frame. Other Python threads can run meanwhile.
 
-        q: nq numbers; v: nv.
+        q: position, nq numbers; v: velocity, nv numbers.
         references: `References` of this controller.
         """
 
     def track(self, plan: Plan, t: float, references: References) -> None:
         """Sets references to the state of a plan at a time: the joints, and the resulting centre of mass, momentum and
-        frames. Contacts get the plan's activation, and are held at the poses that the plan gives them. The contacts
-        share the force that the plan's acceleration c̈ of the centre of mass requires.
+        frames. Contacts get the plan's activation, and are held at the poses of the plan. The contacts share the force
+        that the plan's acceleration c̈ of the centre of mass requires.
 
         plan: a `Plan` of the same robot with the same number of contacts.
-        t: the time (s); before the first knot and after the last one, the plan rests at that knot.
+        t: the time (s); before the first knot, the plan rests at the first knot; after the last knot, at the last knot.
         references: `References` of this controller, which are changed.
         """
 
@@ -4324,8 +4599,8 @@ def _check_pose(name: str, pose: ArrayLike) -> None:
     """Raises `ValueError` if the rotation in a pose, which is a (4, 4) matrix, is not valid."""
 
 def _check_rotations(name: str, q: ArrayLike, rotations: Sequence[tuple[str, int, int]]) -> None:
-    """Raises `ValueError` if a quaternion or a pair (cos, sin) in a position does not have length 1. Each of them is given
-    by its joint and its range in q.
+    """Raises `ValueError` if a quaternion or a pair (cos, sin) in a position does not have length 1. The caller gives the
+    joint of each quaternion or pair, and its range in q.
     """
 
 def _controller_from_numbers(

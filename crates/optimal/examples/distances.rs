@@ -5,6 +5,7 @@
 //! ```text
 //! cargo run --release -p condyle-optimal --example distances
 //! ```
+#![allow(non_snake_case)] // names follow the literature: J
 
 use condyle_dynamics::{Act, Data, Model, ReferenceFrame, Vec3, forward_kinematics, neutral, robots};
 use condyle_optimal::robot::{

@@ -170,8 +170,8 @@ impl Residual {
     ///     one is fixed to the world, or to a frame of the same robot.
     ///
     /// A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
-    /// distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a pair
-    /// coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis as this direction.
+    /// distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
+    /// pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
     ///
     /// >>> from condyle.optimal import Limit, Residual, Sphere
     /// >>> tool, ball = Sphere([0.0, 0.0, 0.0], 0.05, "tool"), Sphere([0.4, 0.2, 0.5], 0.1)

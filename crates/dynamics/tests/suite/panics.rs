@@ -89,7 +89,7 @@ fn missing_bodies_and_frames_are_named() {
     assert_panic(HERE, &body, || placed.body_jacobian(n, World, J));
     assert_panic(HERE, &frame, || placed.frame_jacobian(n, World, J));
     assert_panic(HERE, &body, || placed.add_body_efforts(n, Force::zero(), &mut [0.0; 7]));
-    assert_panic(HERE, "tau: expected length 7, found 6", || {
+    assert_panic(HERE, "tau: expected 7 numbers, found 6", || {
         placed.add_body_efforts(0, Force::zero(), &mut [0.0; 6]);
     });
     let moving = forward_accelerations(&arm, data, &q, &v, &v);

@@ -31,10 +31,12 @@ fn pairs(model: &Model, count: usize, rng: &mut StdRng) -> Vec<GeometryPair> {
     (0..count).map(|k| GeometryPair::new(geometry(k % 3 == 1), geometry(k % 3 == 0))).collect()
 }
 
+/// Frame of a sphere (`None` for the world), centre and radius.
+type Placed = (Option<usize>, Vec3<f64>, f64);
+
 /// Residual that computes the distances of pairs of spheres from the poses of their frames.
 struct Written {
-    /// Frame (`None` for the world), centre and radius of both spheres of each pair.
-    pairs: Vec<[(Option<usize>, Vec3<f64>, f64); 2]>,
+    pairs: Vec<[Placed; 2]>,
 }
 
 impl Written {
@@ -143,8 +145,8 @@ fn sum_at(model: &Arc<Model>, pairs: Vec<GeometryPair>, x: &[f64]) -> (f64, Vec<
     (value, knot.q.as_slice().to_vec())
 }
 
-/// Checks the value and the Jacobian row of single pairs: the value against the poses of the frames, and the row against
-/// central differences.
+/// Checks the value and the Jacobian row of single pairs: the value against the poses of the frames, and the row
+/// against central differences.
 #[test]
 fn rows_are_central_differences_of_distances() {
     let (mut rng, h) = (StdRng::seed_from_u64(52), 1e-6);
@@ -238,9 +240,9 @@ fn knots_with_other_obstacles_are_single_knots() {
     check_group(action, &model, &mut rng);
 }
 
-/// Creates the problem of an arm that moves from one side of a ball to the other side. If `apart`, each knot has its own
-/// action and an obstacle of another size; otherwise one action represents all knots. Also returns the place of the
-/// ball.
+/// Creates the problem of an arm that moves from one side of a ball to the other side. The ball has another size at
+/// each knot. If `apart`, each knot has its own action; otherwise one action represents all knots. Also returns the
+/// centre of the ball.
 fn around(apart: bool, lower: f64) -> (Problem, Vec<f64>, Vec<f64>, Vec3<f64>) {
     let (arm, horizon) = (Arc::new(robots::arm7()), 16);
     let posture = |q: f64| [vec![q, 0.9, 0.0, 1.2, 0.0, 0.4, 0.0], vec![0.0; 7]].concat();
