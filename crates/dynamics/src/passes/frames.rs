@@ -336,7 +336,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// let (tool, mut data) = (arm.frame("tool")?, Data::new(&arm));
     /// let placements = forward_kinematics(&arm, &mut data, &[0.3; 7]);
     /// let push = Force::at_point(placements.frame(tool).translation, Vec3::new(0.0, 0.0, 10.0));
-    /// let mut tau = [0.0; 7];
+    /// let mut tau = [0.0_f64; 7];
     /// placements.add_body_efforts(arm.frames()[tool].body, push, &mut tau);
     /// assert!(tau[0].abs() < 1e-12); // the first axis is vertical
     /// assert!(tau[1].abs() > 1.0);
