@@ -205,6 +205,12 @@ ARGUMENTS = {
 
 # Types of results and properties, by `Class.name` or the function's name. An entry for a class holds for the methods of
 # this class. Without an entry, a function that takes `out` returns an array, and a static method returns its class.
+SETTABLE = {  # properties that can be assigned, with the type of the value
+    "AugmentedLagrangian.inner": "Mapping[str, Any]",
+    "AugmentedLagrangian.settings": "Mapping[str, Any]",
+    "Fddp.settings": "Mapping[str, Any]",
+}
+
 RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
@@ -302,6 +308,7 @@ RESULTS = {
     "SweepResult": "Sweep.run",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
     "Outcome": "AugmentedLagrangian.outcome",
+    "Mapping[str, Any]": "AugmentedLagrangian.inner AugmentedLagrangian.settings Fddp.settings",
     "AllTerms": "compute_all_terms",
     "CentroidalMap": "centroidal_map",
     "CentroidalMapRate": "centroidal_map_rate",
@@ -437,6 +444,8 @@ class Writer:
         for member in sorted(k for k, v in members.items() if inspect.isdatadescriptor(v)):
             head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
             text += head + docstring(members[member], "        ") + "\n\n"
+            if kind := SETTABLE.get(f"{name}.{member}"):
+                text += f"    @{member}.setter\n    def {member}(self, {member}: {kind}) -> None: ...\n"
         for member, value in sorted(members.items()):  # sorted, because otherwise the linker determines the order
             special = member.startswith("__") and name not in known and f"{name}.{member}" not in known
             if callable(value) and not special and member not in ("__new__", "__repr__"):
@@ -492,7 +501,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
 # Written by python/stubs.py from the extension module. Do not edit.
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias, final
 
 import numpy as np

@@ -644,9 +644,10 @@ class _Solution(NamedTuple):
     ]
     """The reason why the solve ended.
 
-    "constraints_violated": the penalty reached its maximum and limits do not hold; this does not prove that no solution
-    exists. "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no
-    solution exists. `outcome.worst` contains the limit.
+    "regularisation_limit": no acceptable step was found, away from a minimum. "constraints_violated": the penalty
+    reached its maximum, and limits do not hold at a minimum; this does not prove that no solution exists.
+    "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no solution
+    exists. `outcome.worst` contains the limit.
     """
     trace: list[Iteration]
     """The records of the iterations, one for each iteration."""

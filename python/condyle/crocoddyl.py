@@ -70,8 +70,9 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
 
     shooting_problem: the problem of Crocoddyl. Its data are copied. The problem itself is kept only for knots that
     Crocoddyl computes.
-    bounded: whether to use the bounds of controls. Crocoddyl's SolverFDDP and SolverDDP ignore bounds, SolverBoxFDDP
-        and SolverBoxDDP use them.
+    bounded: whether to use the bounds of controls (default: yes). Models of robots bound controls by the effort limits
+        of the joints. `Fddp` then makes the iterations of Crocoddyl's SolverBoxFDDP, not of SolverFDDP. SolverFDDP and
+        SolverDDP ignore bounds; for their iterates, use False.
     strict: whether contents without a counterpart in Condyle are an error.
 
     Raises `ProblemError` for contents without a counterpart in Condyle, if `strict` is set.

@@ -118,6 +118,34 @@ def test_settings_reach_both_solvers() -> None:
         AugmentedLagrangian(problem, penalty_start=0.0).solve(xs, us)
 
 
+def test_settings_change_between_solves() -> None:
+    problem, xs, us = reach()
+    solver = AugmentedLagrangian(problem, max_solves=1, inner={"max_iterations": 2})
+    assert solver.solve(xs, us).status == "max_iterations"
+    solver.settings = {"max_solves": 50}
+    solver.inner = {"max_iterations": 100}
+    assert solver.resume().status == "converged"
+    assert solver.settings["max_solves"] == 50 and solver.settings["tolerance"] == 1e-6
+    assert solver.inner["method"] == "fddp" and solver.inner["time_budget"] is None
+    with pytest.raises(TypeError):
+        solver.settings["max_solves"] = 3  # type: ignore[index]
+    for mapping, error in [({"tolerance": 1e-3, "penalty_max": 1.0}, ProblemError), ({"penalty": 1.0}, ValueError)]:
+        with pytest.raises(error, match="penalty"):
+            solver.settings = mapping
+    assert solver.settings["tolerance"] == 1e-6
+    again = pickle.loads(pickle.dumps(solver))
+    assert dict(again.settings) == dict(solver.settings) and dict(again.inner) == dict(solver.inner)
+    saved = solver.settings
+    solver.settings = {"penalty_start": 1e3, "penalty_max": 1e3}
+    assert solver.resume().status == "converged" and solver.outcome.penalty == 1e3
+    solver.settings = saved
+    assert dict(solver.settings) == dict(saved)
+    alone = Fddp(problem, max_iterations=1)
+    assert len(alone.solve(xs, us).trace) == 1
+    alone.settings = {"max_iterations": 3, "tolerance": 0.0, "time_budget": 60.0}
+    assert len(alone.resume().trace) == 3 and alone.settings["time_budget"] == 60.0
+
+
 def test_what_cannot_be_held_is_said() -> None:
     far = Limit("far", Residual.frame_translation(ARM, "tool", [3.0, 0.0, 0.0]))
     knot = FreeDynamics(ARM, DT, [Cost("effort", 1e-3, Residual.control(np.zeros(7)))])

@@ -278,8 +278,34 @@ fn what_cannot_be_met_is_said() {
     assert_eq!(error, "knot 10: constraint 0 must be at least 2 and at most 1");
 }
 
+/// Checks that an inner solve does not depend on the unit of an inequality. Two problems differ only in the factor of a
+/// row and of its bounds; their multipliers differ by the same factor.
+#[test]
+fn a_row_is_measured_in_its_unit() {
+    let solve = |unit: f64, max_solves: usize| {
+        let rows = Rows::new(&[(&[0.0, 0.0, 0.0, unit, 0.0], -unit, unit)]);
+        let running = Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows));
+        let end = Rows::new(&[(&[1.0, 0.0, 0.0], 0.95, 0.95)]);
+        let terminal = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
+        let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(running)], vec![0; 10], Box::new(terminal)).unwrap();
+        let mut solver = AugmentedLagrangian::new(&problem);
+        (solver.settings.max_solves, solver.settings.penalty_start) = (max_solves, 1e3);
+        let solution = solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).unwrap().clone();
+        let multipliers: Vec<f64> = solver.outcome().multipliers[..10].iter().map(|y| y[0] * unit).collect();
+        (solution, multipliers)
+    };
+    // a power of two: both problems have the same rounding errors
+    let (one, other) = (solve(1.0, 1).0, solve(64.0, 1).0);
+    assert!(one.us.iter().any(|u| *u > 1.0 + 1e-6), "{:?}", one.us);
+    assert_eq!((one.us, one.trace), (other.us, other.trace));
+    let ((one, y), (other, others)) = (solve(1.0, 50), solve(64.0, 50));
+    assert_eq!([one.status, other.status], [Status::Converged; 2]);
+    assert!(y.iter().any(|y| *y > 1e-2));
+    assert!(y.iter().zip(&others).all(|(y, other)| (y - other).abs() < 1e-4), "{y:?} {others:?}");
+}
+
 /// Checks that an inner solve that stops early at the largest penalty keeps its status, because it does not prove that
-/// constraints are violated.
+/// constraints are violated. With `accept` above 1, no step of the expected size is accepted.
 #[test]
 fn a_solve_that_stops_early_claims_nothing() {
     let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -1.0, 1.0)]);
@@ -289,12 +315,40 @@ fn a_solve_that_stops_early_claims_nothing() {
     let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(running)], vec![0; 10], Box::new(terminal)).unwrap();
     let mut solver = AugmentedLagrangian::new(&problem);
     (solver.settings.penalty_start, solver.settings.penalty_max) = (1e8, 1e8);
-    solver.inner.max_iterations = 1;
+    (solver.inner.max_iterations, solver.settings.max_solves) = (1, 1);
     let status = solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).unwrap().status;
     assert_eq!(status, Status::MaxIterations);
-    (solver.inner.max_iterations, solver.inner.regularisation_start) = (100, 9e8);
+    (solver.inner.max_iterations, solver.settings.max_solves) = (100, 50);
+    solver.inner.accept = 1e3; // no step lowers the cost by so much
     let status = solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).unwrap().status;
     assert!(!matches!(status, Status::Infeasible | Status::ConstraintsViolated), "{status:?}");
+    assert_eq!(status, Status::RegularisationLimit);
+}
+
+/// Checks that a solve whose constraints cannot hold leaves the multipliers and the penalty of the solve before it. A
+/// second failure in succession deletes them.
+#[test]
+fn one_failed_solve_leaves_the_multipliers() {
+    let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -1.0, 1.0)]);
+    let end = Rows::new(&[(&[1.0, 0.0, 0.0], 0.5, 0.5)]);
+    let running = Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows));
+    let terminal = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
+    let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(running)], vec![0; 10], Box::new(terminal)).unwrap();
+    let mut solver = AugmentedLagrangian::new(&problem);
+    assert_eq!(solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).unwrap().status, Status::Converged);
+    let penalty = solver.outcome().penalty;
+    for (failures, kept) in [(1, true), (2, false)] {
+        let mut solver = solver.clone();
+        problem.set_x0(&[-3.0, 0.0, 0.0]).unwrap();
+        for _ in 0..failures {
+            assert_eq!(solver.resume(&mut problem).unwrap().status, Status::ConstraintsViolated);
+        }
+        problem.set_x0(&[0.0; 3]).unwrap();
+        (solver.inner.max_iterations, solver.settings.max_solves) = (0, 1);
+        solver.resume(&mut problem).unwrap();
+        assert_eq!(solver.outcome().multipliers.iter().flatten().any(|y| *y != 0.0), kept);
+        assert!(!kept || solver.outcome().penalty == penalty);
+    }
 }
 
 /// Checks when a violated constraint on the initial state proves infeasibility: at a knot without controls. At a knot

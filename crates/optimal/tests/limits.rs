@@ -2,6 +2,8 @@
 //! friction cones.
 #![allow(non_snake_case)] // names follow the literature: G
 
+#[path = "limits/rules.rs"]
+mod rules;
 #[path = "limits/starts.rs"]
 mod starts;
 

@@ -9,7 +9,7 @@ use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyMapping, PyMappingProxy};
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -36,6 +36,25 @@ macro_rules! set {
     ($field:expr, $value:ident, $name:expr, $read:ident) => { $field = $read(&$value)? };
 }
 
+/// Defines two functions for a type of settings. The first sets the fields that are given by name; the second returns
+/// all fields as a dict. A field in another form than in Rust names its reader and its writer.
+macro_rules! named {
+    ($kind:ty, $set:ident, $show:ident, { $($field:ident $(by $read:ident and $write:ident)?),* $(,)? }) => {
+        fn $set(s: &mut $kind, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+            set!(s, given, { $($field $(by $read)?),* });
+            Ok(())
+        }
+
+        fn $show<'py>(s: &$kind, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+            let all = PyDict::new(py);
+            $(all.set_item(stringify!($field), named!(s.$field $(, $write)?))?;)*
+            Ok(all)
+        }
+    };
+    ($value:expr) => { $value };
+    ($value:expr, $write:ident) => { $write($value) };
+}
+
 /// A type of setting, with a description of its valid values.
 trait Setting {
     fn expected(&self) -> &'static str;
@@ -58,33 +77,56 @@ fn wrong_setting(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr 
     PyValueError::new_err(format!("settings: {name}: expected {expected}, found {found}"))
 }
 
-/// Applies the given settings of FDDP.
-fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
-    fn method(given: &Bound<'_, PyAny>) -> PyResult<rust::DdpMethod> {
-        match given.extract::<String>()?.as_str() {
-            "fddp" => Ok(rust::DdpMethod::Fddp),
-            "ddp" => Ok(rust::DdpMethod::Ddp),
-            other => Err(wrong_word("method", "'fddp' or 'ddp'", other)),
-        }
+fn method(given: &Bound<'_, PyAny>) -> PyResult<rust::DdpMethod> {
+    match given.extract::<String>()?.as_str() {
+        "fddp" => Ok(rust::DdpMethod::Fddp),
+        "ddp" => Ok(rust::DdpMethod::Ddp),
+        other => Err(wrong_word("method", "'fddp' or 'ddp'", other)),
     }
-    fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
-        let seconds: Option<f64> = given.extract()?;
-        let wrong = |seconds| {
-            PyValueError::new_err(format!(
-                "time_budget: expected at least 0 seconds (and at most 1.8e19, or inf), found {seconds:e}"
-            ))
-        };
-        let limit = seconds.filter(|&s| s != f64::INFINITY); // an infinite time means no limit
-        limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
-    }
-    set!(s, given, {
-        method by method, second_order, inverse_dynamics_form, project_warm_start,
-        max_iterations, time_budget by duration, segments, threads,
-        tolerance, tolerance_bounded, step_lengths, accept, accept_ascent, flat,
-        regularisation_start, regularisation_min, regularisation_max, regularisation_factor,
-        regularisation_decrease_above, regularisation_increase_below
-    });
-    Ok(())
+}
+
+fn method_name(method: rust::DdpMethod) -> &'static str {
+    method.name()
+}
+
+/// Reads a time in seconds; None and infinity mean no limit.
+fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
+    let seconds: Option<f64> = given.extract()?;
+    let wrong = |seconds| {
+        PyValueError::new_err(format!(
+            "time_budget: expected at least 0 seconds (and at most 1.8e19, or inf), found {seconds:e}"
+        ))
+    };
+    let limit = seconds.filter(|&s| s != f64::INFINITY); // an infinite time means no limit
+    limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
+}
+
+fn seconds(duration: Option<Duration>) -> Option<f64> {
+    duration.map(|duration| duration.as_secs_f64())
+}
+
+named!(rust::Settings, set_fddp, show_fddp, {
+    method by method and method_name, second_order, inverse_dynamics_form, project_warm_start,
+    max_iterations, time_budget by duration and seconds, segments, threads,
+    tolerance, tolerance_bounded, step_lengths, accept, accept_ascent, flat,
+    regularisation_start, regularisation_min, regularisation_max, regularisation_factor,
+    regularisation_decrease_above, regularisation_increase_below,
+});
+
+named!(rust::ConstraintSettings, set_constraints, show_constraints, {
+    max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor, restart,
+});
+
+/// Returns settings as a mapping that cannot be changed, because a change would have no effect on the solver.
+fn read_only(settings: Bound<'_, PyDict>) -> Bound<'_, PyMappingProxy> {
+    PyMappingProxy::new(settings.py(), settings.as_mapping())
+}
+
+/// Returns a mapping of settings as a dict.
+fn dict<'py>(given: &Bound<'py, PyMapping>) -> PyResult<Bound<'py, PyDict>> {
+    let copy = PyDict::new(given.py());
+    copy.update(given)?;
+    Ok(copy)
 }
 
 /// The output that a user wants after each iteration of a solve.
@@ -150,15 +192,15 @@ fn run<'py, S: Send>(
 /// Defines a solver class. The macro writes the methods that all solvers have. The constructor and the methods of only
 /// one class are arguments of the macro.
 macro_rules! solver {
-    ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
+    ($(#[$doc:meta])* $class:ident, $set:ident, $show:ident { $($own:tt)* }) => {
         $(#[$doc])*
         #[pyclass(frozen, module = "condyle.optimal")]
         pub(crate) struct $class {
             problem: Py<Problem>,
             solver: Mutex<rust::$class>,
-            /// The settings that the user passed; `inner` are the settings of the inner solver.
+            /// The settings that the user set; `inner` are the settings of the inner solver, if there is one.
             settings: Py<PyDict>,
-            inner: Option<Py<PyDict>>,
+            inner: Py<PyDict>,
         }
 
         #[pymethods]
@@ -230,13 +272,36 @@ macro_rules! solver {
                 (!solution.timings.total.is_zero()).then(|| give(py, &self.problem, &problem, solution)).transpose()
             }
 
+            /// All settings by name, as a read-only mapping.
+            ///
+            /// An assignment of a mapping changes the settings that it names; the others stay. The next `solve` or
+            /// `resume` uses them: `solver.settings = {"tolerance": 1e-4}`.
+            ///
+            /// Raises `ProblemError` for an invalid number; then no setting changes.
+            #[getter(settings)]
+            fn all_settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+                Ok(read_only($show(&lock("solver", &self.solver)?.settings, py)?))
+            }
+
+            #[setter(settings)]
+            fn change_settings(&self, settings: &Bound<'_, PyMapping>) -> PyResult<()> {
+                let given = dict(settings)?;
+                let mut solver = lock("solver", &self.solver)?;
+                let mut changed = solver.settings.clone();
+                $set(&mut changed, Some(&given))?;
+                changed.check().map_err(problem_error)?;
+                solver.settings = changed;
+                self.settings.bind(given.py()).update(given.as_mapping())
+            }
+
             fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
                 let mut text = format!("<condyle.optimal.{} of {}", stringify!($class), self.problem.bind(py).repr()?);
                 for (name, value) in self.settings.bind(py).iter() {
                     text += &format!(", {name} {}", value.repr()?);
                 }
-                if let Some(inner) = &self.inner {
-                    text += &format!(", inner {}", inner.bind(py).repr()?);
+                let inner = self.inner.bind(py);
+                if !inner.is_empty() {
+                    text += &format!(", inner {}", inner.repr()?);
                 }
                 Ok(text + ">")
             }
@@ -245,8 +310,7 @@ macro_rules! solver {
             /// settings. The solution is not included.
             fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
                 let (py, Self { problem, settings, inner, .. }) = (slf.py(), slf.get());
-                let inner = inner.as_ref().map(|inner| inner.clone_ref(py));
-                let arguments = (problem.clone_ref(py), inner, settings.clone_ref(py));
+                let arguments = (problem.clone_ref(py), inner.clone_ref(py), settings.clone_ref(py));
                 Ok((slf.get_type().getattr("_make")?, arguments).into_pyobject(py)?.into_any())
             }
 
@@ -312,7 +376,7 @@ solver! {
 ///     `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
 ///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
 ///     `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
-Fddp {
+Fddp, set_fddp, show_fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]
     fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
@@ -334,10 +398,10 @@ impl Fddp {
     ) -> PyResult<Self> {
         let py = problem.py();
         let mut solver = rust::Fddp::new(&*lock("problem", &problem.get().inner)?);
-        set(&mut solver.settings, settings)?;
+        set_fddp(&mut solver.settings, settings)?;
         solver.settings.check().map_err(problem_error)?;
         let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
-        Ok(Self { problem, solver, settings, inner: None })
+        Ok(Self { problem, solver, settings, inner: kept(py, None)? })
     }
 }
 
@@ -345,19 +409,27 @@ solver! {
 /// The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 ///
 /// The method repeats two steps. First FDDP minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖² with z = g + μ y, where
-/// ℓ is the cost of a knot, g its limits, y their multipliers, and Π the projection onto the bounds. Then, if the
-/// limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. The method ends when the violation of limits and the
-/// gradient of ℓ + yᵀg are below the tolerances.
+/// ℓ is the cost of a knot, g its limits, y their multipliers, and Π the projection onto the bounds. If FDDP found no
+/// minimum, it continues. If the limits hold well enough, or the penalty 1/μ is at its maximum, y ← (z − Π z) / μ.
+/// Otherwise μ is reduced. The method ends when the violation of limits and the gradient of ℓ + yᵀg are below the
+/// tolerances.
 ///
-/// `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve, unless
-/// the last solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
-/// multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. The status is
-/// "constraints_violated" if the penalty reached its maximum and the limits do not hold. This does not prove that no
-/// solution exists: another warm start may find one. The status is "infeasible" if the initial state itself violates a
-/// limit of knot 0 that no control can change. `outcome.worst` contains the knot, the limit and the amount of the
-/// largest violation. The cost of the solution includes the penalties of the limits; the cost of `outcome` does not.
-/// The solution's trace and gains are from the last inner solve, its timings from the whole solve. Controls of a warm
-/// start are moved into their bounds.
+/// The penalty of a row lower < r < upper is divided by the square of its smaller finite bound other than 0, if that
+/// bound exceeds 1 in absolute value. Tolerances, violations and multipliers are in the units of the row.
+///
+/// `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve. If the
+/// last solve failed, they are from the solve before it. They start again after two failed solves in succession, or
+/// after "not_finite". `shift` also shifts the multipliers. Between `solve` and `resume`, `settings` and `inner` may be
+/// assigned.
+///
+/// A solution is "converged" when the residuals of `outcome` are below the tolerances. The status is
+/// "constraints_violated" if limits do not hold at minima of the largest penalty, and updates of the multipliers do not
+/// help. This does not prove that no solution exists: another warm start may find one. The status is
+/// "regularisation_limit" if an inner solve found no acceptable step, and did not end at a minimum. The status is
+/// "infeasible" if the initial state itself violates a limit of knot 0 that no control can change. `outcome.worst`
+/// contains the knot, the limit and the amount of the largest violation. The cost of the solution includes the
+/// penalties of the limits; the cost of `outcome` does not. The solution's trace and gains are from the last inner
+/// solve, its timings from the whole solve. Controls of a warm start are moved into their bounds.
 ///
 /// problem: the problem to solve. All memory is allocated once, for the size of this problem.
 /// inner: a dict of settings of `Fddp` for the inner solves. The tolerances of inner solves are chosen automatically;
@@ -365,10 +437,11 @@ solver! {
 /// settings: any of the following settings, by name. `tolerance`: the largest accepted distance of a limit from its
 ///     bounds. `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the
 ///     maximum number of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve,
-///     its maximum, and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem
+///     its maximum, and the factor by which it increases; an equal `penalty_start` and `penalty_max` fix the penalty.
+///     `restart`: whether to repeat a failed `solve` of a problem
 ///     with limits or bounds once (default: yes). The second solve starts from the initial state, held still at all
-///     knots. A solve fails if it is not finite, or violates limits at the largest penalty. The better result is
-///     returned.
+///     knots. A solve fails if it is not finite, violates limits at the largest penalty, or finds no acceptable step
+///     while limits are violated. The better result is returned.
 ///
 /// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()
@@ -382,7 +455,7 @@ solver! {
 /// >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
 /// >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
 /// ('converged', True, True)
-AugmentedLagrangian {
+AugmentedLagrangian, set_constraints, show_constraints {
     #[new]
     #[pyo3(signature = (problem, inner=None, **settings))]
     fn new(
@@ -391,6 +464,24 @@ AugmentedLagrangian {
         settings: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         Self::with(problem, inner, settings)
+    }
+
+    /// All settings of the inner solves by name, as a read-only mapping. An assignment changes the settings that it
+    /// names, as for `settings`.
+    #[getter(inner)]
+    fn all_inner<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMappingProxy>> {
+        Ok(read_only(show_fddp(&lock("solver", &self.solver)?.inner, py)?))
+    }
+
+    #[setter(inner)]
+    fn change_inner(&self, inner: &Bound<'_, PyMapping>) -> PyResult<()> {
+        let given = dict(inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let mut changed = solver.inner.clone();
+        set_fddp(&mut changed, Some(&given))?;
+        changed.check().map_err(problem_error)?;
+        solver.inner = changed;
+        self.inner.bind(given.py()).update(given.as_mapping())
     }
 
     /// The violation of limits and other results of the last solve, as an `Outcome`.
@@ -421,13 +512,10 @@ impl AugmentedLagrangian {
     ) -> PyResult<Self> {
         let py = problem.py();
         let mut solver = rust::AugmentedLagrangian::new(&*lock("problem", &problem.get().inner)?);
-        set(&mut solver.inner, inner)?;
+        set_fddp(&mut solver.inner, inner)?;
         solver.inner.check().map_err(problem_error)?;
-        set!(solver.settings, settings, {
-            max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor, restart
-        });
-        let inner = inner.map(|inner| kept(py, Some(inner))).transpose()?;
-        let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
-        Ok(Self { problem, solver, settings, inner })
+        set_constraints(&mut solver.settings, settings)?;
+        let (problem, solver) = (problem.unbind(), Mutex::new(solver));
+        Ok(Self { problem, solver, settings: kept(py, settings)?, inner: kept(py, inner)? })
     }
 }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// ```
 ///
 /// whose derivative with respect to g is e / μ. Its Gauss–Newton curvature is 1/μ outside the bounds and at equalities,
-/// and 0 elsewhere.
+/// and 0 elsewhere. Each row may have its own [ratio](Self::scale) of μ; y and g are never scaled.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Multipliers {
     mu: f64,
@@ -21,6 +21,9 @@ pub(crate) struct Multipliers {
     y: Vec<f64>,
     /// Multipliers e / μ after the next update, from each knot's last derivatives. Written by: `slopes`.
     next: Vec<f64>,
+    /// Ratios μ of a row / μ of the action; a row without an entry has the ratio 1. Shape: knots × size. Written by:
+    /// `start`, `scale`.
+    ratio: Vec<f64>,
     /// Violations g − Π g from each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by:
     /// `slopes`.
     excess: Vec<f64>,
@@ -31,8 +34,9 @@ pub(crate) struct Multipliers {
 impl Clone for Multipliers {
     fn clone(&self) -> Self {
         let Self { mu, size, .. } = *self;
-        let [y, next, excess, terms] = [&self.y, &self.next, &self.excess, &self.terms].map(Vec::clone);
-        Self { mu, size, y, next, excess, terms }
+        let [y, next, ratio, excess, terms] =
+            [&self.y, &self.next, &self.ratio, &self.excess, &self.terms].map(Vec::clone);
+        Self { mu, size, y, next, ratio, excess, terms }
     }
 
     /// Copies the multipliers; does not allocate if the number of knots is the same.
@@ -40,6 +44,7 @@ impl Clone for Multipliers {
         (self.mu, self.size) = (other.mu, other.size);
         self.y.clone_from(&other.y);
         self.next.clone_from(&other.next);
+        self.ratio.clone_from(&other.ratio);
         self.excess.clone_from(&other.excess);
         self.terms.clone_from(&other.terms);
     }
@@ -97,6 +102,16 @@ pub(crate) fn leave_a_value(lower: f64, upper: f64) -> bool {
 /// Default penalty 1/μ, which is used until a solver sets another.
 pub(crate) const PENALTY: f64 = 10.0;
 
+/// Returns the unit in which the penalty measures a row: the smaller absolute value of its finite bounds other than 0,
+/// and at least 1. An equality has the unit 1, because its bound is an offset and no range.
+fn unit(lower: f64, upper: f64) -> f64 {
+    if lower == upper {
+        return 1.0;
+    }
+    let bounds = [lower, upper].map(f64::abs).into_iter().filter(|bound| bound.is_finite() && *bound != 0.0);
+    bounds.reduce(f64::min).unwrap_or(1.0).max(1.0)
+}
+
 /// Returns the signed distance of z from the interval [lower, upper]; zero within it.
 #[inline(always)]
 fn outside(z: f64, lower: f64, upper: f64) -> f64 {
@@ -110,7 +125,7 @@ fn outside(z: f64, lower: f64, upper: f64) -> f64 {
 impl Multipliers {
     /// Creates multipliers of zero, for at most `size` constraints per knot.
     pub(crate) fn new(size: usize) -> Self {
-        Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], excess: vec![], terms: vec![] }
+        Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], ratio: vec![], excess: vec![], terms: vec![] }
     }
 
     /// Returns the maximum number of constraints of a knot.
@@ -118,15 +133,32 @@ impl Multipliers {
         self.size
     }
 
-    /// Sets the multipliers of knot t to zero, and sets μ; the action serves `knots` knots. Allocates at the first
-    /// call.
+    /// Sets the multipliers of knot t to zero, the ratios of its rows to one, and μ; the action serves `knots` knots.
+    /// Allocates at the first call.
     pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
         self.mu = mu;
         for numbers in [&mut self.y, &mut self.next, &mut self.excess] {
             numbers.resize(knots * self.size, 0.0);
             numbers[t * self.size..(t + 1) * self.size].fill(0.0);
         }
+        self.ratio.resize(knots * self.size, 1.0);
+        self.ratio[t * self.size..(t + 1) * self.size].fill(1.0);
         self.terms.resize(knots, 0.0);
+    }
+
+    /// Scales the rows of knot t by their bounds: μ of a row is multiplied by the square of its [`unit`]. The penalty
+    /// then applies to g / unit. `start` must have been called before.
+    pub(crate) fn scale(&mut self, t: usize, lower: &[f64], upper: &[f64]) {
+        let rows = self.ratio[t * self.size..].iter_mut();
+        for (ratio, (&lower, &upper)) in rows.zip(lower.iter().zip(upper)) {
+            *ratio = unit(lower, upper).powi(2);
+        }
+    }
+
+    /// Returns μ of a row of knot t.
+    #[inline(always)]
+    fn mu(&self, t: usize, row: usize) -> f64 {
+        self.mu * self.ratio.get(t * self.size + row).copied().unwrap_or(1.0)
     }
 
     pub(crate) fn set_mu(&mut self, mu: f64) {
@@ -165,9 +197,9 @@ impl Multipliers {
     pub(crate) fn value(&self, t: usize, first: usize, g: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
         let mut term = 0.0;
         for i in 0..g.len() {
-            let y = self.y(t, first + i);
-            let e = outside(g[i] + self.mu * y, lower[i], upper[i]);
-            term += 0.5 * (e * e / self.mu - self.mu * y * y);
+            let (y, mu) = (self.y(t, first + i), self.mu(t, first + i));
+            let e = outside(g[i] + mu * y, lower[i], upper[i]);
+            term += 0.5 * (e * e / mu - mu * y * y);
         }
         term
     }
@@ -190,9 +222,10 @@ impl Multipliers {
         dd: &mut [f64],
     ) {
         for i in 0..g.len() {
-            let e = outside(g[i] + self.mu * self.y(t, first + i), lower[i], upper[i]);
+            let mu = self.mu(t, first + i);
+            let e = outside(g[i] + mu * self.y(t, first + i), lower[i], upper[i]);
             let active = e != 0.0 || lower[i] == upper[i];
-            (d[i], dd[i]) = (e / self.mu, if active { 1.0 / self.mu } else { 0.0 });
+            (d[i], dd[i]) = (e / mu, if active { 1.0 / mu } else { 0.0 });
         }
         let term = self.value(t, first, g, lower, upper);
         if let Some(sum) = self.terms.get_mut(t) {

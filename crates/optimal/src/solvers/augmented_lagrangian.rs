@@ -7,6 +7,7 @@ use super::solver_loop::{Pass, SolverLoop};
 use super::start::quasi_static_start;
 use super::watch::{Observer, Recent, Watch};
 use crate::error::Error;
+use crate::lq::LqKnot;
 use crate::problem::Problem;
 use crate::time::Instant;
 use nalgebra::DVector;
@@ -18,10 +19,18 @@ use nalgebra::DVector;
 ///
 /// ```text
 /// repeat   minimise   Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,   z = g + μ y        by FDDP, to a tolerance ω
-///          if the violation is below the tolerance η:   y ← (z − Π z) / μ,   and η and ω become smaller
-///          else:                                        μ becomes smaller
+///          if FDDP stopped before ω:                      continue the minimisation
+///          if the violation is below the tolerance η, or the penalty 1/μ is at its limit:
+///                                                         y ← (z − Π z) / μ,   and η and ω become smaller
+///          else:                                          μ becomes smaller
 /// until    the violations, and the gradient of the Lagrangian ℓ + yᵀg under the dynamics, are below the tolerances
 /// ```
+///
+/// Multipliers and penalty change only after an inner solve that found a minimum. The gaps of the dynamics have no part
+/// in this decision, but a converged solution has none. Each row is measured in its own unit: the penalty of an
+/// inequality is divided by the square of its smaller finite bound other than 0, if that bound exceeds 1 in absolute
+/// value. An effort limit of 87 N m and a joint limit of 2 rad then have similar weights. Tolerances, violations and
+/// multipliers are not scaled.
 ///
 /// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
 /// receding horizon, call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the
@@ -82,18 +91,68 @@ pub struct AugmentedLagrangian {
     pub inner: Settings,
     solver: SolverLoop,
     outcome: Outcome,
-    /// Adjoint state λ of a knot, and scratch for the adjoint state of the previous knot.
-    adjoint: [DVector<f64>; 2],
+    /// Adjoint state λ of a knot, scratch for the adjoint state of the previous knot, and the term Kᵀs.
+    adjoint: [DVector<f64>; 3],
     /// Last durations of `measure`.
     measuring: Recent,
-    /// Whether the next solve must reset the multipliers and the penalty.
+    /// Whether the last solve failed, so that its multipliers and its penalty are useless.
     lost: bool,
+    kept: Kept,
 }
+
+/// Multipliers and penalty from which the next resumed solve starts.
+#[derive(Debug, Clone, Default)]
+struct Kept {
+    /// Multipliers of each knot, from the last solve that did not fail.
+    multipliers: Vec<Vec<f64>>,
+    /// Penalty of the same solve; `None` if there is no such solve.
+    penalty: Option<f64>,
+    /// Whether a solve has failed since.
+    failed: bool,
+}
+
+impl Kept {
+    /// Takes the result of a solve. One failed solve leaves the earlier multipliers; a second one in succession, or a
+    /// solve that is not finite, deletes them.
+    fn take(&mut self, outcome: &Outcome, status: Status, lost: bool) {
+        if !lost {
+            self.multipliers.clone_from(&outcome.multipliers);
+            self.penalty = Some(outcome.penalty);
+        } else if self.failed || status == Status::NotFinite {
+            self.penalty = None;
+        }
+        self.failed = lost;
+    }
+}
+
+/// Progress of the multipliers' updates at the largest penalty.
+#[derive(Debug)]
+struct Progress {
+    /// Smallest violation so far.
+    smallest: f64,
+    /// Number of consecutive updates that did not lower the violation.
+    stalled: usize,
+}
+
+impl Progress {
+    /// Takes the violation before an update. Returns whether the last updates made no progress.
+    fn stalls(&mut self, violation: f64) -> bool {
+        self.stalled = if violation < PROGRESS * self.smallest { 0 } else { self.stalled + 1 };
+        self.smallest = self.smallest.min(violation);
+        self.stalled >= STALLED
+    }
+}
+
+/// Largest ratio of a violation to the smallest earlier violation that counts as progress.
+const PROGRESS: f64 = 0.99;
+
+/// Number of consecutive updates without progress after which a solve ends.
+const STALLED: usize = 3;
 
 /// Residuals of the stopping tests that [`Outcome`] does not contain.
 struct Residuals {
-    /// Largest gap, or largest violation of a constraint that controls can change, whichever is larger.
-    primal: f64,
+    /// Largest violation of a constraint that controls can change.
+    violation: f64,
     /// Largest violation of a constraint that depends only on the initial state x̂₀.
     fixed: Option<Violation>,
     /// Whether the trajectory minimises the augmented Lagrangian, except for rounding errors.
@@ -112,9 +171,10 @@ impl AugmentedLagrangian {
             inner: Settings::default(),
             solver: SolverLoop::new(problem),
             outcome: Outcome::default(),
-            adjoint: [(); 2].map(|()| DVector::zeros(problem.ndx())),
+            adjoint: [(); 3].map(|()| DVector::zeros(problem.ndx())),
             measuring: Recent::default(),
             lost: false,
+            kept: Kept::default(),
         }
     }
 
@@ -122,10 +182,13 @@ impl AugmentedLagrangian {
     /// start at zero.
     ///
     /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances.
-    /// It is [`Status::ConstraintsViolated`] if the penalty reached its limit and the inner solve found a minimum at
-    /// which the constraints do not hold. It is [`Status::Infeasible`] if x̂₀ violates a constraint of knot 0 that is a
-    /// function of the state alone; the solve then continues under the other constraints. In all other cases the status
-    /// is the status of the inner solve that stopped early.
+    /// It is [`Status::ConstraintsViolated`] if inner solves at the largest penalty found minima at which constraints
+    /// are violated. Three updates of the multipliers in succession then did not lower the violation by a hundredth. It
+    /// is [`Status::RegularisationLimit`] if an inner solve found no acceptable step and did not end at a minimum. It
+    /// is [`Status::Infeasible`] if x̂₀ violates a constraint of knot 0 that is a function of the state alone; the
+    /// solve then continues under the other constraints. It is [`Status::MaxIterations`] after
+    /// [`max_solves`](ConstraintSettings::max_solves) inner solves. In all other cases the status is the status of the
+    /// inner solve that stopped early.
     ///
     /// The cost of the solution includes the terms of the constraints; the cost of the outcome does not. After the
     /// solve, the multipliers in the problem are zero again.
@@ -157,9 +220,12 @@ impl AugmentedLagrangian {
     }
 
     /// Solves `problem` from the last solution, its multipliers and its penalty. The problem may have a new initial
-    /// state or new references, or may be [shifted](Self::shift) to the next horizon. If the last solve ended as
-    /// [`Status::NotFinite`], or with violated constraints at the largest penalty, the multipliers and the penalty are
-    /// reset. The multipliers then start at zero, and the penalty at its first value.
+    /// state or new references, or may be [shifted](Self::shift) to the next horizon. The settings may be others.
+    ///
+    /// A solve has failed if it ended as [`Status::NotFinite`] or [`Status::ConstraintsViolated`], or found no
+    /// acceptable step while constraints were violated. After one failed solve, the multipliers and the penalty are
+    /// taken from the solve before it. After two failed solves in succession, or after [`Status::NotFinite`], the
+    /// multipliers start at zero, and the penalty at its first value.
     ///
     /// # Errors
     /// The same errors as [`solve`](Self::solve).
@@ -186,7 +252,8 @@ impl AugmentedLagrangian {
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         self.solver.shift(problem, &self.inner)?;
         let horizon = problem.horizon();
-        if let Some(knots) = self.outcome.multipliers.get_mut(..horizon) {
+        for multipliers in [&mut self.outcome.multipliers, &mut self.kept.multipliers] {
+            let Some(knots) = multipliers.get_mut(..horizon) else { continue };
             knots.rotate_left(1);
             if let [.., before, last] = knots {
                 last.clone_from(before);
@@ -221,8 +288,9 @@ impl AugmentedLagrangian {
         {
             result = self.restart(problem, &settings, start, *status, &mut watch);
         }
-        if result.is_ok() {
+        if let Ok(status) = result {
             problem.multipliers(&mut self.outcome.multipliers);
+            self.kept.take(&self.outcome, status, self.lost);
         }
         problem.forget_multipliers();
         self.solver.iterate.solution.status = result?;
@@ -238,13 +306,15 @@ impl AugmentedLagrangian {
         watch: &mut Watch<'_>,
     ) -> Result<Status, Error> {
         self.settings.check()?;
-        let goes_on = warm_start.is_none() && !self.lost && self.outcome.solves > 0;
         let ConstraintSettings { tolerance, tolerance_dual, penalty_start, penalty_max, .. } = self.settings;
-        let penalty = if goes_on { self.outcome.penalty.clamp(penalty_start, penalty_max) } else { penalty_start };
+        if warm_start.is_some() {
+            self.kept.penalty = None;
+        }
+        let penalty = self.kept.penalty.map_or(penalty_start, |penalty| penalty.clamp(penalty_start, penalty_max));
         let mut mu = 1.0 / penalty;
         problem.start_constraints(mu)?;
-        if goes_on {
-            problem.set_multipliers(&self.outcome.multipliers);
+        if self.kept.penalty.is_some() {
+            problem.set_multipliers(&self.kept.multipliers);
         }
         let multipliers = std::mem::take(&mut self.outcome.multipliers);
         self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
@@ -252,15 +322,16 @@ impl AugmentedLagrangian {
         self.solver.begin(problem, settings, warm_start)?;
         // tolerances of one pass, both functions of μ: eta for the constraints, omega for the gradient
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
-        let mut status = Status::MaxIterations;
-        let mut residuals = Residuals { primal: f64::INFINITY, fixed: None, stationary: false };
+        let mut progress = Progress { smallest: f64::INFINITY, stalled: 0 };
+        let (mut status, mut continues) = (Status::MaxIterations, false);
+        let mut residuals = Residuals { violation: f64::INFINITY, fixed: None, stationary: false };
         for solve in 0..self.settings.max_solves {
             // the tolerance of a pass is dual², because the expected decrease of the cost is about the square of the
             // gradient
             let dual = omega.max(0.1 * tolerance_dual);
             let resumes = warm_start.is_none() && solve == 0;
             self.solver.clock.reserve = self.measuring.median();
-            let pass = Pass { tolerance: Some(dual * dual), trusts_start: true, resumes };
+            let pass = Pass { tolerance: Some(dual * dual), trusts_start: true, resumes, continues };
             let stopped = self.solver.pass(problem, settings, pass, watch);
             self.outcome.solves += 1;
             self.outcome.iterations += self.solver.iterate.solution.trace.len();
@@ -270,24 +341,37 @@ impl AugmentedLagrangian {
                 self.lost = stopped == Status::NotFinite;
                 return Ok(stopped);
             }
-            if residuals.primal <= eta.max(tolerance) {
+            let (violation, gap) = (residuals.violation, self.solver.iterate.solution.gap);
+            if larger(gap, violation) <= tolerance && self.outcome.dual <= tolerance_dual {
                 problem.update_multipliers();
-                if residuals.primal <= tolerance && self.outcome.dual <= tolerance_dual {
-                    status = Status::Converged;
-                    break;
+                status = Status::Converged;
+                break;
+            }
+            status = if stopped == Status::Converged { Status::MaxIterations } else { stopped };
+            let small = gap <= tolerance && self.outcome.dual <= dual;
+            let solved = stopped == Status::Converged || residuals.stationary || small;
+            continues = !solved;
+            if !solved {
+                let moved = self.solver.iterate.solution.trace.iter().any(|iteration| iteration.accepted);
+                if stopped == Status::RegularisationLimit && !moved {
+                    self.lost = violation > tolerance;
+                    break; // the next pass would repeat this one
                 }
-                eta = (eta * mu.powf(0.9)).max(0.1 * tolerance);
-                omega *= mu;
-            } else {
-                if mu <= 1.0 / penalty_max {
-                    let solved = stopped == Status::Converged || residuals.stationary;
-                    (status, self.lost) = (if solved { Status::ConstraintsViolated } else { stopped }, true);
-                    break;
-                }
+                continue;
+            }
+            let met = violation <= eta.max(tolerance);
+            if !met && mu > 1.0 / penalty_max {
                 mu = (mu / self.settings.penalty_factor).max(1.0 / penalty_max);
                 (eta, omega) = (mu.powf(0.1), mu);
                 problem.set_penalty(mu);
                 self.outcome.penalty = 1.0 / mu;
+                continue;
+            }
+            problem.update_multipliers();
+            (eta, omega) = ((eta * mu.powf(0.9)).max(0.1 * tolerance), omega * mu);
+            if !met && progress.stalls(violation) {
+                (status, self.lost) = (Status::ConstraintsViolated, true);
+                break;
             }
         }
         // no control changes x₀ = x̂₀: if x̂₀ violates a constraint on x₀ alone, no trajectory satisfies that
@@ -341,53 +425,87 @@ impl AugmentedLagrangian {
         Ok(kept)
     }
 
-    /// Computes the cost and the residuals at the iterate, by the recursion λ = q + Aᵀλ⁺ and the gradient ∂L/∂u = r +
-    /// Bᵀλ⁺ at each knot. The vectors q and r contain the terms yᵀ∂g of the constraints, with the multipliers y that
-    /// the next update would give.
+    /// Computes the cost and the residuals at the iterate, with the multipliers y that the next update would give. The
+    /// adjoint states λ are free in the optimality conditions. They are computed twice, without feedback and with the
+    /// feedback of the last sweep, and the smaller residual counts.
     fn measure(&mut self, problem: &mut Problem) -> Residuals {
-        let Self { settings, solver: SolverLoop { iterate, knots, .. }, outcome, adjoint: [lambda, before], .. } = self;
-        let (horizon, begin) = (problem.horizon(), Instant::now());
+        let Self { settings, solver: SolverLoop { iterate, knots, .. }, outcome, adjoint, .. } = self;
+        let begin = Instant::now();
         let Solution { xs, us, gap, cost, .. } = &iterate.solution;
         problem.calc_diff(xs, us, knots);
         let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
         let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);
-        (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - measured.terms, 0.0);
+        (outcome.primal, outcome.cost) = (larger(*gap, violation), cost - measured.terms);
         outcome.worst = match iterate.largest_gap() {
             Some((knot, row, amount)) if amount > violation => {
                 Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })
             }
             _ => measured.worst,
         };
-        let primal = larger(*gap, measured.rest);
-        let mut slope_of_free = 0.0; // largest ∂L/∂u of controls that are not pressed against a bound
-        lambda.copy_from(&knots[horizon].q);
-        for t in (0..horizon).rev() {
-            let knot = &knots[t];
-            let u = &us[problem.control_range(t)];
-            for (j, u) in u.iter().enumerate() {
-                let slope = knot.r[j] + knot.B.column(j).dot(lambda);
-                let (lower, upper) = match problem.action(t).bounds(t) {
-                    Some((lower, upper)) => (lower[j], upper[j]),
-                    None => (f64::NEG_INFINITY, f64::INFINITY),
-                };
-                // at a minimum, u equals u − ∂L/∂u projected on the bounds of u
-                let projected = if slope.is_nan() { slope } else { (u - slope).min(upper).max(lower) };
-                outcome.dual = larger(outcome.dual, (u - projected).abs());
-                if !(*u <= lower && slope > 0.0 || *u >= upper && slope < 0.0) {
-                    slope_of_free = larger(slope_of_free, slope.abs());
-                }
-            }
-            before.copy_from(&knot.q);
-            before.gemv_tr(1.0, &knot.A, lambda, 1.0);
-            std::mem::swap(lambda, before);
-        }
+        let [open, closed] = [false, true].map(|fed_back| slopes(problem, knots, &iterate.solution, adjoint, fed_back));
+        outcome.dual = open.dual.min(closed.dual);
         for number in [&mut outcome.cost, &mut outcome.primal, &mut outcome.dual] {
             *number = if number.is_nan() { f64::INFINITY } else { *number };
         }
         self.measuring.add(begin.elapsed());
-        let stationary = *gap <= settings.tolerance && slope_of_free <= STATIONARY * measured.multiplier;
-        Residuals { primal, fixed: measured.fixed, stationary }
+        let stationary = *gap <= settings.tolerance && open.free.min(closed.free) <= STATIONARY * measured.multiplier;
+        Residuals { violation: measured.rest, fixed: measured.fixed, stationary }
     }
+}
+
+/// Gradient of the Lagrangian for one choice of the adjoint states.
+struct Slopes {
+    /// Largest entry, after projection on the bounds of the controls.
+    dual: f64,
+    /// Largest entry without projection, except for controls that are pressed against a bound.
+    free: f64,
+}
+
+/// Computes the gradient of the Lagrangian by the recursion λ = q + Aᵀλ⁺ + Kᵀs, s = r + Bᵀλ⁺, from the LQ knots at a
+/// trajectory. The entries for the controls are s, for the states −Kᵀs. The vectors q and r contain the terms yᵀ∂g of
+/// the constraints.
+///
+/// Without feedback, K is zero. An unstable motion then multiplies rounding errors by the largest sensitivity of the
+/// states, which can be a million. With the gains K of a sweep, the recursion follows the closed loop, which is stable.
+fn slopes(
+    problem: &Problem,
+    knots: &[LqKnot],
+    solution: &Solution,
+    [lambda, before, of_state]: &mut [DVector<f64>; 3],
+    fed_back: bool,
+) -> Slopes {
+    let horizon = problem.horizon();
+    let (mut dual, mut free) = (0.0, 0.0);
+    lambda.copy_from(&knots[horizon].q);
+    for t in (0..horizon).rev() {
+        let knot = &knots[t];
+        let u = &solution.us[problem.control_range(t)];
+        of_state.fill(0.0);
+        for (j, u) in u.iter().enumerate() {
+            let slope = knot.r[j] + knot.B.column(j).dot(lambda);
+            let (lower, upper) = match problem.action(t).bounds(t) {
+                Some((lower, upper)) => (lower[j], upper[j]),
+                None => (f64::NEG_INFINITY, f64::INFINITY),
+            };
+            // at a minimum, u equals u − ∂L/∂u projected on the bounds of u
+            let projected = if slope.is_nan() { slope } else { u - (u - slope).min(upper).max(lower) };
+            dual = larger(dual, projected.abs());
+            if !(*u <= lower && slope > 0.0 || *u >= upper && slope < 0.0) {
+                free = larger(free, slope.abs());
+            }
+            if fed_back {
+                of_state.iter_mut().zip(solution.K[t].row(j).iter()).for_each(|(sum, gain)| *sum += gain * projected);
+            }
+        }
+        for entry in of_state.iter() {
+            (dual, free) = (larger(dual, entry.abs()), larger(free, entry.abs()));
+        }
+        before.copy_from(&knot.q);
+        before.gemv_tr(1.0, &knot.A, lambda, 1.0);
+        *before += &*of_state;
+        std::mem::swap(lambda, before);
+    }
+    Slopes { dual, free }
 }
 
 /// Returns the larger of two numbers, or NaN if one of them is NaN.

@@ -27,7 +27,7 @@ impl Problem {
         }
     }
 
-    /// Sets all multipliers to zero, and the penalty to 1/μ.
+    /// Sets all multipliers to zero, the penalty to 1/μ, and the scale of each row from its bounds.
     ///
     /// # Errors
     /// [`Error`] if bounds have a wrong length or no value satisfies the bounds.
@@ -38,6 +38,9 @@ impl Problem {
             self.constraints(t, &mut |bounded| {
                 result = result.clone().and(bounded.check(t));
                 bounded.multipliers.start(t, horizon + 1, mu);
+                if result.is_ok() {
+                    bounded.multipliers.scale(t, bounded.lower, bounded.upper);
+                }
             });
             result?;
         }
@@ -63,7 +66,7 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// Sets all multipliers to zero, and the penalty to its default value.
+    /// Sets all multipliers to zero, the penalty to its default value, and the scale of all rows to 1.
     pub(super) fn forget_multipliers(&mut self) {
         let knots = self.horizon() + 1;
         for t in 0..knots {

@@ -17,15 +17,16 @@ pub struct Outcome {
     /// [`Status::ConstraintsViolated`]: crate::Status::ConstraintsViolated
     /// [`Status::Infeasible`]: crate::Status::Infeasible
     pub worst: Option<Violation>,
-    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on the bounds of the
-    /// controls.
+    /// Largest entry of the gradient of the Lagrangian with respect to controls and states, projected on the bounds of
+    /// the controls. The multipliers of the dynamics are adjoint states of the trajectory or of its closed loop with
+    /// the gains of the last sweep, whichever gives the smaller gradient.
     pub dual: f64,
     /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
     /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in the order
     /// of the limits. The multipliers of a [`Constrained`](crate::Constrained) action that contains the robot's action
     /// follow.
     pub multipliers: Vec<Vec<f64>>,
-    /// Penalty 1/μ at the end of the solve.
+    /// Penalty 1/μ at the end of the solve, of rows whose bounds do not exceed 1.
     pub penalty: f64,
     /// Number of inner solves.
     pub solves: usize,

@@ -230,17 +230,20 @@ pub struct ConstraintSettings {
     pub tolerance_dual: f64,
     /// Maximum number of inner solves.
     pub max_solves: usize,
-    /// Penalty 1/μ of the first inner solve.
+    /// Penalty 1/μ of the first inner solve. If it equals `penalty_max`, the penalty is fixed, and each inner solve
+    /// that finds a minimum updates the multipliers.
     pub penalty_start: f64,
-    /// Largest penalty 1/μ.
+    /// Largest penalty 1/μ. At this penalty, only the multipliers change.
     pub penalty_max: f64,
-    /// Factor by which the penalty 1/μ is raised.
+    /// Factor by which the penalty 1/μ is raised. It is raised after an inner solve that found a minimum at which the
+    /// constraints do not hold well enough.
     pub penalty_factor: f64,
     /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold x̂₀ still
-    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if its status is `NotFinite`, or if
-    /// constraints are violated at the largest penalty. The better of the two results is kept. Typical causes of
-    /// failures are warm starts that diverge or saturate the controls. The repetition allocates. `resume` never repeats
-    /// a solve. A problem without constraints and bounds is never solved twice.
+    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if its status is `NotFinite`, if
+    /// constraints are violated at the largest penalty, or if it found no acceptable step while constraints were
+    /// violated. The better of the two results is kept. Typical causes of failures are warm starts that diverge or
+    /// saturate the controls. The repetition allocates. `resume` never repeats a solve. A problem without constraints
+    /// and bounds is never solved twice.
     pub restart: bool,
 }
 
@@ -259,11 +262,11 @@ impl Default for ConstraintSettings {
 }
 
 impl ConstraintSettings {
-    /// Checks the settings.
+    /// Checks the settings, as each solve does at its beginning.
     ///
     /// # Errors
     /// [`Error::Setting`] for the first invalid field.
-    pub(super) fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<(), Error> {
         let (start, max, factor) = (self.penalty_start, self.penalty_max, self.penalty_factor);
         check_all([
             ("max_solves", self.max_solves as f64, self.max_solves > 0, "at least 1"),

@@ -27,9 +27,12 @@ pub enum Status {
     TimeLimit,
     /// An [`Observer`](crate::Observer) has ended the solve.
     Interrupted,
-    /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
+    /// The regularisation reached its largest value: no descent direction or no acceptable step was found. After a
+    /// solve with constraints, the last inner solve ended so, away from a minimum. This says nothing about the
+    /// constraints.
     RegularisationLimit,
-    /// The penalty reached its limit, and constraints are still violated. This does not prove infeasibility: another
+    /// The penalty reached its limit, inner solves found minima, and constraints are still violated. Updates of the
+    /// multipliers no longer lower the violation. This does not prove infeasibility: another
     /// warm start or a larger penalty may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest
     /// violation.
     ConstraintsViolated,

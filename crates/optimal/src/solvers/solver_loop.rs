@@ -55,6 +55,9 @@ pub(super) struct Pass {
     /// Whether the pass continues the last solve. If not, the pass starts from a warm start or follows an earlier pass
     /// of the same solve.
     pub(super) resumes: bool,
+    /// Whether the pass continues the last pass of the same solve, on the same cost. The regularisation then continues
+    /// if the last step was rejected.
+    pub(super) continues: bool,
 }
 
 /// Variables that one iteration passes to the next.
@@ -142,7 +145,8 @@ impl SolverLoop {
             solution.project(problem, 0..problem.horizon());
         }
         let start = settings.regularisation_start;
-        let regularisation = if pass.resumes { solution.resumed_regularisation(start) } else { start };
+        let kept = pass.resumes || pass.continues;
+        let regularisation = if kept { solution.resumed_regularisation(start) } else { start };
         solution.trace.clear();
         solution.trace.reserve(settings.max_iterations.min(FORESEEN));
         let motion_size = if self.inverse_dynamics { problem.motion_size() } else { 0 };

@@ -9,19 +9,19 @@ use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
 /// Maximum effort of each joint (N m). To hold the initial posture, the second joint needs 29.6 N m.
-const WEAK: f64 = 20.0;
-const HORIZON: usize = 15;
+pub(super) const WEAK: f64 = 20.0;
+pub(super) const HORIZON: usize = 15;
 /// Cost of the optimum, computed with IPOPT; the next constant is the accuracy of this cost.
 const IPOPT: f64 = 0.7869;
 const DIGITS: f64 = 2e-4;
 
-fn control() -> Residual {
+pub(super) fn control() -> Residual {
     Residual::Control { reference: vec![0.0; 7] }
 }
 
 /// Creates the problem of an arm with the terminal action `end`. Efforts are bounded by limits if `limits` is set, else
 /// by control bounds. Also returns the efforts that hold the arm still.
-fn arm(limits: bool, end: FreeDynamics) -> (Problem, Vec<f64>) {
+pub(super) fn arm(limits: bool, end: FreeDynamics) -> (Problem, Vec<f64>) {
     let costs =
         vec![quadratic("rest", 0.1, Residual::State { reference: ARM.to_vec() }), quadratic("effort", 1e-3, control())];
     let mut knot = FreeDynamics::running(Arc::new(robots::arm7()), 0.05, costs).unwrap();
@@ -39,7 +39,7 @@ fn point() -> Residual {
 }
 
 /// Returns a terminal action with two exact constraints: the tool is at a point, and the arm is at rest.
-fn exact() -> FreeDynamics {
+pub(super) fn exact() -> FreeDynamics {
     let infinite = f64::INFINITY;
     let [lower, upper] = [-infinite, infinite].map(|q| [vec![q; 7], vec![0.0; 7]].concat());
     let stop = Limit::new("stop", Residual::State { reference: ARM.to_vec() }, lower, upper);
@@ -47,7 +47,7 @@ fn exact() -> FreeDynamics {
     end.with_limits(vec![Limit::equality("reach", point()), stop]).unwrap()
 }
 
-fn clipped(us: &[f64], bound: f64) -> Vec<f64> {
+pub(super) fn clipped(us: &[f64], bound: f64) -> Vec<f64> {
     us.iter().map(|u| u.clamp(-bound, bound)).collect()
 }
 
