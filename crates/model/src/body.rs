@@ -92,11 +92,12 @@ pub struct Limits {
     /// Limits of speed, nv numbers (rad/s, m/s).
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub velocity: Vec<f64>,
-    /// Lower limits of effort, nv numbers (N m, N), usually negative.
-    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
+    /// Lower limits of effort, nv numbers (N m, N), usually negative. In a file without them, they are minus the upper
+    /// limits.
+    #[cfg_attr(feature = "serde", serde(default, with = "condyle_spatial::finite::lower"))]
     pub effort_lower: Vec<f64>,
-    /// Upper limits of effort, nv numbers (N m, N).
-    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
+    /// Upper limits of effort, nv numbers (N m, N). A file may also call them `effort`.
+    #[cfg_attr(feature = "serde", serde(alias = "effort", with = "condyle_spatial::finite::upper"))]
     pub effort_upper: Vec<f64>,
 }
 

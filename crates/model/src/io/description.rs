@@ -74,7 +74,7 @@ impl<'de> Deserialize<'de> for Model {
 
 impl Description {
     /// Builds and checks the model that a file describes.
-    fn model(self) -> Result<Model, Error> {
+    fn model(mut self) -> Result<Model, Error> {
         let mut builder = ModelBuilder::new(&self.name);
         builder.gravity(self.gravity);
         let ids = self.add_bodies(&mut builder)?;
@@ -93,6 +93,10 @@ impl Description {
                 let what = format!("begins at {q} in q and {v} in v, expected {expected_q} and {expected_v}");
                 return Err(Error::Body { body: body.name.clone(), what });
             }
+        }
+        if self.limits.effort_lower.is_empty() {
+            // the file is of a version with limits that are the same in both directions
+            self.limits.effort_lower = self.limits.effort_upper.iter().map(|upper| -upper).collect();
         }
         self.check_coordinates(model.tree.nq, model.tree.nv)?;
         let Self { bodies, limits, damping, friction, armature, warnings, .. } = self;
