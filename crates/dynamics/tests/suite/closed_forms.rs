@@ -279,9 +279,9 @@ fn puck_and_point() {
     }
 }
 
-/// Checks a motor that drives a wheel, a second wheel with the gear ratio −3, and a rack on the first wheel: (J₁ + 9 J₂
-/// + r² m) θ̈ = τ. J₁ and J₂ are the inertias of the wheels, m is the mass of the rack, and r the radius of the first
-/// wheel.
+/// Checks a motor that drives a wheel, a second wheel with the gear ratio −3, and a rack on the first wheel:
+/// (J₁ + 9 J₂ + r² m) θ̈ = τ. J₁ and J₂ are the inertias of the wheels, m is the mass of the rack, and r the radius of
+/// the first wheel.
 #[test]
 fn gears() {
     let (J1, J2, m, r) = (0.2, 0.05, 1.5, 0.1);
