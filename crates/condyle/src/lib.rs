@@ -32,7 +32,7 @@
 //! | algebra and numbers | [`Scalar`], [`Se3`], [`Motion`], [`Force`], [`spatial`], [`conventions`] |
 #![cfg_attr(
     feature = "optimal",
-    doc = "| optimal control | [`optimal`]: `Fddp`, `AugmentedLagrangian`, `Problem`, `robot` |"
+    doc = "| optimal control | [`optimal`]: `Fddp`, `AugmentedLagrangian`, `InteriorPoint`, `Problem`, `robot` |"
 )]
 #![cfg_attr(
     feature = "wholebody",

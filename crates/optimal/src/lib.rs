@@ -14,8 +14,10 @@
 //!   value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
-//! - [`AugmentedLagrangian`] repeats solves by [`Fddp`] until general constraints hold: the constraints of
-//!   [`Constrained`] actions and a robot's [`Limit`](robot::Limit)s.
+//! - [`InteriorPoint`] imposes general constraints by slack variables and a barrier: the constraints of [`Constrained`]
+//!   actions, a robot's [`Limit`](robot::Limit)s and bounds on controls. Each iteration is one sweep.
+//!   [`tick`](InteriorPoint::tick) makes a fixed number of sweeps, for model-predictive control.
+//! - [`AugmentedLagrangian`] imposes the same constraints by repeated solves with [`Fddp`].
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
 //! - [`AutoDiff`] turns dynamics and a cost that are generic over the scalar type into an action with exact derivatives
 //!   by dual numbers. [`AutoDiffConstraint`] does the same for a path constraint, [`robot::OwnResidual::autodiff`] for
@@ -95,8 +97,8 @@ pub use problem::{
     PathConstraint, Problem, Unicycle,
 };
 pub use solvers::{
-    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, Iteration, Observer, Outcome, Settings, Solution, Status,
-    Timings, Verdict, Violation, ViolationKind,
+    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, InteriorPoint, InteriorPointSettings, Iteration,
+    Observer, Outcome, Settings, Solution, Status, Timings, Verdict, Violation, ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

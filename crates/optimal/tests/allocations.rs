@@ -11,7 +11,7 @@ use condyle_optimal::robot::{
     FreeDynamics, FrictionCone, GenericResidual, Geometry, GeometryPair, ImpulseDynamics, Integrator, Limit,
     OwnResidual, Residual, RobotState, Shape,
 };
-use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
+use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, Problem, Status, Sweep};
 use condyle_spatial::Scalar;
 use counting::{allocated, allocations};
 
@@ -223,17 +223,20 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
         Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic),
         Cost::new("effort", 1e-3, control(), Activation::Quadratic),
     ];
-    let weak = Limit::new("weak", control(), vec![-30.0; 7], vec![30.0; 7]);
+    let weak = Limit::new("weak", control(), vec![-34.0; 7], vec![34.0; 7]);
     let ball = Geometry::in_world(Shape::sphere([0.5, 0.1, 0.4], 0.1));
     let pair = GeometryPair::new(Geometry::on("tool", Shape::sphere([0.0; 3], 0.05)), ball);
     let clear = Limit::new("clear", Residual::Distances { pairs: vec![pair] }, vec![0.0], vec![f64::INFINITY]);
     let target = Vec3::new(0.35, 0.2, 0.6);
     let reach = Residual::FrameTranslation { frame: "tool".into(), target };
     let reach = Limit::equality("reach", reach);
+    let (none, zero) = ([f64::INFINITY; 7], [0.0; 7]);
+    let (low, high) = ([none.map(|x| -x), zero].concat(), [none, zero].concat());
+    let stop = Limit::new("stop", Residual::State { reference: vec![0.0; 14] }, low, high);
     let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs).unwrap().with_limits(vec![weak, clear]).unwrap();
     knot.set_limits(3, vec![]).unwrap();
     let us = knot.quasi_static(&x0).repeat(10);
-    let end = FreeDynamics::terminal(arm, vec![]).unwrap().with_limits(vec![reach]).unwrap();
+    let end = FreeDynamics::terminal(arm, vec![]).unwrap().with_limits(vec![reach, stop]).unwrap();
     let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
     let mut solver = AugmentedLagrangian::new(&problem);
     let xs = x0.repeat(11);
@@ -250,6 +253,43 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
         assert_eq!(solver.solution().status, Status::Converged);
         assert!(solver.outcome().multipliers.iter().flatten().any(|y| *y != 0.0));
     }
+    let mut solver = InteriorPoint::new(&problem);
+    for threads in [1, 2] {
+        solver.settings.threads = threads;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+        let counts = pool.install(|| {
+            solver.solve(&mut problem, &xs, &us).unwrap();
+            solver.tick(&mut problem, 2).unwrap();
+            let solve = allocations(|| {
+                solver.solve(&mut problem, &xs, &us).unwrap();
+            });
+            assert_eq!(solver.solution().status, Status::Converged);
+            let tick = allocations(|| {
+                solver.tick(&mut problem, 2).unwrap();
+                solver.resume(&mut problem).unwrap();
+            });
+            [solve, tick]
+        });
+        assert_eq!(counts, [0, 0], "{threads} threads");
+    }
+    solver.settings.threads = 1;
+    solver.solve(&mut problem, &xs, &us).unwrap();
+    let next = solver.solution().x(1).to_vec();
+    let count = allocations(|| {
+        problem.shift(0).unwrap();
+        solver.shift(&mut problem).unwrap();
+        problem.set_x0(&next).unwrap();
+        solver.tick(&mut problem, 2).unwrap();
+    });
+    assert!(count <= 16, "{count}"); // memory for old multipliers, and for rows that move to other knots
+    let next = solver.solution().x(1).to_vec();
+    let count = allocations(|| {
+        problem.shift(0).unwrap();
+        solver.shift(&mut problem).unwrap();
+        problem.set_x0(&next).unwrap();
+        solver.tick(&mut problem, 2).unwrap();
+    });
+    assert_eq!(count, 0);
 }
 
 /// Counts the allocations of solves in which limits become active. The robot first stands; then the forces of its feet

@@ -6,8 +6,8 @@ mod common;
 
 use common::{Linear, Unicycle, cartpole_action, random, random_knot, random_matrix};
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, LqKnot, NumDiff, PathConstraint, Problem,
-    Status, ViolationKind,
+    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, InteriorPoint, LqKnot, NumDiff, PathConstraint,
+    Problem, Solution, Status, ViolationKind,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -94,8 +94,22 @@ fn compare(reference: &Value, running: Constrained, terminal: Constrained) {
     );
     assert_eq!(solution.status, Status::Converged);
     assert!(outcome.primal <= 1e-7 && outcome.dual <= 1e-6);
+    compare_solution(reference, &solution, outcome.cost);
+
+    let mut solver = InteriorPoint::new(&problem);
+    for second_order in [false, true] {
+        solver.settings.second_order = second_order;
+        let solution = solver.solve(&mut problem, &xs, &us).unwrap().clone();
+        assert_eq!(solution.status, Status::Converged);
+        assert!(solver.outcome().primal <= 1e-7);
+        compare_solution(reference, &solution, solution.cost);
+    }
+}
+
+/// Compares the trajectory and the cost of a solution with IPOPT's.
+fn compare_solution(reference: &Value, solution: &Solution, found: f64) {
     let cost = reference["cost"].as_f64().unwrap();
-    assert!((outcome.cost - cost).abs() < COST * (1.0 + cost.abs()), "{} {cost}", outcome.cost);
+    assert!((found - cost).abs() < COST * (1.0 + cost.abs()), "{found} {cost}");
     for (name, ours, theirs) in [("xs", &solution.xs, &reference["xs"]), ("us", &solution.us, &reference["us"])] {
         let theirs = numbers(theirs);
         assert_eq!(ours.len(), theirs.len());
@@ -191,6 +205,19 @@ fn equalities_of_a_linear_problem_are_a_linear_system() {
     }
     for i in 0..2 {
         assert!((solver.outcome().multipliers[horizon][i] - exact[size - 2 + i]).abs() < 1e-4);
+    }
+    // one sweep of the interior point solves the problem
+    let mut solver = InteriorPoint::new(&problem);
+    let solution = solver.solve(&mut problem, &vec![0.0; n * (horizon + 1)], &vec![0.0; m * horizon]).unwrap();
+    assert_eq!(solution.status, Status::Converged);
+    assert!(solution.trace.len() <= 3, "{} iterations", solution.trace.len());
+    for t in 0..horizon {
+        for j in 0..m {
+            assert!((solution.u(t)[j] - exact[t * block + j]).abs() < 1e-7, "u{t}[{j}]");
+        }
+    }
+    for i in 0..2 {
+        assert!((solver.outcome().multipliers[horizon][i] - exact[size - 2 + i]).abs() < 1e-6);
     }
 }
 

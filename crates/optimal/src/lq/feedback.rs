@@ -26,6 +26,8 @@ pub struct KnotFeedback {
     pub expected: [f64; 2],
     /// Whether K, Qu and Quu store factors instead of results. [`Gains::finish`] computes K and k from these factors.
     pub(super) gains_deferred: bool,
+    /// Factors for the forward pass, if the sweep was asked for them instead of gains.
+    pub(crate) factors: Factors,
 }
 
 impl KnotFeedback {
@@ -40,7 +42,26 @@ impl KnotFeedback {
             Quu: DMatrix::zeros(nu, nu),
             expected: [0.0; 2],
             gains_deferred: false,
+            factors: Factors::default(),
         }
+    }
+}
+
+/// Columns [L; X; yᵀ] of the unknowns that a step eliminated, from which the forward pass computes the unknowns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Factors {
+    /// Columns, one after the other. Shape: (unknowns + ndx + 1) × unknowns.
+    pub(crate) numbers: Vec<f64>,
+    /// Rotation of the states in the rows X: row i belongs to state (i + turn) mod ndx.
+    pub(crate) turn: usize,
+}
+
+impl Factors {
+    /// Copies the columns of the m unknowns of a knot with n states. Allocates at the first call.
+    pub(super) fn copy(&mut self, H: View<'_>, [m, n]: [usize; 2], turn: usize) {
+        self.numbers.resize((m + n + 1) * m, 0.0);
+        self.turn = turn;
+        copy_matrix(&mut self.numbers, m + n + 1, H, [m + n + 1, m]);
     }
 }
 

@@ -4,7 +4,9 @@
 use super::feedback::KnotFeedback;
 use super::forms::{Curvature, CurvatureFn, Forms, Sizes};
 use super::knot::{Hessian, LqKnot};
+use super::row_terms::{RowTerms, ScaledRows};
 use super::workspace::Workspace;
+use condyle_linalg::View;
 
 /// Reason why a sweep stopped before the first knot.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -35,6 +37,17 @@ pub enum SweepError {
     },
 }
 
+/// Results of a step of the sweep, besides the value function.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum SweepOutput {
+    /// Gains K and k.
+    Gains,
+    /// Factors for the forward pass.
+    Factors,
+    /// Gains and factors.
+    Both,
+}
+
 /// Options of a sweep, the same for all knots.
 pub(super) struct SweepOptions<'a> {
     /// Regularisation, which is added to the diagonals of Quu and Vxx.
@@ -43,12 +56,16 @@ pub(super) struct SweepOptions<'a> {
     pub(super) defers_gains: bool,
     /// Function that computes the curvature of the dynamics; `None` if the dynamics count as linear.
     pub(super) curvature: Option<&'a mut CurvatureFn<'a>>,
+    /// Terms of the constraint rows; without them, a knot with rows is an error.
+    pub(super) rows: Option<RowTerms<'a>>,
+    /// Results that are written for each step.
+    pub(super) output: SweepOutput,
 }
 
 impl SweepOptions<'_> {
     /// Returns the options of a sweep without curvature of the dynamics and without deferred gains.
     pub(super) fn linear(regularisation: f64) -> Self {
-        Self { regularisation, defers_gains: false, curvature: None }
+        Self { regularisation, defers_gains: false, curvature: None, rows: None, output: SweepOutput::Gains }
     }
 }
 
@@ -59,6 +76,7 @@ pub(crate) struct Step {
     /// Whether Vxx is written to the feedback.
     pub(super) keep: bool,
     forms: Forms,
+    scaled_rows: ScaledRows,
     /// Storage for the curvature of the dynamics: one Hessian for each number of controls that occurs at knots with
     /// curvature.
     hessians: Vec<Hessian>,
@@ -74,6 +92,7 @@ impl Step {
             work: Workspace::new(sizes.n, sizes.m, below.max(sizes.rows_below())),
             keep: true,
             forms: Forms::new(sizes),
+            scaled_rows: ScaledRows::default(),
             hessians: curved.into_iter().map(|nu| Hessian::zeros(sizes.n, nu)).collect(),
         }
     }
@@ -87,8 +106,11 @@ impl Step {
         options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
         let last = knots.len() - 1;
-        check_rows(first + last, &knots[last])?;
         self.work.start(&knots[last]);
+        match &options.rows {
+            Some(rows) => rows.add_to_value(first + last, &knots[last], &mut self.work),
+            None => check_rows(first + last, &knots[last])?,
+        }
         self.finish(first + last, &mut feedback[last], options.regularisation)?;
         self.back(first, &knots[..last], feedback, options)
     }
@@ -103,7 +125,9 @@ impl Step {
         options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
         for (i, (knot, feedback)) in knots.iter().zip(feedback).enumerate().rev() {
-            check_rows(first + i, knot)?;
+            if options.rows.is_none() {
+                check_rows(first + i, knot)?;
+            }
             self.step(first + i, knot, feedback, options)?;
             self.finish(first + i, feedback, options.regularisation)?;
         }
@@ -118,19 +142,28 @@ impl Step {
         feedback: &mut KnotFeedback,
         options: &mut SweepOptions<'_>,
     ) -> Result<(), SweepError> {
-        let Self { work, forms, hessians, .. } = self;
-        let SweepOptions { regularisation, defers_gains, .. } = *options;
+        let Self { work, forms, hessians, scaled_rows, .. } = self;
+        let SweepOptions { regularisation, defers_gains, rows, output, .. } = *options;
         let form = forms.of_step(knot, regularisation);
         work.move_by(knot.f.as_slice());
         let ask = options.curvature.as_mut().map(|ask| &mut **ask as &mut CurvatureFn<'_>);
         form.write(work, knot, regularisation, &mut Curvature { knot: t, ask, hessians });
+        if let Some(rows) = rows {
+            rows.add_to_form(t, knot, form.turn(knot.ndx()), work, scaled_rows);
+        }
         let eliminated = form.eliminate(work, knot, feedback).map_err(|(row, pivot)| match pivot.is_finite() {
             true => SweepError::NotPositive { knot: t, row, pivot },
             false => SweepError::NotFinite { knot: t },
         })?;
         work.take_value(work.stride(knot.nu()), eliminated, form.turn(knot.ndx()));
         feedback.gains_deferred = false;
-        form.write_gains(work, knot, feedback, defers_gains);
+        if output != SweepOutput::Gains {
+            let (m, n, turn) = (knot.nu(), knot.ndx(), form.turn(knot.ndx()));
+            feedback.factors.copy(View::new(&work.H, work.stride(m)), [m, n], turn);
+        }
+        if output != SweepOutput::Factors {
+            form.write_gains(work, knot, feedback, defers_gains);
+        }
         Ok(())
     }
 

@@ -2,10 +2,11 @@
 #![allow(non_snake_case)] // names follow the literature: A, B, Q, …, K, Vxx
 
 use super::feedback::{Gains, KnotFeedback};
-use super::forms::Sizes;
+use super::forms::{CurvatureFn, Sizes};
 use super::knot::{Hessian, LqKnot};
+use super::row_terms::RowTerms;
 use super::segments::Segments;
-use super::step::{Step, SweepError, SweepOptions};
+use super::step::{Step, SweepError, SweepOptions, SweepOutput};
 use crate::error::assert_length;
 use condyle_dynamics::level::level;
 
@@ -181,6 +182,22 @@ impl Sweep {
     ) -> Result<(), SweepError> {
         self.check(knots);
         let mut options = SweepOptions { curvature: Some(&mut curvature), ..SweepOptions::linear(regularisation) };
+        self.step.run(0, knots, &mut self.feedback, &mut options)
+    }
+
+    /// Sweeps as [`run`](Self::run) does, with the terms of constraint rows and, if given, the curvature of the
+    /// dynamics. Writes the results that `output` selects.
+    pub(crate) fn run_with_rows(
+        &mut self,
+        knots: &[LqKnot],
+        regularisation: f64,
+        rows: RowTerms<'_>,
+        output: SweepOutput,
+        curvature: Option<&mut CurvatureFn<'_>>,
+    ) -> Result<(), SweepError> {
+        let curvature = curvature.map(|ask| ask as &mut CurvatureFn<'_>);
+        let rows = Some(rows);
+        let mut options = SweepOptions { rows, output, curvature, ..SweepOptions::linear(regularisation) };
         self.step.run(0, knots, &mut self.feedback, &mut options)
     }
 

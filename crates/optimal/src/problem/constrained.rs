@@ -1,10 +1,10 @@
 //! Action with constraints, which become terms of an augmented Lagrangian.
 
 use super::action::ActionModel;
-use super::group::{Evaluation, KnotGroup, Results, evaluate, lanes};
+use super::group::{Evaluation, KnotGroup, Results, constraint_count, evaluate, lanes};
 use super::multipliers::{Bounded, Multipliers, Visit};
 use super::path_constraint::{self, PathConstraint};
-use crate::lq::{Hessian, LqKnot};
+use crate::lq::{ConstraintRow, ConstraintRows, Hessian, LqKnot};
 use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
@@ -29,6 +29,8 @@ pub struct Constrained {
     dd: Vec<f64>,
     gx: DMatrix<f64>,
     gu: DMatrix<f64>,
+    /// One row [∂g/∂x ∂g/∂u]. Shape: ndx + nu.
+    row: Vec<f64>,
 }
 
 impl Constrained {
@@ -37,7 +39,8 @@ impl Constrained {
         let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
         let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
         let [g, d, dd] = [(); 3].map(|()| vec![0.0; size]);
-        Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu }
+        let row = Vec::with_capacity(ndx + nu);
+        Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu, row }
     }
 
     /// Returns the wrapped action, if its type is `T`.
@@ -59,14 +62,31 @@ impl Constrained {
         self.multipliers.value(t, 0, &self.g, lower, upper)
     }
 
+    /// Computes g and its Jacobians ∂g/∂x and ∂g/∂u.
+    fn differentiate(&mut self, t: usize, x: &[f64], u: &[f64]) {
+        let Self { action, constraint, g, gx, gu, .. } = self;
+        constraint.calc(t, x, u, g);
+        if !constraint.calc_diff(t, x, u, gx, gu) {
+            path_constraint::calc_diff(&**action, &mut **constraint, t, x, u, [gx, gu]);
+        }
+    }
+
+    /// Appends the constraints to the rows of a knot.
+    fn push_rows(&mut self, t: usize, x: &[f64], u: &[f64], rows: &mut ConstraintRows) {
+        self.differentiate(t, x, u);
+        let Self { constraint, g, gx, gu, row, .. } = self;
+        let (lower, upper) = constraint.bounds(t);
+        for (i, &c) in g.iter().enumerate() {
+            row.clear();
+            row.extend(gx.row(i).iter().chain(gu.row(i).iter()));
+            rows.push(ConstraintRow { first: 0, entries: row, c, lower: lower[i], upper: upper[i] });
+        }
+    }
+
     /// Adds the gradient and the Gauss–Newton Hessian of the constraints' term: q += gₓᵀ d, Q += gₓᵀ D gₓ, and likewise
     /// r, R and S. Here d and D are the term's first and second derivatives with respect to g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], knot: &mut LqKnot) {
-        self.constraint.calc(t, x, u, &mut self.g);
-        if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {
-            let Self { action, constraint: g, gx, gu, .. } = self;
-            path_constraint::calc_diff(&**action, &mut **g, t, x, u, [gx, gu]);
-        }
+        self.differentiate(t, x, u);
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.begin(t);
         self.multipliers.slopes(t, 0, &self.g, [lower, upper], &mut self.d, &mut self.dd);
@@ -161,9 +181,10 @@ impl ActionModel for Constrained {
 
     fn try_clone(&self) -> Option<Box<dyn ActionModel>> {
         let (action, constraint) = (self.action.try_clone()?, self.constraint.try_clone()?);
-        let Self { multipliers, g, d, dd, gx, gu, .. } = self;
+        let Self { multipliers, g, d, dd, gx, gu, row, .. } = self;
         let (multipliers, [g, d, dd]) = (multipliers.clone(), [g, d, dd].map(Vec::clone));
-        Some(Box::new(Self { action, constraint, multipliers, g, d, dd, gx: gx.clone(), gu: gu.clone() }))
+        let (gx, gu, row) = (gx.clone(), gu.clone(), Vec::with_capacity(row.capacity()));
+        Some(Box::new(Self { action, constraint, multipliers, g, d, dd, gx, gu, row }))
     }
 
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
@@ -192,12 +213,18 @@ impl KnotGroup for Constrained {
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>) {
         let (nx, nu) = (self.nx(), self.nu());
-        let what = if what == Evaluation::Values { what } else { Evaluation::Derivatives };
+        let what = what.without_equations();
         evaluate(&mut *self.action, knots, xs, us, what, results);
+        let room = results.constraints.len() / knots.len().max(1);
         for (i, &t) in knots.iter().enumerate() {
             let (x, u) = (&xs[i * nx..][..nx], &us[i * nu..][..nu]);
             match what {
+                Evaluation::Values if room > 0 => {
+                    let (first, size) = (constraint_count(&mut *self.action, t), self.constraint.size());
+                    self.constraint.calc(t, x, u, &mut results.constraints[i * room + first..][..size]);
+                }
                 Evaluation::Values => results.costs[i] += self.term(t, x, u),
+                Evaluation::Rows => self.push_rows(t, x, u, &mut results.lq_knots[i].rows),
                 _ => self.add_derivatives(t, x, u, &mut results.lq_knots[i]),
             }
         }

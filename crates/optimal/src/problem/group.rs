@@ -55,28 +55,49 @@ pub trait GroupModel: ActionModel {
 pub enum Evaluation<'m> {
     /// Next states and costs, and also the motions (accelerations and forces) if the results have storage for them.
     Values,
-    /// Derivatives of dynamics and costs.
+    /// Derivatives of dynamics and costs. Constraints add their terms of the augmented Lagrangian to the costs.
     Derivatives,
+    /// Derivatives of dynamics and costs alone; the constraints are written to the [rows](LqKnot::rows) of LQ knots.
+    Rows,
     /// Derivatives of the costs, with the dynamics as equations of inverse dynamics at knots that support this. The
     /// equations are taken at the given motions (accelerations and forces), which have the same length at each knot. If
     /// no motions are given, they are computed.
-    Equations(&'m [f64]),
+    Equations {
+        /// Accelerations and forces of the knots.
+        motions: &'m [f64],
+        /// Whether the constraints are written to the rows of LQ knots, as for [`Rows`](Self::Rows).
+        rows: bool,
+    },
 }
 
 impl Evaluation<'_> {
+    /// Returns whether constraints are written to the rows of LQ knots.
+    pub(crate) fn has_rows(self) -> bool {
+        matches!(self, Self::Rows | Self::Equations { rows: true, .. })
+    }
+
+    /// Returns the evaluation of the same quantities without equations of inverse dynamics.
+    pub(crate) fn without_equations(self) -> Self {
+        match self {
+            Self::Equations { rows: true, .. } => Self::Rows,
+            Self::Equations { rows: false, .. } => Self::Derivatives,
+            other => other,
+        }
+    }
+
     /// Returns the part of this evaluation for the knots `knots` of a group of `count` knots.
     pub(crate) fn part(self, knots: Range<usize>, count: usize) -> Self {
         match self {
-            Self::Equations(motions) => {
+            Self::Equations { motions, rows } => {
                 let size = motions.len() / count;
-                Self::Equations(&motions[knots.start * size..knots.end * size])
+                Self::Equations { motions: &motions[knots.start * size..knots.end * size], rows }
             }
             other => other,
         }
     }
 }
 
-/// Outputs of a group evaluation. An evaluation writes either the first three fields, or the last one.
+/// Outputs of a group evaluation. An evaluation writes either the LQ knots, or the other fields.
 #[derive(Debug)]
 pub struct Results<'a> {
     /// Next states, one after the other.
@@ -86,6 +107,9 @@ pub struct Results<'a> {
     /// Accelerations and forces; empty if they are not stored. Each knot has an equal share of the slice, and uses the
     /// beginning of its share.
     pub(crate) motions: &'a mut [f64],
+    /// Values g(x, u) of the constraints, an equal share for each knot. If the slice is empty, constraints instead add
+    /// their terms of the augmented Lagrangian to the costs.
+    pub(crate) constraints: &'a mut [f64],
     /// LQ knots that receive the derivatives.
     pub(crate) lq_knots: &'a mut [LqKnot],
 }
@@ -93,12 +117,12 @@ pub struct Results<'a> {
 impl<'a> Results<'a> {
     /// Returns outputs for an evaluation of values.
     pub(crate) fn values(next: &'a mut [f64], costs: &'a mut [f64], motions: &'a mut [f64]) -> Self {
-        Self { next, costs, motions, lq_knots: &mut [] }
+        Self { next, costs, motions, constraints: &mut [], lq_knots: &mut [] }
     }
 
     /// Returns outputs for an evaluation of derivatives.
     pub(crate) fn derivatives(lq_knots: &'a mut [LqKnot]) -> Self {
-        Self { next: &mut [], costs: &mut [], motions: &mut [], lq_knots }
+        Self { next: &mut [], costs: &mut [], motions: &mut [], constraints: &mut [], lq_knots }
     }
 }
 
@@ -114,8 +138,7 @@ pub trait KnotGroup {
     #[track_caller]
     fn evaluate(&mut self, knots: &[usize], xs: &[f64], us: &[f64], what: Evaluation<'_>, results: &mut Results<'_>);
 
-    /// Calls `visit` for the constraints of knot t whose augmented Lagrangian terms are part of the knot's cost, in the
-    /// order of the constraints.
+    /// Calls `visit` for the constraints of knot t, in their order.
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>);
 
     /// Returns the sizes of the equations of inverse dynamics: the number of accelerations and forces of a knot, and
@@ -190,6 +213,15 @@ pub(crate) fn lanes(action: &mut dyn ActionModel) -> usize {
         None => action.group_model().map_or(1, |group| group.lanes()),
     };
     lanes.max(1)
+}
+
+/// Returns the number of constraints at knot t of an action.
+pub(crate) fn constraint_count(action: &mut dyn ActionModel, t: usize) -> usize {
+    let mut count = 0;
+    if let Some(group) = action.knot_group_mut() {
+        group.constraints(t, &mut |bounded| count += bounded.count);
+    }
+    count
 }
 
 /// Returns the innermost wrapped action, or the action itself if it wraps none, as a group of knots.

@@ -292,8 +292,17 @@ impl HorizonTerms {
         (cost, term)
     }
 
+    /// Writes the residuals of the limits of knot t.
+    pub(crate) fn write_limits(&mut self, t: usize, state: KnotState<'_>, to: &mut [f64]) {
+        self.reserve();
+        let Self { model, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
+        let kinematics = &state.data.residuals.kinematic[1];
+        let mut view = ResidualView { model, t, state, kinematics, scratch };
+        limits.write_values(&mut view, to);
+    }
+
     /// Computes the derivatives of `scale` · ℓ at knot t, where ℓ is the cost. If `limited`, also adds the derivatives
-    /// of the knot's limit term in the augmented Lagrangian.
+    /// of the knot's limit term in the augmented Lagrangian, or appends the limits to the rows of the knot.
     pub(crate) fn calc_diff(
         &mut self,
         t: usize,
@@ -306,7 +315,7 @@ impl HorizonTerms {
         self.reserve();
         let Self { model, costs, limits, scratch: Some(scratch), .. } = self else { unreachable!("was just made") };
         let [first, second] = &state.data.residuals.kinematic;
-        let (limits, mut objective) = limits.objective(t, limited);
+        let (in_cost, mut objective) = limits.objective(t, limited);
         if limited {
             objective.multipliers.begin(t);
         }
@@ -317,10 +326,13 @@ impl HorizonTerms {
             let costs = &costs.at(t).at(t).terms;
             costs.differentiate(&mut view, sensitivities, &mut WeightedActivations(scale), diagonal, knot);
             view.kinematics = second;
-            limits.differentiate(&mut view, sensitivities, &mut objective, diagonal, knot);
+            in_cost.differentiate(&mut view, sensitivities, &mut objective, diagonal, knot);
             if !diagonal {
                 view.scratch.write(knot);
             }
+        }
+        if limited && !limits.in_cost {
+            limits.write_rows(&mut view, sensitivities, knot);
         }
     }
 }

@@ -1,21 +1,24 @@
 //! Limits: bounds on residuals of a robot's state, controls and forces.
 
 use super::horizon::{PerKnot, PerModel};
+use super::knot_data::Sensitivities;
 use super::outputs::Capabilities;
 use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
+use super::residuals::view::ResidualView;
 use crate::Error;
+use crate::lq::LqKnot;
 use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
 /// Residual within bounds: lower ≤ r(x, u) ≤ upper. Equal bounds make an equality. If both lists of bounds are empty,
 /// the limit is r(x, u) = 0.
 ///
-/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforces the limit. For [`Fddp`](crate::Fddp) alone the limit is
-/// a cost for values outside the bounds. The limit uses the dynamics and kinematics that the costs of its knot compute.
-/// It applies at the beginning of the knot, with any integrator and any Δt. All entries of r have the same penalty,
-/// whatever their units.
+/// [`InteriorPoint`](crate::InteriorPoint) and [`AugmentedLagrangian`](crate::AugmentedLagrangian) enforce the limit.
+/// For [`Fddp`](crate::Fddp) alone the limit is a cost for values outside the bounds. The limit uses the dynamics and
+/// kinematics that the costs of its knot compute. The limit applies at the beginning of the knot, with any integrator
+/// and any Δt. In an augmented Lagrangian all entries of r have the same penalty, whatever their units.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -134,13 +137,15 @@ pub(crate) struct Limits {
     /// Empty list of limits, for evaluations without limits.
     none: Terms<Limit>,
     multipliers: Multipliers,
+    /// Whether limits add their terms of the augmented Lagrangian to the cost. Each evaluation of a group sets it.
+    pub(super) in_cost: bool,
 }
 
 impl Limits {
     /// Returns an empty set of limits.
     pub(super) fn none() -> Self {
         let (sets, none) = (PerModel::new(PerKnot::new(LimitSet::default())), Terms::default());
-        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0) }
+        Self { sets, own: Vec::new(), none, multipliers: Multipliers::new(0), in_cost: true }
     }
 
     /// Returns a set of limits without the user's limits. It contains the limits `own`, which the dynamics require at
@@ -207,11 +212,27 @@ impl Limits {
         if limited { &self.sets.at(t).at(t).terms } else { &self.none }
     }
 
-    /// Returns the limits as [`at`](Self::at) does, and the term of these limits in the augmented Lagrangian.
+    /// Returns the limits that add to the cost at knot t, and their term in the augmented Lagrangian.
     pub(super) fn objective(&mut self, t: usize, limited: bool) -> (&Terms<Limit>, LimitObjective<'_>) {
-        let Self { sets, none, multipliers, .. } = self;
-        let terms = if limited { &sets.at(t).at(t).terms } else { none };
+        let Self { sets, none, multipliers, in_cost, .. } = self;
+        let terms = if limited && *in_cost { &sets.at(t).at(t).terms } else { none };
         (terms, LimitObjective { multipliers, t })
+    }
+
+    /// Writes the residuals of the limits of the knot that `view` shows.
+    pub(super) fn write_values(&self, view: &mut ResidualView<'_>, to: &mut [f64]) {
+        for (limit, plan) in self.at(view.t, true).with_plans() {
+            view.compute(&limit.residual, plan);
+            to[plan.first..][..plan.n].copy_from_slice(&view.scratch.r[..plan.n]);
+        }
+    }
+
+    /// Appends the limits of the knot that `view` shows to the rows of an LQ knot.
+    pub(super) fn write_rows(&self, view: &mut ResidualView<'_>, sensitivities: &dyn Sensitivities, knot: &mut LqKnot) {
+        for (limit, plan) in self.at(view.t, true).with_plans() {
+            view.compute(&limit.residual, plan);
+            view.push_constraint_rows(&limit.residual, plan, sensitivities, [&limit.lower, &limit.upper], knot);
+        }
     }
 
     /// Calls `visit` with the bounds, names and multipliers of the limits of knot t.

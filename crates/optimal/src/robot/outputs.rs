@@ -15,7 +15,7 @@ pub(crate) enum Output {
     ContactAcceleration,
 }
 
-/// Outputs that the dynamics of a knot can compute. They are known when the action is created.
+/// Outputs that the dynamics of a knot can compute. The set of outputs is fixed when the action is created.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Capabilities {
     pub nu: usize,

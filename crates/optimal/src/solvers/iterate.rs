@@ -61,7 +61,7 @@ impl Iterate {
     pub(super) fn evaluate(&mut self, problem: &mut Problem) -> f64 {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
-        problem.calc_with_motions(xs, us, next, costs, motions);
+        problem.calc_with(xs, us, next, costs, [motions, &mut []]);
         self.knows_motions = true;
         let mut sum = Sum::default();
         self.costs.iter().for_each(|cost| sum.add(*cost));
@@ -72,17 +72,22 @@ impl Iterate {
 
     /// Computes the gaps f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns the largest gap ‖f‖∞.
     pub(super) fn update_gaps(&mut self, problem: &Problem) -> f64 {
-        let (shape, xs) = (self.solution.shape(), &self.solution.xs);
+        Self::write_gaps(problem, &self.solution.xs, &self.next, &mut self.gaps);
+        max_abs(&self.gaps)
+    }
+
+    /// Computes the gaps of a trajectory with the states `xs` and the next states `next`.
+    pub(super) fn write_gaps(problem: &Problem, xs: &[f64], next: &[f64], gaps: &mut [f64]) {
+        let shape = problem.shape();
         for t in 0..=shape.horizon() {
-            let predicted = if t == 0 { problem.x0() } else { &self.next[shape.x(t - 1)] };
-            let (x, gap) = (&xs[shape.x(t)], &mut self.gaps[shape.dx(t)]);
+            let predicted = if t == 0 { problem.x0() } else { &next[shape.x(t - 1)] };
+            let (x, gap) = (&xs[shape.x(t)], &mut gaps[shape.dx(t)]);
             if x == predicted {
                 gap.fill(0.0);
             } else {
                 problem.action(t).difference(x, predicted, gap);
             }
         }
-        max_abs(&self.gaps)
     }
 
     /// Returns the largest gap: the index of its knot, the index of its entry in the tangent space, and its size.

@@ -3,6 +3,7 @@
 mod augmented_lagrangian;
 mod best;
 mod fddp;
+mod interior_point;
 mod iterate;
 mod multipliers;
 mod outcome;
@@ -16,6 +17,7 @@ mod watch;
 
 pub use augmented_lagrangian::AugmentedLagrangian;
 pub use fddp::Fddp;
+pub use interior_point::{InteriorPoint, InteriorPointSettings};
 pub use outcome::{Outcome, Violation, ViolationKind};
 pub use settings::{ConstraintSettings, DdpMethod, Settings};
 pub use solution::{Iteration, Solution, Status, Timings};

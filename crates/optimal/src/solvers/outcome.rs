@@ -24,10 +24,12 @@ pub struct Outcome {
     /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
     /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in the order
     /// of the limits. The multipliers of a [`Constrained`](crate::Constrained) action that contains the robot's action
-    /// follow.
+    /// follow. For an [`InteriorPoint`](crate::InteriorPoint), the multipliers of the bounds on controls are last.
     pub multipliers: Vec<Vec<f64>>,
     /// Penalty 1/μ at the end of the solve, of rows whose bounds do not exceed 1.
     pub penalty: f64,
+    /// Barrier parameter μ at the end of a solve by an interior point; 0 for other solvers.
+    pub barrier: f64,
     /// Number of inner solves.
     pub solves: usize,
     /// Number of iterations of all inner solves.
@@ -40,6 +42,8 @@ pub struct Outcome {
 pub enum ViolationKind {
     /// Constraint of a knot: a robot's [`Limit`](crate::robot::Limit) or a [`PathConstraint`](crate::PathConstraint).
     Constraint,
+    /// Bound on a control ([`bounds`](crate::ActionModel::bounds)); `row` is the index of the control.
+    ControlBound,
     /// Gap of the dynamics: f₀ = x̂₀ ⊖ x₀ at knot 0, else fₜ = φ(xₜ₋₁, uₜ₋₁) ⊖ xₜ.
     Gap,
 }
@@ -93,6 +97,9 @@ impl fmt::Display for Violation {
         let Self { kind, knot, row, name, entry, amount } = self;
         match (kind, name) {
             (ViolationKind::Gap, _) => write!(f, "knot {knot}: entry {row} of the gap is {amount:.3e}"),
+            (ViolationKind::ControlBound, _) => {
+                write!(f, "knot {knot}: control {row} is {amount:.3e} beyond its bound")
+            }
             (_, Some(name)) => write!(f, "knot {knot}: entry {entry} of `{name}` is {amount:.3e} beyond its bound"),
             (_, None) => write!(f, "knot {knot}: constraint {row} is {amount:.3e} beyond its bound"),
         }

@@ -199,10 +199,10 @@ impl Settings {
 }
 
 /// Setting to check: its name, its value, whether the value is valid, and a text for the valid range.
-type Checked = (&'static str, f64, bool, &'static str);
+pub(super) type Checked = (&'static str, f64, bool, &'static str);
 
 /// Returns the error of the first invalid setting, if there is one.
-fn check_all<const N: usize>(settings: [Checked; N]) -> Result<(), Error> {
+pub(super) fn check_all<const N: usize>(settings: [Checked; N]) -> Result<(), Error> {
     match settings.into_iter().find(|(_, _, good, _)| !good) {
         Some((name, value, _, allowed)) => Err(Error::Setting { name, value, allowed }),
         None => Ok(()),
@@ -210,12 +210,12 @@ fn check_all<const N: usize>(settings: [Checked; N]) -> Result<(), Error> {
 }
 
 /// Returns whether x is finite and at least 0.
-fn from_zero(x: f64) -> bool {
+pub(super) fn from_zero(x: f64) -> bool {
     x >= 0.0 && x.is_finite()
 }
 
 /// Returns whether x is finite and above the limit.
-fn exceeds(limit: f64, x: f64) -> bool {
+pub(super) fn exceeds(limit: f64, x: f64) -> bool {
     x > limit && x.is_finite()
 }
 

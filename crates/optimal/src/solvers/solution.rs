@@ -38,7 +38,9 @@ pub enum Status {
     ConstraintsViolated,
     /// No solution exists. The initial state x̂₀ violates a constraint of knot 0 that no control can change, for
     /// example a built-in residual of the state alone. [`Outcome::worst`](crate::Outcome::worst) names this constraint.
-    /// The solution satisfies the other constraints, as far as the solve progressed.
+    /// The solution satisfies the other constraints, as far as the solve progressed. An
+    /// [`InteriorPoint`](crate::InteriorPoint) also ends with this status where no small change of the trajectory
+    /// reduces the violation. Another warm start may then find a solution.
     Infeasible,
     /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so no search direction can be computed.
     /// The solution is the best earlier iterate. Its states and controls are finite, but its cost may be infinite if it

@@ -283,7 +283,7 @@ impl SolverLoop {
 
     /// Computes the linear-quadratic problem at the iterate. The problem contains the gaps until the first full step,
     /// and the bounds afterwards. With several threads, the sweep processes knots as soon as their derivatives are
-    /// known, if possible. In that case the result of the sweep is returned.
+    /// known, if possible. Returns the result of the sweep if it ran here, otherwise `None`.
     #[inline(never)] // `benches/instructions.py` counts this function by name
     fn calc_diff(
         &mut self,
@@ -296,7 +296,7 @@ impl SolverLoop {
         let follows = self.follows(settings);
         let Self { iterate: Iterate { solution, gaps, motions, knows_motions, .. }, knots, sweep, .. } = self;
         let what = match self.inverse_dynamics {
-            true => Evaluation::Equations(if *knows_motions { motions } else { &[] }),
+            true => Evaluation::Equations { motions: if *knows_motions { motions } else { &[] }, rows: false },
             false => Evaluation::Derivatives,
         };
         let (Solution { xs, us, .. }, shape) = (&*solution, solution.shape());

@@ -23,14 +23,20 @@ pub(super) fn quasi_static_start(problem: &mut Problem) -> Result<[Vec<f64>; 2],
     Ok([xs, us])
 }
 
+/// Returns whether the start of a resumed solve is lost: its cost or its largest gap is not finite, or it costs far
+/// more than the last solution.
+pub(super) fn is_lost(cost: f64, gap: f64, last_cost: f64) -> bool {
+    let limit = if last_cost.is_finite() { LOST * (1.0 + last_cost.abs()) } else { f64::INFINITY };
+    !(gap.is_finite() && cost.is_finite() && cost - last_cost <= limit)
+}
+
 impl SolverLoop {
     /// Replaces a lost start of a resumed solve by x̂₀ at all knots and the controls that hold x̂₀ still, if the
     /// replacement costs less. A start is lost if its cost or a gap is not finite, or if it costs far more than the
     /// last solution. Returns the largest gap of the start. Allocates only if the start is lost.
     pub(super) fn recover(&mut self, problem: &mut Problem, settings: &Settings, gap: f64, last_cost: f64) -> f64 {
         let cost = self.iterate.solution.cost;
-        let limit = if last_cost.is_finite() { LOST * (1.0 + last_cost.abs()) } else { f64::INFINITY };
-        if gap.is_finite() && cost.is_finite() && cost - last_cost <= limit {
+        if !is_lost(cost, gap, last_cost) {
             return gap;
         }
         let Ok([mut xs, mut us]) = quasi_static_start(problem) else { return gap };

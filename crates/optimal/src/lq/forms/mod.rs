@@ -122,7 +122,7 @@ impl Forms {
 }
 
 /// Function that writes the second derivatives of λᵀφ at a knot, and returns whether it wrote them.
-pub(super) type CurvatureFn<'a> = dyn FnMut(usize, &[f64], &mut Hessian) -> bool + 'a;
+pub(crate) type CurvatureFn<'a> = dyn FnMut(usize, &[f64], &mut Hessian) -> bool + 'a;
 
 /// Arguments with which a form obtains the curvature of a knot's dynamics; see
 /// [`Sweep::run_with`](crate::Sweep::run_with).

@@ -48,22 +48,23 @@ impl Problem {
     /// If a length is wrong.
     #[track_caller]
     pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
-        self.calc_with_motions(xs, us, next, costs, &mut []);
+        self.calc_with(xs, us, next, costs, [&mut [], &mut []]);
     }
 
-    /// Computes as [`calc`](Self::calc) does, and also writes the motion of each knot to `motions`. `motions` is empty,
-    /// or consists of N equal parts of [`motion_size`](Self::motion_size) entries.
+    /// Computes as [`calc`](Self::calc) does, and also writes the motions and the constraints of the knots. Each may be
+    /// empty. `motions` consists of N equal parts of [`motion_size`](Self::motion_size) entries. `constraints` consists
+    /// of N + 1 equal parts for the values g(x, u); constraints then add no terms to the costs.
     #[track_caller]
-    pub(crate) fn calc_with_motions(
+    pub(crate) fn calc_with(
         &mut self,
         xs: &[f64],
         us: &[f64],
         next: &mut [f64],
         costs: &mut [f64],
-        motions: &mut [f64],
+        [motions, constraints]: [&mut [f64]; 2],
     ) {
         let (nx, horizon) = (self.nx(), self.horizon());
-        let size = motions.len() / horizon;
+        let (size, rows) = (motions.len() / horizon, constraints.len() / (horizon + 1));
         self.assert_trajectory(xs, us);
         assert_length("next", next.len(), horizon * nx);
         assert_length("costs", costs.len(), horizon + 1);
@@ -71,10 +72,12 @@ impl Problem {
             let (x, u) = self.places(knots);
             let motions = &mut motions[knots.start * size..knots.end * size];
             let mut results = Results::values(&mut next[x.clone()], &mut costs[knots.clone()], motions);
+            results.constraints = &mut constraints[knots.start * rows..knots.end * rows];
             let (action, t) = (&mut *self.models.actions[*action], &self.knots[knots.clone()]);
             evaluate(action, t, &xs[x], &us[u], Evaluation::Values, &mut results);
         }
         let mut results = Results::values(&mut self.unread, &mut costs[horizon..], &mut []);
+        results.constraints = &mut constraints[horizon * rows..];
         let x = &xs[self.shape.x(horizon)];
         evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Values, &mut results);
     }
@@ -102,7 +105,7 @@ impl Problem {
             evaluate(action, t, &xs[x], &us[u], what.part(knots.clone(), horizon), &mut results);
         }
         let (x, mut results) = (&xs[self.shape.x(horizon)], Results::derivatives(&mut lq_knots[horizon..]));
-        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], Evaluation::Derivatives, &mut results);
+        evaluate(&mut *self.terminal, &self.knots[horizon..], x, &[], what.without_equations(), &mut results);
     }
 
     /// Computes [`calc_diff_as`](Self::calc_diff_as) on `gains.len()` threads of the rayon pool from which it is
@@ -129,7 +132,7 @@ impl Problem {
         let t = shape.horizon();
         let ((lq_knots, end), (found, found_there)) = (lq_knots.split_at_mut(t), found.split_at_mut(t));
         let mut results = Results::derivatives(&mut *end);
-        evaluate(&mut **terminal, &knots[t..], &xs[shape.x(t)], &[], Evaluation::Derivatives, &mut results);
+        evaluate(&mut **terminal, &knots[t..], &xs[shape.x(t)], &[], what.without_equations(), &mut results);
         sweep(&**terminal, t, end, found_there);
         let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets, what };
         copies.calc_diff(models, runs, all, lq_knots, found, gains, sweep);

@@ -141,7 +141,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.pack(model, group.xs, to);
         pack(to.len(), |k| &to[k].tau, &mut self.tau);
         match group.what {
-            Evaluation::Equations(_) => self.run_equations(model, to),
+            Evaluation::Equations { .. } => self.run_equations(model, to),
             what => self.run_pass(model, what == Evaluation::Derivatives, terms.layout().forces, to),
         }
         self.run_residuals(model, group, terms, to);

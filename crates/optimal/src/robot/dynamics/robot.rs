@@ -109,8 +109,8 @@ fn lanes(kind: &DynamicsKind) -> usize {
 }
 
 impl VectorBatches {
-    /// Allocates the workspace for the equations of knots in inverse-dynamics form. Only the batch with the widest
-    /// registers needs it, because only derivatives use these equations.
+    /// Allocates the workspace for the equations of knots in inverse-dynamics form. Only derivatives use these
+    /// equations, and derivatives are computed in the widest registers, so only that batch needs the workspace.
     fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         match &mut self.long {
             Some(long) => long.reserve(tableau, eliminations),
@@ -299,7 +299,7 @@ impl RobotDynamics {
     /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
         let Group { knots, xs, us, what, .. } = group;
-        if let Evaluation::Equations(motions) = what {
+        if let Evaluation::Equations { motions, .. } = what {
             match motions.is_empty() {
                 true => self.solve(Group { what: Evaluation::Values, ..group }),
                 false => self.set_motions(knots.len(), motions),
@@ -323,7 +323,7 @@ impl RobotDynamics {
                 data.lambda.copy_from_slice(forces);
             }
         }
-        let equations = matches!(what, Evaluation::Equations(_));
+        let equations = matches!(what, Evaluation::Equations { .. });
         match vectors.as_mut().filter(|_| count >= WORTHWHILE || equations) {
             Some(VectorBatches { long: Some(long), .. }) if count > Short::LANES || what != Evaluation::Values => {
                 long.run(model, group, terms, data);
@@ -349,6 +349,12 @@ impl RobotDynamics {
         (&data.a, cost, term)
     }
 
+    /// Writes the residuals of the limits at one knot of the last group in [`solve`](Self::solve).
+    pub(crate) fn write_limits(&mut self, lane: usize, KnotInput { t, x, u }: KnotInput<'_>, to: &mut [f64]) {
+        let Parts { terms, work: Work { data, .. }, .. } = self.parts();
+        terms.write_limits(t, KnotState { x, u, data: &data[lane] }, to);
+    }
+
     /// Returns the derivatives of the accelerations at one knot of the last group in [`solve`](Self::solve). Writes the
     /// derivatives of `scale` · ℓ and of the limit term to the LQ knot. If [`solve`](Self::solve) computed equations of
     /// inverse dynamics, the LQ knot is written in inverse-dynamics form if possible.
@@ -362,7 +368,7 @@ impl RobotDynamics {
     ) -> Derivatives<'_> {
         let (given, KnotInput { t, x, u }) = (self.given, input);
         let Parts { model, actuation, terms, work, .. } = self.parts();
-        let equations = matches!(what, Evaluation::Equations(_));
+        let equations = matches!(what, Evaluation::Equations { .. });
         let inverse = equations && work.write_equations(terms, lane, input, scale, knot);
         let Work { single, data, da_du, .. } = work;
         if equations && !inverse {

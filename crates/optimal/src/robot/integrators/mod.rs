@@ -177,6 +177,25 @@ impl<M: ContinuousModel> Integrated<M> {
         !matches!(self.method, Method::RungeKutta(_)) && self.controls.is_constant()
     }
 
+    /// Sets whether limits add their terms of the augmented Lagrangian to the cost.
+    fn set_limits_in_cost(&mut self, counted: bool) {
+        if let Some(robot) = robot_mut(&mut self.inner) {
+            robot.terms.limits.in_cost = counted;
+        }
+    }
+
+    /// Writes the residuals of the limits at one knot of the last solved group. For a Runge–Kutta method, whose stages
+    /// are solved later, solves the first stage.
+    fn write_limits(&mut self, lane: usize, input: KnotInput<'_>, to: &mut [f64]) {
+        let input = KnotInput { u: &input.u[..self.inner.nu()], ..input };
+        if matches!(self.method, Method::RungeKutta(_)) {
+            solve(&mut self.inner, Group::one(&input, Evaluation::Values, true));
+        }
+        if let Some(robot) = robot_mut(&mut self.inner) {
+            robot.write_limits(lane, input, to);
+        }
+    }
+
     /// Returns the controls from which a step is computed. For a Runge–Kutta method these are all nodes of the
     /// polynomial; for other methods, only u(0).
     fn controls_of_step<'u>(&self, u: &'u [f64]) -> &'u [f64] {
@@ -212,6 +231,8 @@ impl<M: ContinuousModel> Integrated<M> {
             (Method::Euler, _, Some(first)) => {
                 euler::calc_diff(inner, lane, input, dt, group, retraction, first);
                 widen(first, knot);
+                core::mem::swap(&mut first.rows, &mut knot.rows); // u = w₀ has the same columns
+                first.rows.clear();
             }
             (Method::Euler, ..) => euler::calc_diff(inner, lane, input, dt, group, retraction, knot),
             (_, Some(method), _) => method.calc_diff(inner, input, dt, retraction, knot),
@@ -250,7 +271,13 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
             _ => assert_length("lq_knots", results.lq_knots.len(), count),
         }
         let motion = KnotGroup::inverse_dynamics(self).map_or(0, |(size, _)| size);
-        let what = if motion == 0 && what != Evaluation::Values { Evaluation::Derivatives } else { what };
+        let constraints = results.constraints.len() / count.max(1);
+        self.set_limits_in_cost(!what.has_rows() && constraints == 0);
+        let what = match what {
+            Evaluation::Values => what,
+            Evaluation::Equations { .. } if motion > 0 => what,
+            _ => Evaluation::Derivatives,
+        };
         let (lanes, room) = (GroupModel::lanes(self), results.motions.len() / count.max(1));
         for from in (0..count).step_by(lanes) {
             let to = (from + lanes).min(count);
@@ -270,6 +297,10 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
                 }
                 if let Some(robot) = robot_mut(&mut self.inner).filter(|_| motion.min(room) > 0) {
                     robot.copy_motion(lane, &mut results.motions[i * room..][..motion]);
+                }
+                if constraints > 0 {
+                    let to = &mut results.constraints[i * constraints..][..constraints];
+                    self.write_limits(lane, input, to);
                 }
                 results.costs[i] = self.step(lane, input, &mut results.next[i * nx..][..nx]);
             }
@@ -396,6 +427,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         if self.method != Method::Terminal {
             assert_length("next", next.len(), self.nx());
         }
+        self.set_limits_in_cost(true);
         let input = KnotInput { t, x, u: self.controls_of_step(u) };
         if !matches!(self.method, Method::RungeKutta(_)) {
             solve(&mut self.inner, Group::one(&input, Evaluation::Values, true));

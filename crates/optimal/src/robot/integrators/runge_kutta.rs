@@ -177,6 +177,10 @@ impl RungeKutta {
                 self.dk.iter().zip(self.dsum.iter_mut()).for_each(|(dk, sum)| *sum += weight * dk);
                 self.add_cost(knot, i, n, nu);
             }
+            if i == 0 {
+                core::mem::swap(&mut self.stage.rows, &mut knot.rows); // at c₀ = 0, y = x and u = w₀
+                self.stage.rows.clear();
+            }
         }
         step.delta.copy_from_slice(&self.sum[..nv]);
         step.differentiate(model);

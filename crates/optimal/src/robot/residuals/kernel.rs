@@ -150,8 +150,8 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
     }
 }
 
-/// Computes the distances of residual i of a list, and the rows of their Jacobian. All knots of the group have the pairs
-/// of bodies of `plan`, but the geometries may differ.
+/// Computes the distances of residual i of a list, and the rows of their Jacobian. All knots of the group have the
+/// pairs of bodies of `plan`, but the geometries may differ.
 fn write_distances<S: Block<Number = f64>>(
     placements: Placements<'_, S>,
     group: &mut KnotGroup<'_>,

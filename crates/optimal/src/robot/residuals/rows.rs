@@ -97,6 +97,21 @@ impl Rows {
         self.rows[k * self.stride + self.nu + self.nv..][..self.nv].copy_from_slice(row);
     }
 
+    /// Returns row i of those that were pushed with respect to the columns (q, v, u) of δx and δu, and the column of
+    /// its first entry. If all rows are functions of q alone, the row has only the columns of q.
+    pub(crate) fn of_knot(&mut self, i: usize) -> &[f64] {
+        let (u, v) = (self.nu, self.nv);
+        if i >= self.whole {
+            let k = self.slopes.len() - 1 - (i - self.whole);
+            return &self.rows[k * self.stride + u + v..][..v];
+        }
+        let (row, to) = (&self.rows[i * self.stride..][..u + 2 * v], &mut self.left[..u + 2 * v]);
+        to[..v].copy_from_slice(&row[u + v..]);
+        to[v..2 * v].copy_from_slice(&row[u..u + v]);
+        to[2 * v..].copy_from_slice(&row[..u]);
+        to
+    }
+
     /// Writes q, r, Q, S and R from the matrix G of all rows: the gradient is Gᵀ a′, the Hessian Gᵀ a″ G. In
     /// inverse-dynamics form, only the gradient and the block of Q for positions are written. The sweep then uses the
     /// rows that depend on more than positions.

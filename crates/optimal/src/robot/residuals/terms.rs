@@ -84,9 +84,14 @@ impl<T: Term> Terms<T> {
         self.plans.last().map_or(0, |plan| plan.first + plan.n)
     }
 
+    /// Returns all terms with the plans of their residuals.
+    pub(crate) fn with_plans(&self) -> impl Iterator<Item = (&T, &Plan)> {
+        self.all.iter().zip(&self.plans)
+    }
+
     /// Returns the terms whose weight is not 0.
     fn weighty(&self) -> impl Iterator<Item = (&T, &Plan)> {
-        self.all.iter().zip(&self.plans).filter(|(term, _)| term.weight() != 0.0)
+        self.with_plans().filter(|(term, _)| term.weight() != 0.0)
     }
 
     /// Returns the sum of the objective over all terms.

@@ -5,7 +5,7 @@ use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
-use crate::lq::{Hessian, LARGEST_BLOCK, LqKnot};
+use crate::lq::{ConstraintRow, Hessian, LARGEST_BLOCK, LqKnot};
 use crate::robot::knot_data::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::outputs::Output;
 use crate::robot::state::{groups, state_difference};
@@ -220,6 +220,53 @@ impl ResidualView<'_> {
                 for (k, w) in plan.W[i * rows..(i + 1) * rows].iter().enumerate().filter(|(_, w)| **w != 0.0) {
                     sensitivities.add_row(Output::Force, plan.rows.start + k, *w, g); // W ∂λ
                 }
+            }
+        }
+    }
+
+    /// Appends the residual that was just computed to the constraint rows of an LQ knot, with the given bounds. At a
+    /// knot in inverse-dynamics form, the columns of the unknowns replace the columns of δu, and the columns of δu
+    /// follow.
+    pub(crate) fn push_constraint_rows(
+        &mut self,
+        residual: &Residual,
+        plan: &Plan,
+        sensitivities: &dyn Sensitivities,
+        [lower, upper]: [&[f64]; 2],
+        knot: &mut LqKnot,
+    ) {
+        let (n, nu, nv) = (knot.ndx(), knot.nu(), self.model.nv());
+        let inverse = knot.structure.is_inverse_dynamics();
+        let s = &mut *self.scratch;
+        let mut push = |first: usize, entries: &[f64], i: usize, c: f64| {
+            knot.rows.push(ConstraintRow { first, entries, c, lower: lower[i], upper: upper[i] });
+        };
+        match residual {
+            Residual::State { .. } => {
+                if !s.groups.is_empty() {
+                    difference_jacobian_groups(self.model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
+                }
+                for i in 0..plan.n {
+                    let mut row = [0.0; LARGEST_BLOCK];
+                    match s.groups.iter().find(|group| group.contains(&i)) {
+                        Some(group) => {
+                            group.clone().zip(&mut row).for_each(|(j, entry)| *entry = s.D[(i, j)]);
+                            push(group.start, &row[..group.len()], i, s.r[i]);
+                        }
+                        None => push(i, &[1.0], i, s.r[i]),
+                    }
+                }
+            }
+            _ if residual.part() == Part::Diagonal => {
+                let first = n + if inverse { nu } else { 0 };
+                (0..plan.n).for_each(|i| push(first + i, &[1.0], i, s.r[i]));
+            }
+            _ => {
+                s.clear();
+                s.d[..plan.n].fill(1.0); // every row is needed, inside its bounds too
+                self.push_rows(residual, plan, sensitivities);
+                let s = &mut *self.scratch;
+                (0..plan.n).for_each(|i| push(0, s.rows.of_knot(i), i, s.r[i]));
             }
         }
     }
