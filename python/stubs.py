@@ -109,15 +109,15 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
-        facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
-        Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
+        facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps
+        sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
         bias damping dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
         regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
-    "float | None": "DifferentialAction.dt FreeDynamics.dt",
+    "float | None": "DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings",
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
     "list[tuple[int, Residual]]": " ".join(
@@ -180,8 +180,10 @@ ARGUMENTS = {
     "Callable[[Any, NDArray[Any], NDArray[Any]], Any]": "Residual.own.calc Residual.own_cost.calc",
     "Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]]": """
         ConstrainedAction.calc_diff Residual.own.calc_diff""",
-    "dict[str, Any]": "AugmentedLagrangian.inner Fddp._make.settings AugmentedLagrangian._make.settings",
-    "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner",
+    "dict[str, Any]": """
+        AugmentedLagrangian.inner AugmentedLagrangian._make.settings Fddp._make.settings
+        InteriorPoint._make.settings""",
+    "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner InteriorPoint._make.inner",
     "Sequence[Any]": "parts",
     "float | str | None": "Fddp.settings",
     'Literal["world", "frame"]': "FrictionContact.axes",
@@ -265,7 +267,8 @@ RESULTS = {
     "None": """
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
-        AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
+        AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift InteriorPoint.shift
+        Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_costs Problem.set_duration Problem.set_knot
@@ -302,13 +305,16 @@ RESULTS = {
     "_Status": "Simulation.run Simulation.step",
     "Ground | None": "Simulation.ground",
     "GroundContacts": "Simulation.contacts",
-    "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
+    "Solution": """
+        AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve InteriorPoint.resume
+        InteriorPoint.solve InteriorPoint.tick""",
     "Evaluation": "Problem.evaluate Problem._evaluate",
     "list[LqKnot]": "Problem.derivatives",
     "SweepResult": "Sweep.run",
-    "Solution | None": "AugmentedLagrangian.solution Fddp.solution",
-    "Outcome": "AugmentedLagrangian.outcome",
-    "Mapping[str, Any]": "AugmentedLagrangian.inner AugmentedLagrangian.settings Fddp.settings",
+    "Solution | None": "AugmentedLagrangian.solution Fddp.solution InteriorPoint.solution",
+    "Outcome": "AugmentedLagrangian.outcome InteriorPoint.outcome",
+    "Mapping[str, Any]": """
+        AugmentedLagrangian.inner AugmentedLagrangian.settings Fddp.settings InteriorPoint.settings""",
     "AllTerms": "compute_all_terms",
     "CentroidalMap": "centroidal_map",
     "CentroidalMapRate": "centroidal_map_rate",

@@ -47,6 +47,7 @@ from ._types import (
     RneaHessian,
     RneaSecondDerivatives,
     Solution,
+    Sphere,
     Spring,
     SweepResult,
 )
@@ -80,6 +81,7 @@ __all__ = [
     "FrictionContact",
     "HyperDual",
     "ImpulseDynamics",
+    "InteriorPoint",
     "Joint",
     "Limit",
     "Lqr",
@@ -369,9 +371,9 @@ def forward_dynamics(
     m/s²).
 
     q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`. method: 'aba', the
-    articulated-body algorithm, O(n); 'dense', a dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros
-    of the tree, O(n d²) for depth d; None, the fastest of these: 'sparse' for a robot with mimic joints, else 'aba'.
-    All methods give the same numbers, up to rounding.
+    articulated-body algorithm, O(n) for n coordinates; 'dense', a dense factor of M, O(n³); 'sparse', a factor of M
+    that keeps the zeros of the tree, O(n d²) for depth d of the tree. None selects 'sparse' for a robot with mimic
+    joints, and 'aba', the fastest method, for all other robots. All methods give the same numbers, up to rounding.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -511,8 +513,9 @@ class ModelBuilder:
 
         joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
         tendon: the tendon's name, if the actuator drives a tendon.
-        gear: one to six numbers; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1 if
-        both are 0, as for a motor. control, force: (minimum, maximum); None for no limits.
+        gear: one to six numbers; None is 1. gain: the force per unit of control. None means kp if kp is not 0, else kv
+        if kv is not 0. If both are 0, None means 1, as for a motor. control, force: (minimum, maximum); None for no
+        limits.
         """
 
     def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
@@ -626,7 +629,8 @@ class ModelBuilder:
         """
 
     def spring(self, body: BodyId, stiffness: ArrayLike, rest: ArrayLike) -> None:
-        """Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
+        """Adds a spring to a joint: τ = −(k₀ + k₁ Δ + k₂ Δ²) Δ with the displacement Δ = q ⊖ rest. For joints with several
+        degrees of freedom, the brackets contain |Δ| instead of Δ.
 
         body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
         spring is at rest, with as many numbers as the joint has in q.
@@ -895,11 +899,12 @@ class ConstraintSet:
     Make one set for each combination of contacts; all sets may share one `Data`. Only one thread at a time may use a
     set.
 
-    With μ > 0 the forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', where b is the right-hand side without regularisation.
-    In the first iteration λ' is 0; in each later iteration λ' is the previous λ. Redundant constraints then share the
-    forces, with the smallest norm of λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration
-    is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
-    sparse resolution of constrained dynamic equations (2021).
+    With a regularisation μ > 0, the constraint forces λ solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ'. J is the Jacobian of the
+    constraints, M the inertia matrix, and b the right-hand side without regularisation. In the first iteration λ' is 0;
+    in each later iteration λ' is the previous λ. Redundant constraints then share the forces, with the smallest norm of
+    λ. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on
+    earlier rows get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained
+    dynamic equations (2021).
 
     model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
     to 10000; all of them are computed.
@@ -955,7 +960,8 @@ def constrained_dynamics(
     out: Constrained | Sequence[_Array] | None = None,
 ) -> Constrained:
     """Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
-    dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
+    dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`. J is the Jacobian of the
+    constraints. γ contains J̇ v, the stabilisation, and the constraints' target accelerations with a minus sign.
 
     constraints: a `ConstraintSet`; q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as
     for `rnea`. If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the
@@ -1009,9 +1015,10 @@ def constrained_dynamics_equations(
 
         M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 
-    `constrained_dynamics_derivatives` solves these equations; this function does not solve them. constraints: a
-    `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position, nq numbers; v, tau: velocity and
-    efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames. ∂/∂q is taken in the tangent space.
+    Symbols are as for `constrained_dynamics`. `constrained_dynamics_derivatives` solves these equations; this function
+    does not solve them. constraints: a `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: position,
+    nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`, constant in the bodies' frames.
+    ∂/∂q is taken in the tangent space.
     out: one array for each member, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
@@ -1031,7 +1038,7 @@ def impulse_dynamics(
     out: Impulse | Sequence[_Array] | None = None,
 ) -> Impulse:
     """Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
-    lambda_, residual, redundant)`.
+    lambda_, residual, redundant)`. J is the Jacobian of the constraints, and M the inertia matrix.
 
     constraints: a `ConstraintSet`, whose gains and targets of velocity and acceleration are ignored; q: position, nq
     numbers; v: velocity, nv numbers; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
@@ -1404,12 +1411,13 @@ class Cholesky:
 class DivideConquer:
     """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and scratch memory.
 
-    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
-    joining two parts of the robot costs about six times as much as eliminating a body. With two threads and two runs,
-    the algorithm is faster than `aba` from about 200 bodies on; with one thread it is always slower. For a robot with
-    mimic joints, the passes run once with all joints free, and once more for each joint that shares a coordinate. The
-    results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
-    algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+    The robot is assembled from runs: groups of at most `grain` adjacent bodies, which are eliminated one after the
+    other. With `grain` = 1 the algorithm takes O(log n) steps for n bodies. But joining two parts of the robot costs
+    about six times as much as eliminating a body. With two threads and two runs, the algorithm is faster than `aba`
+    from about 200 bodies on. With one thread it is always slower. For a robot with mimic joints, the passes run once
+    with all joints free, and once more for each joint that shares a coordinate. The results are bit-identical for any
+    number of threads. Source: Featherstone, A divide-and-conquer articulated-body algorithm for parallel O(log(n))
+    calculation of rigid-body dynamics (1999).
 
     model: the robot; grain: the maximum number of bodies in a run.
 
@@ -1438,8 +1446,8 @@ class DivideConquer:
         f_ext: ArrayLike | None = None,
         out: _Array | None = None,
     ) -> _Array:
-        """Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding, in O(n) work and O(log n
-        + grain) steps.
+        """Computes the acceleration q̈, nv numbers, equal to the result of `aba` up to rounding. For n bodies, the work is
+        O(n) and the number of steps O(log n + grain).
 
         model: the planned model, or another model with the same bodies and joints; q: position, nq numbers; v, tau:
         velocity and efforts, nv numbers each;
@@ -1700,8 +1708,8 @@ def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     """
 
 def pseudo_inertia(inertia: Inertia) -> _Array:
-    """Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
-    kg m and kg.
+    """Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], (4, 4), in kg m², kg m and kg, with the mass m and the centre of
+    mass c. J is the integral of the products of (x, y, z, 1) over the mass; Σ contains the products of x, y and z.
 
     J is linear in the parameters. J is positive definite if and only if a body of positive density can have this
     inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
@@ -2648,7 +2656,7 @@ class Action:
     """An action written in Python.
 
     nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; the next state may be None only at the
+    calc: a function of (t, x, u) that returns the next state x⁺ and the cost ℓ; the next state may be None only at the
         terminal knot.
     calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
         ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without calc_diff, calc is called with arrays of
@@ -2851,9 +2859,10 @@ class AugmentedLagrangian:
     ) -> Solution:
         """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
 
-        Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-        an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
-        Then `solution` is the best iterate, from which `resume` continues.
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+        phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+        KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+        `resume` continues.
 
         xs: states, (N + 1, nx), which need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
@@ -2867,10 +2876,11 @@ class AugmentedLagrangian:
 
 @final
 class ConstrainedAction:
-    """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
+    """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `InteriorPoint` and `AugmentedLagrangian`
+    enforce.
 
-    `Fddp` alone treats the constraint as a cost of values outside the bounds. For residuals of a robot, `Limit` is
-    faster.
+    `Fddp` without `AugmentedLagrangian` treats the constraint as a cost of values outside the bounds. For residuals of
+    a robot, `Limit` is faster.
 
     action: the action.
     size: the number of entries of g, at most 4096.
@@ -2900,8 +2910,8 @@ class ConstrainedAction:
 
 @final
 class ContactDynamics:
-    """A knot of a robot in contact, with contact forces λ: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0. Integrator and cost are as
-    for `FreeDynamics`.
+    """A knot of a robot in contact: M q̈ + h = S u + Jᵀλ and J q̈ + γ = 0, with the contact forces λ, the Jacobian J of
+    the contacts, and γ as for `constrained_dynamics`. Integrator and cost are as for `FreeDynamics`.
 
     model: the robot.
     contacts: a dict of `ContactConstraint`s by name, which may be empty. Residuals refer to a contact by this name.
@@ -2948,10 +2958,12 @@ class ContactInverseDynamics:
     = (q̈, λ), and τ = M q̈ + h − Jᵀλ. Integrator and cost are as for `FreeDynamics`.
 
     By default the knot has two kinds of `Limit`, which keep a residual at zero. The limit named `undriven efforts`
-    keeps Nᵀτ = 0, where Nᵀ S = 0; for a floating base, Nᵀτ are the first 6 efforts. A limit named `contact` and the
-    contact's name keeps J q̈ + γ = 0. `AugmentedLagrangian` enforces both limits; `Fddp` alone treats them as costs. No
-    matrix is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
-    `DifferentialActionModelContactInvDynamics`, and without contacts as in `DifferentialActionModelFreeInvDynamics`.
+    keeps Nᵀτ = 0. The columns of N are the directions without actuators, Nᵀ S = 0 with the actuation S. For a floating
+    base, Nᵀτ are the first 6 efforts. A limit named `contact` and the contact's name keeps J q̈ + γ = 0, as in
+    `constrained_dynamics`. `InteriorPoint` and `AugmentedLagrangian` enforce both limits; `Fddp` without
+    `AugmentedLagrangian` treats them as costs. No matrix is inverted, so contacts may be redundant. The equations are
+    the same as in Crocoddyl's `DifferentialActionModelContactInvDynamics`, and without contacts as in
+    `DifferentialActionModelFreeInvDynamics`.
 
     model: the robot.
     contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. The dict may be empty.
@@ -2998,8 +3010,8 @@ class Cost:
     name: the name of the term for `Problem.set_weight` and in error messages.
     weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
-    activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone or a centre of pressure,
-        the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
+    activation: an `Activation`. None chooses the barrier with the residual's bounds for a cone, a centre of pressure or
+        distances, the sum for `Residual.own_cost`, and the quadratic cost for other residuals.
 
     >>> from condyle.optimal import Cost, Residual
     >>> Cost("effort", 1e-3, Residual.control([0.0] * 7))
@@ -3071,16 +3083,16 @@ class Fddp:
         `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
         yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
         has used up the budget returns its current result, with the status "time_limit". The first iteration always
-        runs, unless the budget is 0. A later phase of an iteration runs only if the median of its last five durations
-        fits into the budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the
-        number of segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep
-        uses as many threads as are available. The number of segments changes the results by rounding errors; the number
-        of threads does not change them. `threads`: the number of threads that share an iteration on a robot
-        (derivatives and gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical for
-        any number of these threads. `max_iterations`, `tolerance`, `tolerance_bounded` (if controls are bounded),
-        `step_lengths`, `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`,
-        `regularisation_max`, `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`:
-        the thresholds of the method.
+        runs, unless the budget is 0. In later iterations, each phase (derivatives, backward sweep, rollout) runs only
+        if the median of its last five durations fits into the budget. If a solve takes longer than the budget,
+        `timings.overrun` is the excess. `segments`: the number of segments of the horizon on which a sweep works at the
+        same time, at most 1024, default 1. The sweep uses as many threads as are available. The number of segments
+        changes the results by rounding errors; the number of threads does not change them. `threads`: the number of
+        threads that share an iteration on a robot (derivatives and gains, in parallel with the sweep), at most 1024,
+        default 1. The results are bit-identical for any number of these threads. `max_iterations`, `tolerance`,
+        `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+        `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
+        `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
     """
 
     def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
@@ -3142,9 +3154,10 @@ class Fddp:
     ) -> Solution:
         """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
 
-        Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
-        an iteration. An exception of a signal handler, such as KeyboardInterrupt, ends the solve and is raised.
-        Then `solution` is the best iterate, from which `resume` continues.
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+        phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+        KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+        `resume` continues.
 
         xs: states, (N + 1, nx), which need not satisfy the dynamics.
         us: controls, (N, nu), or a list of N arrays if knots differ in nu.
@@ -3166,12 +3179,12 @@ class FreeDynamics:
     model: the robot.
     dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
     costs: a list of `Cost`.
-    costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve several
-        knots of a phase.
+    costs_at: lists of `Cost` by index of the knot. At these knots they replace `costs`, so one action can serve all
+        knots of a contact phase.
     actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
     lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
-    limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
+    limits: a list of `Limit`, or None; `InteriorPoint` and `AugmentedLagrangian` enforce them.
     limits_at: lists of `Limit` by index of the knot. At these knots they replace `limits`.
     controls: the polynomial that the controls follow within a knot: 'constant', 'linear' or 'quadratic'. The knot then
         has nu, 2 nu or 3 nu controls: one value of u; values at the times 0 and Δt/2; or values at 0, Δt/2 and Δt
@@ -3231,8 +3244,8 @@ class FreeInverseDynamics:
 
 @final
 class FrictionCone:
-    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper for a force
-    f.
+    """Coulomb's friction cone ‖f_t‖ ≤ μ f_n of a force f with tangential part f_t and normal component f_n, as a pyramid.
+    The pyramid and the bounds on the normal force are the rows lower ≤ A f ≤ upper.
 
     mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
     rotation: the surface's axes in the contact's axes, (3, 3), with the surface's normal as z axis; least, greatest:
@@ -3264,8 +3277,8 @@ class FrictionCone:
 
 @final
 class ImpulseDynamics:
-    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v. The cost is Σ
-    w a(r), as for `FreeDynamics` without Δt.
+    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, with the
+    inertia matrix M and the Jacobian J of the contacts. The cost is Σ w a(r), as for `FreeDynamics` without Δt.
 
     An impact has no controls.
 
@@ -3294,16 +3307,170 @@ class ImpulseDynamics:
         """Returns an empty array, since an impact has no controls."""
 
 @final
-class Limit:
-    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
+class InteriorPoint:
+    """The primal–dual interior point method with multiple shooting: for robots with `Limit`s, bounds on controls, and
+    `ConstrainedAction`s.
 
-    Limits apply at the beginning of a knot. `Fddp` alone treats limits as costs of values outside the bounds.
+    A slack variable s replaces each limited number. The method replaces each bound by a barrier term −μ log(s − lower)
+    or −μ log(upper − s). It makes Newton steps for states, controls, slack variables and multipliers, while μ falls to
+    zero. Each step is a single sweep over the horizon, which costs little more than a sweep without limits. A filter
+    accepts a step if either the violation or the cost with barrier terms decreases enough. If no step is accepted,
+    or the violation stalls, the method starts anew with careful steps. Later, a restoration reduces the violation
+    alone.
+
+    Use `InteriorPoint` for problems with limits, and `tick` for model predictive control with limits. It takes fewer
+    iterations than `AugmentedLagrangian`, but its trajectory has gaps until it converges. Use `AugmentedLagrangian`
+    if `InteriorPoint` does not converge, or if the result of each iteration must satisfy the dynamics. Use `Fddp` if
+    there are no limits.
+
+    `solve` computes the first slack variables and multipliers from the warm start. `resume` and `tick` begin with the
+    slack variables and multipliers of the last solve, and `shift` also shifts them. `settings` may be assigned before
+    each of these calls. The status is "converged" if the gradient of the Lagrangian, the complementarity and the gaps
+    are below the tolerance, and the violation is below a tenth of it. A violated limit is never reported as
+    "converged". The status is "infeasible" if the restoration ended where no small step reduces the violation, or if
+    the initial state itself violates a limit of knot 0 that no control can change. The first case does not prove that
+    no solution exists: another warm start may find one. The status is "constraints_violated" if the restoration reached
+    its maximum number of iterations. `outcome.worst` contains the knot, the limit and the amount of the largest
+    violation. "regularisation_limit", "max_iterations", "time_limit", "interrupted" and "not_finite" have the same
+    meanings as for `Fddp`; the solution is then the best iterate. The status is also "regularisation_limit" if the
+    residuals no longer decrease near a solution. The costs of the solution and of `outcome` are equal and do not
+    include terms of the limits.
+
+    The gains K contain the limits. Near a bound, the feedback is stiff in the direction of this bound. With μ near
+    zero, active rows are equations: K does not move a control that is at its bound, and keeps other active limits at
+    their bounds for small deviations of the state. Rows that are not active do not change K.
+
+    problem: the problem to solve. All memory is allocated once, for the size of this problem.
+    settings: any of the following settings, by name. `tolerance`: see above, default 1e-6; the gradient and the
+        complementarity are scaled as in IPOPT. `max_iterations`: default 300. `barrier_start`: μ of the first
+        iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `second_order`:
+        whether to use the curvature of the dynamics near the solution, if the models provide it. This saves iterations
+        if this curvature is large compared with the costs. `inverse_dynamics_form`, `time_budget` (s), `threads`: as
+        for `Fddp`; the results are bit-identical for any number of threads. `regularisation_min`, `regularisation_max`:
+        the smallest and the largest regularisation; a solve that reaches the largest one stops.
+
+    >>> from condyle.optimal import Cost, FreeDynamics, InteriorPoint, Limit, Problem, Residual
+    >>> arm = condyle.robots.arm7()
+    >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+    >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
+    >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
+    >>> solver = InteriorPoint(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
+    >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
+    ('converged', True, True)
+    >>> solver.shift(0)
+    >>> problem.set_x0(solution.xs[1])
+    >>> solver.tick(2).us.shape
+    (10, 7)
+    """
+
+    def __new__(cls, problem: Problem, **settings: float | None) -> InteriorPoint: ...
+    @property
+    def outcome(self) -> Outcome:
+        """The violation of limits and other results of the last solve or tick, as an `Outcome`."""
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """All settings by name, as a read-only mapping.
+
+        An assignment of a mapping changes the settings that it names; the others stay. The next `solve` or
+        `resume` uses them: `solver.settings = {"tolerance": 1e-4}`.
+
+        Raises `ProblemError` for an invalid number; then no setting changes.
+        """
+
+    @property
+    def solution(self) -> Solution | None:
+        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
+        ("interrupted"); None before the first solve.
+        """
+
+    @staticmethod
+    def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> InteriorPoint: ...
+    def resume(
+        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+    ) -> Solution:
+        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+        `Solution`.
+
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
+        least one iteration.
+
+        callback, verbose, progress: as for `solve`.
+
+        Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def shift(self, last: int) -> None:
+        """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
+
+        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
+        limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
+        model has for all knots. The last control is repeated, and the last state follows from this control. At
+        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
+        repeated controls would diverge.
+
+        last: the index of the new last knot's model.
+
+        Raises `ProblemError` if the model does not exist.
+        """
+
+    def solve(
+        self,
+        xs: ArrayLike,
+        us: _Controls,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+    ) -> Solution:
+        """Solves the problem from a warm start. Returns a `Solution`; its status shows how the solve ended.
+
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the three
+        phases of an iteration (derivatives, backward sweep, rollout). An exception of a signal handler, such as
+        KeyboardInterrupt, ends the solve and is raised. Then `solution` is the best iterate, from which
+        `resume` continues.
+
+        xs: states, (N + 1, nx), which need not satisfy the dynamics.
+        us: controls, (N, nu), or a list of N arrays if knots differ in nu.
+        callback: a function that is called with the `Iteration` after each iteration. If the function returns
+            False, the solve ends ("interrupted"). Exceptions of the callback end the solve and are raised.
+        verbose: whether to print a line for each iteration.
+        progress: whether to show the progress, with tqdm if it is installed, else as lines of text.
+
+        Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
+        """
+
+    def tick(self, sweeps: int = 2) -> Solution:
+        """Makes one linearisation at the last trajectory and up to `sweeps` Newton steps for its quadratic program, as a
+        controller does in each period. Returns a `Solution`.
+
+        No step length is searched, so the time is known in advance. The result is close to the optimum only if the last
+        trajectory is: begin with a `solve`, then `shift`, `set_x0` and `tick` in each period. Other threads can run
+        meanwhile. The status is "converged" if the quadratic program is solved, "max_iterations" after all steps,
+        and "time_limit" if the `time_budget` ended the steps. The first step is always made. The cost, the gap and
+        `outcome` belong to the trajectory before the tick, from the present initial state. `outcome.dual` is infinite,
+        because a tick does not measure it. The gains belong to the last step.
+
+        sweeps: the maximum number of steps, at least 1. Two steps follow changes of the active limits better than one.
+
+        Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
+        """
+
+@final
+class Limit:
+    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `InteriorPoint` and `AugmentedLagrangian` enforce.
+
+    Limits apply at the beginning of a knot. `Fddp` without `AugmentedLagrangian` treats limits as costs of values
+    outside the bounds.
 
     name: the name of the limit in error messages.
     residual: a `Residual`.
-    lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
-        centre of pressure has its own bounds, and every other r must be 0. An entry with equal lower and upper bounds
-        is an equality.
+    lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone, a centre
+        of pressure and distances have their own bounds, and every other r must be 0. An entry with equal lower and
+        upper bounds is an equality.
 
     >>> from condyle.optimal import Limit, Residual
     >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
@@ -3349,14 +3516,14 @@ class Problem:
     models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
         `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
     knot_models: for each knot, the index of the knot's model; None if knot t has model t. Consecutive knots are
-    computed
-        as a group if they have the same model, or if their models belong to one robot and differ only in their
-        costs and limits.
+        computed as a group in two cases: they have the same model, or their models belong to one robot and differ only
+        in costs and limits.
     terminal: the model of the terminal knot, without controls.
 
     Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
-    is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, more than 4096 numbers in a state or in
-    the controls of a knot, or more than 2²⁸ numbers in the matrices [A B] of all knots together.
+    is not 1 (up to 1e-3). Also raises `ProblemError` for more than 2²⁰ knots, and for more than 4096 numbers in a state
+    or in the controls of a knot. The matrices [A B], the derivatives of the next states, may have at most 2²⁸ numbers
+    in all knots together.
     """
 
     def __new__(
@@ -3448,8 +3615,8 @@ class Problem:
         between solves. The solver's next iterations do not allocate.
 
         knot: the index of the knot, 0 to N − 1.
-        model: the new model, with as many states and controls as the old one. Costs that the model has for single
-            knots belong to the knots of this problem with the same index.
+        model: the new model, whose state and controls have the same sizes as in the old model. Costs that the model has
+            for single knots belong to the knots of this problem with the same index.
 
         Raises `ProblemError` if the model does not fit.
         """
@@ -3512,8 +3679,9 @@ class Residual:
 
     @staticmethod
     def contact_acceleration(contact: str) -> Residual:
-        """Returns the acceleration of a contact, r = J q̈ + γ, for actions whose controls include the accelerations: 1, 2,
-        3 or 6 numbers along the axes of the contact's rows. The acceleration is 0 while the contact holds.
+        """Returns the acceleration of a contact, r = J q̈ + γ as in `constrained_dynamics`: 1, 2, 3 or 6 numbers along the
+        axes of the contact's rows. Only actions whose controls include the accelerations have this residual. The
+        acceleration is 0 while the contact holds.
         """
 
     @staticmethod
@@ -3528,19 +3696,38 @@ class Residual:
 
     @staticmethod
     def control_gravity() -> Residual:
-        """Returns r = τ − g(q) + Jᵀλ, nv numbers: the excess of the actual efforts and forces over the efforts and forces
-        that hold the robot still.
+        """Returns r = τ − g(q) + Jᵀλ, nv numbers, with joint efforts τ, gravity efforts g, contact forces λ and their
+        Jacobian J. r is zero if efforts and contact forces hold the robot still.
+        """
+
+    @staticmethod
+    def distances(model: Model, pairs: Sequence[tuple[Sphere, Sphere]]) -> Residual:
+        """Returns the signed distances between pairs of spheres, r = ‖p₁ − p₂‖ − radius₁ − radius₂ with the centres p₁ and
+        p₂ in the world, one number for each pair (m). A distance is negative while the spheres overlap.
+
+        pairs: a list of pairs of `Sphere`s. At least one sphere of a pair is fixed to a frame of the robot; the other
+            one is fixed to the world, or to a frame of the same robot.
+
+        A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
+        distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
+        pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
+
+        >>> from condyle.optimal import Limit, Residual, Sphere
+        >>> tool, ball = Sphere([0.0, 0.0, 0.0], 0.05, "tool"), Sphere([0.4, 0.2, 0.5], 0.1)
+        >>> clear = Limit("clear", Residual.distances(condyle.robots.arm7(), [(tool, ball)]), lower=[0.01])
         """
 
     @staticmethod
     def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is
-        a homogeneous 4 × 4 matrix.
+        """Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf) with the pose oMf of the frame in
+        the world, 6 numbers, linear first; target is a homogeneous 4 × 4 matrix.
         """
 
     @staticmethod
     def frame_rotation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """Returns the deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix."""
+        """Returns the deviation of a frame's rotation R from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3
+        matrix.
+        """
 
     @staticmethod
     def frame_translation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
@@ -3560,7 +3747,9 @@ class Residual:
 
     @staticmethod
     def impulse_center_of_mass() -> Residual:
-        """Returns the jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
+        """Returns the jump of the centre of mass's velocity at an impact: r = J_c (v⁺ − v), 3 numbers (m/s), with the
+        Jacobian J_c of the centre of mass and the velocity v⁺ after the impact.
+        """
 
     @staticmethod
     def joint_acceleration(reference: ArrayLike) -> Residual:
@@ -3613,8 +3802,9 @@ class Residual:
 
     @staticmethod
     def undriven_effort() -> Residual:
-        """Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base,
-        6 numbers: the force on the base. These efforts are 0 in a feasible motion.
+        """Returns the efforts of inverse dynamics in the directions without actuators: r = Nᵀτ, where Nᵀ S = 0 with the
+        actuation matrix S. For a floating base, these are 6 numbers, the force on the base. The efforts are 0 in a
+        feasible motion.
         """
 
     @staticmethod
@@ -3644,7 +3834,8 @@ class Sweep:
     def run(self, regularisation: float = 0.0) -> SweepResult:
         """Computes the feedback and the value functions, as a `SweepResult`.
 
-        regularisation: the number added to the diagonals of Quu and Vxx, at least 0.
+        regularisation: the number added to the diagonals of Quu and Vxx, at least 0. Quu is the Hessian of the
+        cost-to-go with respect to the controls, and Vxx the Hessian of the value function.
 
         Raises `ProblemError` if Quu of a knot is not positive definite.
         """
@@ -3718,12 +3909,12 @@ def passive_torque(model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, o
     """Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
     damping coefficient is d = d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 
-    q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 %
-    of f. The effort of a spring is −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ is the displacement from its rest position; for
-    joints with several degrees of freedom the brackets contain |Δ|. The equations are the same as for MuJoCo's
-    `qfrc_passive`. The only exception are joints with `actuatorgravcomp`, where MuJoCo counts gravity compensation
-    among the efforts of actuators. No other function of a model includes passive torques: add passive torques to τ
-    where needed.
+    q: position, nq numbers; v: velocity, nv numbers; smoothing: ε > 0, a speed (rad/s, m/s); at the speed ε, friction
+    is tanh 1 = 76 % of f. A spring with the coefficients k₀, k₁ and k₂ has the effort −(k₀ + k₁ Δ + k₂ Δ²) Δ, where Δ
+    is the displacement from its rest position. For joints with several degrees of freedom, the brackets contain |Δ|
+    instead of Δ. The equations are the same as for MuJoCo's `qfrc_passive`, with two exceptions. MuJoCo treats friction
+    as a constraint. For joints with `actuatorgravcomp`, MuJoCo counts gravity compensation among the efforts of
+    actuators. No other function of a model includes passive torques: add passive torques to τ where needed.
 
     >>> arm = condyle.robots.arm7()
     >>> q, v = np.zeros(7), np.ones(7)
@@ -3929,7 +4120,9 @@ def computeCentroidalMomentum(model: _SpelledModel, data: _SpelledData, q: Array
     """Computes the centroidal momentum, also stored as data.hg."""
 
 def computeCoriolisMatrix(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Computes the Coriolis matrix C, also stored as data.C. C v + g = h, and Ṁ − 2 C is skew-symmetric."""
+    """Computes the Coriolis matrix C, also stored as data.C. C v + g = h, with gravity efforts g and nonlinear effects
+    h; Ṁ − 2 C is skew-symmetric, with the inertia matrix M.
+    """
 
 def computeFrameJacobian(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, frame_id: int, frame: ReferenceFrame | None = None
@@ -4009,7 +4202,7 @@ def updateFramePlacements(model: _SpelledModel, data: _SpelledData) -> None:
 @final
 class FrictionContact:
     """A contact with friction: the frame that touches the environment is held, and each contact force lies in the cone
-    ‖f_t‖ ≤ μ f_n.
+    ‖f_t‖ ≤ μ f_n, with the tangential part f_t and the normal component f_n of the force.
 
     `ContactTarget.activation` defines at each tick whether the contact touches, and which fraction of the full load the
     contact carries. The constructor of `WholeBodyController` checks the numbers.
@@ -4108,9 +4301,10 @@ class FrictionContact:
         forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
             about the normal; or 'corners', a force with a friction cone at each corner.
         normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
-            None is the z axis. yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔
-        μ r, where r is the radius of the largest circle in the polygon about the mean of the corners; for an edge of
-        length 2 l it is ½ μ l.
+            None is the z axis.
+        yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n, with the normal force f_n. For a
+            polygon, None means ⅔ μ r, where r is the radius of the largest circle in the polygon about the mean of the
+            corners. For an edge of length 2 l, None means ½ μ l.
         """
 
 @final
@@ -4173,7 +4367,8 @@ class Plan:
 
 @final
 class Task:
-    """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+    """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v), where
+    J is the Jacobian of the quantity x.
 
     The `References` contain the target of the task. Tasks of priority 0 come first. Tasks of priority 1 only use the
     freedom that tasks of priority 0 leave, and so on. Within a priority, only the ratios of the weights matter. The
@@ -4323,8 +4518,12 @@ class WholeBodyController:
                      −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
                      bounds on q̈                         from limits of position and velocity: `JointLimits`
 
-    Positions, velocities and accelerations of tasks and contacts are in the world's axes; accelerations are classical.
-    All memory is allocated in the constructor.
+    J and J_c are the Jacobians of tasks and contacts; in Jᵀ f, J belongs to the contact forces. a* is the desired
+    acceleration of a task, and w are weights. f are the contact forces: f_n is the normal component of a force, f₁ and
+    f₂ the tangential components. p is the centre of pressure, τ_n the moment about the normal, and X the pose of a
+    contact. Sᵤ selects the coordinates without motors, S the coordinates with motors. Positions, velocities and
+    accelerations of tasks and contacts are in the world's axes; accelerations are classical. All memory is allocated in
+    the constructor.
 
     model: the robot.
     contacts: a list of `FrictionContact`, each of a different frame; empty for a robot in free fall.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._condyle import LEVEL, AugmentedLagrangian, Error, Fddp, Problem, __version__
+from ._condyle import LEVEL, AugmentedLagrangian, Error, Fddp, InteriorPoint, Problem, __version__
 from ._report import counter
 from ._types import Solution
 
@@ -67,7 +67,7 @@ class Job(NamedTuple):
     problem: Problem
     start: tuple[Any, Any]
     vary: Callable[[Problem, Any], Problem | None] | None
-    solver: type[Fddp] | type[AugmentedLagrangian]
+    solver: type[Fddp] | type[AugmentedLagrangian] | type[InteriorPoint]
     settings: dict[str, Any]
     keep: tuple[str, ...]
 
@@ -78,7 +78,7 @@ def sweep(
     *,
     vary: Callable[[Problem, Any], Problem | None] | None = None,
     start: Solution | tuple[Any, Any] | None = None,
-    solver: type[Fddp] | type[AugmentedLagrangian] = Fddp,
+    solver: type[Fddp] | type[AugmentedLagrangian] | type[InteriorPoint] = Fddp,
     settings: dict[str, Any] | None = None,
     keep: Sequence[Literal["xs", "us", "K", "k"]] = ("xs", "us"),
     folder: "str | PathLike[str] | None" = None,
@@ -98,7 +98,7 @@ def sweep(
         the initial state.
     start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
         and starts from the solution of this problem. The first state is replaced by the variation's initial state.
-    solver: `Fddp` or `AugmentedLagrangian`, which is made for each problem with the `settings`.
+    solver: `Fddp`, `AugmentedLagrangian` or `InteriorPoint`, which is made for each problem with the `settings`.
     keep: the arrays of each solution to keep: "xs", "us", "K", "k".
     folder: the folder to which results are written, chunk by chunk, as NPZ files. An interrupted sweep continues with
         the unfinished chunks when it is called again with the same arguments; `Variations.load` reads the folder. None

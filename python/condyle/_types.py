@@ -647,7 +647,9 @@ class _Solution(NamedTuple):
     "regularisation_limit": no acceptable step was found, away from a minimum. "constraints_violated": the penalty
     reached its maximum, and limits do not hold at a minimum; this does not prove that no solution exists.
     "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no solution
-    exists. `outcome.worst` contains the limit.
+    exists. `InteriorPoint` also ends with "infeasible" where no small change of the trajectory reduces the violation,
+    and with "constraints_violated" if its restoration did not reduce the violation enough. Another warm start may then
+    find a solution. `outcome.worst` contains the limit.
     """
     trace: list[Iteration]
     """The records of the iterations, one for each iteration."""
@@ -751,12 +753,16 @@ class SweepResult(NamedTuple):
 class Violation(NamedTuple):
     """A row of a limit, or of the dynamics, that is violated at the end of a solve."""
 
-    kind: Literal["constraint", "gap"]
-    """'constraint' for a limit or constraint of a knot, 'gap' for a gap of the dynamics."""
+    kind: Literal["constraint", "control_bound", "gap"]
+    """'constraint' for a limit or constraint of a knot, 'control_bound' for a bound on a control, 'gap' for a gap of
+    the dynamics.
+    """
     knot: int
     """The index of the knot, 0 … N."""
     row: int
-    """The index of the row in `multipliers[knot]`; for a gap, the index in the tangent vector."""
+    """The index of the row in `multipliers[knot]`; for a bound, the index of the control; for a gap, the index in the
+    tangent vector.
+    """
     name: str | None
     """The name of the limit; None for a constraint of a `ConstrainedAction` and for a gap."""
     entry: int
@@ -766,26 +772,33 @@ class Violation(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The violation of limits and other results of a solve of `AugmentedLagrangian`, in addition to its `Solution`."""
+    """The violation of limits and other results of a solve of `AugmentedLagrangian` or `InteriorPoint`, in addition to
+    its `Solution`.
+    """
 
     cost: float
     """The cost without the penalties of the limits."""
     primal: float
     """The largest distance of a limited number from its bounds, or the largest gap of the dynamics."""
     dual: float
-    """The largest entry of the Lagrangian's gradient with respect to the controls, projected onto the bounds of the
-    controls.
+    """The largest entry of the Lagrangian's gradient. For `AugmentedLagrangian` the gradient is with respect to
+    controls and states, projected onto the bounds of the controls. For `InteriorPoint` it is with respect to the
+    controls, and infinite after `tick`, which does not measure it.
     """
     multipliers: list[_Array]
-    """The multipliers of each knot, limit by limit: positive at an upper bound, negative at a lower bound."""
+    """The multipliers of each knot, limit by limit: positive at an upper bound, negative at a lower bound. For
+    `InteriorPoint`, the multipliers of the bounds on controls follow.
+    """
     penalty: float
-    """The penalty 1/μ at the end of the solve."""
+    """The penalty 1/μ at the end of the solve of `AugmentedLagrangian`; 0 for `InteriorPoint`."""
     solves: int
     """The number of inner solves."""
     iterations: int
     """The total number of iterations of the inner solves."""
     worst: Violation | None = None
     """The largest violation; None if all limits hold exactly."""
+    barrier: float = 0.0
+    """The barrier parameter μ at the end of the solve of `InteriorPoint`; 0 for `AugmentedLagrangian`."""
 
 
 class Control(NamedTuple):

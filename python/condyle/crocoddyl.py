@@ -66,7 +66,8 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
     is written in Python, is computed by Crocoddyl: Condyle's solver calls Crocoddyl for this knot, and a warning names
     these contents.
 
-    Constraints and the equations of inverse dynamics become limits, which `AugmentedLagrangian` enforces.
+    Constraints and the equations of inverse dynamics become limits, which `InteriorPoint` and `AugmentedLagrangian`
+    enforce.
 
     shooting_problem: the problem of Crocoddyl. Its data are copied. The problem itself is kept only for knots that
     Crocoddyl computes.

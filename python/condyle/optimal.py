@@ -13,9 +13,9 @@
 >>> solution.status, solution.xs.shape
 ('converged', (21, 14))
 
-Hard constraints are `Limit`s, which `AugmentedLagrangian` enforces. A separate action for each knot is as fast as one
-action for all knots: `Problem(x0, [action_0, action_1, ...], None, terminal)` groups the actions that differ only in
-costs.
+Hard constraints are `Limit`s, which `InteriorPoint` and `AugmentedLagrangian` enforce. A separate action for each knot
+is as fast as one action for all knots: `Problem(x0, [action_0, action_1, ...], None, terminal)` groups the actions that
+differ only in costs.
 
 You can define your own actions by the next state and the cost (`Action`), by accelerations (`DifferentialAction`), by ẋ
 (`ode_action`), or by CasADi expressions (`condyle.casadi.action`). You can also define residuals of a robot
@@ -41,6 +41,7 @@ from ._condyle import (
     FreeInverseDynamics,
     FrictionCone,
     ImpulseDynamics,
+    InteriorPoint,
     Limit,
     Lqr,
     Problem,
@@ -68,6 +69,7 @@ __all__ = [
     "FreeInverseDynamics",
     "FrictionCone",
     "ImpulseDynamics",
+    "InteriorPoint",
     "Iteration",
     "Limit",
     "LqKnot",

@@ -119,8 +119,8 @@ mod _condyle {
     #[pymodule_export]
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics, Cost,
-        DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics, Limit, Lqr,
-        Problem, Residual, Sweep, Unicycle, WrenchCone,
+        DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics, InteriorPoint,
+        Limit, Lqr, Problem, Residual, Sweep, Unicycle, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -23,5 +23,5 @@ pub(crate) use inverse::{ContactInverseDynamics, FreeInverseDynamics};
 pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycle};
 pub(crate) use problem::{Problem, lock};
 pub(crate) use residuals::Residual;
-pub(crate) use solvers::{AugmentedLagrangian, Fddp};
+pub(crate) use solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
 pub(crate) use sweep::Sweep;

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp, Problem
+from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp, InteriorPoint, Problem
 
 
 class Marker:
@@ -47,6 +47,7 @@ MAKERS: dict[str, Any] = {
     "Problem, constrained": lambda f, g: problem(ConstrainedAction(action(f), 1, g)),
     "Fddp": lambda f, g: solved(Fddp, action(f)),
     "AugmentedLagrangian": lambda f, g: solved(AugmentedLagrangian, ConstrainedAction(action(f), 1, g)),
+    "InteriorPoint": lambda f, g: solved(InteriorPoint, ConstrainedAction(action(f), 1, g)),
 }
 
 

@@ -14,7 +14,7 @@ import pytest
 
 import condyle
 from condyle import WORLD, ConstraintSet, ContactConstraint, Data, Joint, Model, ModelBuilder
-from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, Problem
+from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, InteriorPoint, Problem
 
 ARM = condyle.robots.arm7()
 DATA = Data(ARM)
@@ -124,7 +124,7 @@ def test_texts_paths_and_macros(tmp_path: Path) -> None:
 
 def test_settings_that_are_not_there_are_told_those_that_are() -> None:
     problem = Problem(np.zeros(14), [FreeDynamics(ARM, 0.1, [])], [0], FreeDynamics(ARM, None, []))
-    for solver in (Fddp, AugmentedLagrangian):
+    for solver in (Fddp, AugmentedLagrangian, InteriorPoint):
         message = told(lambda solver=solver: solver(problem, tolerence=1e-6), ValueError)
         assert message.startswith("settings: there is no setting 'tolerence'; there are ")
         names = message.split("there are ", 1)[1].split(", ")

@@ -25,6 +25,7 @@ from condyle.optimal import (
     FreeInverseDynamics,
     FrictionCone,
     ImpulseDynamics,
+    InteriorPoint,
     Iteration,
     Limit,
     LqKnot,
@@ -251,7 +252,7 @@ def test_what_is_shown(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.M
 
 def test_nothing_to_resume() -> None:
     problem, xs, us = reach()
-    for solver in (Fddp(problem), AugmentedLagrangian(problem)):
+    for solver in (Fddp(problem), AugmentedLagrangian(problem), InteriorPoint(problem)):
         with pytest.raises(ProblemError, match="resume: there is no solution to go on from; call solve first"):
             solver.resume()
         assert solver.solution is None
@@ -489,6 +490,7 @@ KINDS: dict[str, Any] = {
     "Problem of all kinds": lambda: reach()[0],
     "Fddp": lambda: Fddp(reach()[0], max_iterations=7, method="ddp"),
     "AugmentedLagrangian": lambda: AugmentedLagrangian(reach()[0], inner={"threads": 2}, tolerance=1e-5),
+    "InteriorPoint": lambda: InteriorPoint(reach()[0], barrier_start=1e-2, second_order=True),
 }
 
 

@@ -73,6 +73,13 @@ CALLS = {
         def call():
             return solver.solve(xs, us).cost
     """,
+    "interior point": """
+        weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+        problem, xs, us = reach(limits=[weak])
+        solver = InteriorPoint(problem, threads=2, max_iterations=3)
+        def call():
+            return solver.solve(xs, us).cost
+    """,
     "simulation": """
         simulation = condyle.simulation.Simulation(condyle.robots.quadruped())
         def call():
@@ -200,6 +207,18 @@ LONG = {
             return x + 0.1 * u, 0.5 * (x @ x + u @ u)
         knot, end = Action(1, 1, calc), Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
         solver = Fddp(Problem([1.0], [knot], [0] * 1000, end), max_iterations=10**9, tolerance=0.0)
+        def call():
+            solver.solve(np.ones((1001, 1)), np.zeros((1000, 1)))
+        def check():
+            assert solver.solution is not None
+    """,
+    "interior point": """
+        def calc(t, x, u):
+            time.sleep(1e-3)
+            return x + 0.1 * u, 0.5 * (x @ x + u @ u)
+        knot = ConstrainedAction(Action(1, 1, calc), 1, lambda t, x, u: u, lower=[-0.5], upper=[0.5])
+        end = Action(1, 0, lambda t, x, u: (None, 0.5 * x @ x))
+        solver = InteriorPoint(Problem([1.0], [knot], [0] * 1000, end), max_iterations=10**9, tolerance=0.0)
         def call():
             solver.solve(np.ones((1001, 1)), np.zeros((1000, 1)))
         def check():

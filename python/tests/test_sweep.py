@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import AugmentedLagrangian, Cost, Fddp, FreeDynamics, Limit, Problem, Residual
+from condyle.optimal import AugmentedLagrangian, Cost, Fddp, FreeDynamics, InteriorPoint, Limit, Problem, Residual
 
 ARM = condyle.robots.arm7()
 REST = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
@@ -82,9 +82,10 @@ def test_parameters_of_the_model_and_weights() -> None:
 def test_limits_and_settings() -> None:
     limit = Limit("effort", Residual.control(np.zeros(7)), [-30.0] * 7, [30.0] * 7)
     problem = reach(limits=[limit])
-    found = condyle.sweep(problem, states(3), solver=AugmentedLagrangian)
-    assert found.us is not None
-    assert abs(found.us).max() < 30.0 + 1e-3
+    for solver in (AugmentedLagrangian, InteriorPoint):
+        found = condyle.sweep(problem, states(3), solver=solver)
+        assert found.us is not None
+        assert abs(found.us).max() < 30.0 + 1e-3
     short = condyle.sweep(reach(), states(3), settings={"max_iterations": 1, "tolerance": 0.0})
     assert (short.iterations == 1).all()
     assert (short.status == "max_iterations").all()

@@ -13,7 +13,17 @@ from numpy.typing import ArrayLike
 
 import condyle
 from condyle import _condyle, _inertia, _spelling, _types
-from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, FrictionCone, Outcome, Problem, Residual, Solution
+from condyle.optimal import (
+    AugmentedLagrangian,
+    Fddp,
+    FreeDynamics,
+    FrictionCone,
+    InteriorPoint,
+    Outcome,
+    Problem,
+    Residual,
+    Solution,
+)
 from condyle.simulation import Ground, Simulation
 
 STUB = ast.parse(pkgutil.get_data("condyle", "_condyle.pyi") or b"")
@@ -146,8 +156,9 @@ def test_what_is_made_is_what_the_stubs_say() -> None:
     warm_start = np.tile(np.r_[Q, V], (2, 1)), np.zeros((1, 7))
     solution = Fddp(PROBLEM).solve(*warm_start)
     assert conforms(solution, Solution)
-    solver = AugmentedLagrangian(PROBLEM)
-    solver.solve(*warm_start)
-    assert conforms(solver.outcome, Outcome)
+    for solver in (AugmentedLagrangian(PROBLEM), InteriorPoint(PROBLEM)):
+        solver.solve(*warm_start)
+        assert conforms(solver.outcome, Outcome)
+    assert conforms(solver.tick(), Solution)
     assert not conforms(solution, Outcome) and not conforms([1], eval("list[str]", NAMES))
     assert not conforms(Residual.control_gravity(), eval("_Array | None", NAMES))

@@ -94,7 +94,7 @@ pub(super) fn knot(
 /// actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
-/// limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
+/// limits: a list of `Limit`, or None; `InteriorPoint` and `AugmentedLagrangian` enforce them.
 /// limits_at: lists of `Limit` by index of the knot. At these knots they replace `limits`.
 /// controls: the polynomial that the controls follow within a knot: 'constant', 'linear' or 'quadratic'. The knot then
 ///     has nu, 2 nu or 3 nu controls: one value of u; values at the times 0 and Δt/2; or values at 0, Δt/2 and Δt

@@ -147,7 +147,7 @@ impl Cost {
     }
 }
 
-/// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
+/// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `InteriorPoint` and `AugmentedLagrangian` enforce.
 ///
 /// Limits apply at the beginning of a knot. `Fddp` without `AugmentedLagrangian` treats limits as costs of values
 /// outside the bounds.

@@ -57,9 +57,10 @@ methods! {
 /// By default the knot has two kinds of `Limit`, which keep a residual at zero. The limit named `undriven efforts`
 /// keeps Nᵀτ = 0. The columns of N are the directions without actuators, Nᵀ S = 0 with the actuation S. For a floating
 /// base, Nᵀτ are the first 6 efforts. A limit named `contact` and the contact's name keeps J q̈ + γ = 0, as in
-/// `constrained_dynamics`. `AugmentedLagrangian` enforces both limits; `Fddp` without `AugmentedLagrangian` treats them
-/// as costs. No matrix is inverted, so contacts may be redundant. The equations are the same as in Crocoddyl's
-/// `DifferentialActionModelContactInvDynamics`, and without contacts as in `DifferentialActionModelFreeInvDynamics`.
+/// `constrained_dynamics`. `InteriorPoint` and `AugmentedLagrangian` enforce both limits; `Fddp` without
+/// `AugmentedLagrangian` treats them as costs. No matrix is inverted, so contacts may be redundant. The equations are
+/// the same as in Crocoddyl's `DifferentialActionModelContactInvDynamics`, and without contacts as in
+/// `DifferentialActionModelFreeInvDynamics`.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. The dict may be empty.

@@ -69,7 +69,12 @@ macro_rules! settings {
         }
     )*};
 }
-settings!(bool: "True or False", usize: "a whole number, 0 or above", f64: "a number");
+settings!(
+    bool: "True or False",
+    usize: "a whole number, 0 or above",
+    f64: "a number",
+    Option<f64>: "a number or None"
+);
 
 /// Returns the error for a setting of another type, or for a negative number.
 fn wrong_setting(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
@@ -89,7 +94,7 @@ fn method_name(method: rust::DdpMethod) -> &'static str {
     method.name()
 }
 
-/// Reads a time in seconds; None and infinity mean no limit.
+/// Reads a time limit in seconds; `None` and infinity mean no limit.
 fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
     let seconds: Option<f64> = given.extract()?;
     let wrong = |seconds| {
@@ -97,7 +102,7 @@ fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
             "time_budget: expected at least 0 seconds (and at most 1.8e19, or inf), found {seconds:e}"
         ))
     };
-    let limit = seconds.filter(|&s| s != f64::INFINITY); // an infinite time means no limit
+    let limit = seconds.filter(|&s| s != f64::INFINITY);
     limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
 }
 
@@ -115,6 +120,11 @@ named!(rust::Settings, set_fddp, show_fddp, {
 
 named!(rust::ConstraintSettings, set_constraints, show_constraints, {
     max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor, restart,
+});
+
+named!(rust::InteriorPointSettings, set_interior_point, show_interior_point, {
+    tolerance, max_iterations, barrier_start, second_order, inverse_dynamics_form,
+    time_budget by duration and seconds, threads, regularisation_min, regularisation_max,
 });
 
 /// Returns settings as a mapping that cannot be changed, because a change would have no effect on the solver.
@@ -390,20 +400,26 @@ fn kept(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyD
     Ok(settings.map_or_else(|| Ok(PyDict::new(py)), |settings| settings.copy())?.unbind())
 }
 
-impl Fddp {
-    fn with(
-        problem: Bound<'_, Problem>,
-        _inner: Option<&Bound<'_, PyDict>>,
-        settings: Option<&Bound<'_, PyDict>>,
-    ) -> PyResult<Self> {
-        let py = problem.py();
-        let mut solver = rust::Fddp::new(&*lock("problem", &problem.get().inner)?);
-        set_fddp(&mut solver.settings, settings)?;
-        solver.settings.check().map_err(problem_error)?;
-        let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
-        Ok(Self { problem, solver, settings, inner: kept(py, None)? })
-    }
+/// Defines the constructor of solvers without an inner solver.
+macro_rules! construct {
+    ($($class:ident by $set:ident),*) => {$(
+        impl $class {
+            fn with(
+                problem: Bound<'_, Problem>,
+                _inner: Option<&Bound<'_, PyDict>>,
+                settings: Option<&Bound<'_, PyDict>>,
+            ) -> PyResult<Self> {
+                let py = problem.py();
+                let mut solver = rust::$class::new(&*lock("problem", &problem.get().inner)?);
+                $set(&mut solver.settings, settings)?;
+                solver.settings.check().map_err(problem_error)?;
+                let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
+                Ok(Self { problem, solver, settings, inner: kept(py, None)? })
+            }
+        }
+    )*};
 }
+construct!(Fddp by set_fddp, InteriorPoint by set_interior_point);
 
 solver! {
 /// The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
@@ -487,19 +503,7 @@ AugmentedLagrangian, set_constraints, show_constraints {
     /// The violation of limits and other results of the last solve, as an `Outcome`.
     #[getter]
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let solver = lock("solver", &self.solver)?;
-        let o = solver.outcome();
-        let multipliers = o.multipliers.iter().map(|y| y.give(py, None)).collect::<PyResult<Vec<_>>>()?;
-        let worst = o.worst.as_ref().map(|worst| {
-            let kind = match worst.kind {
-                rust::ViolationKind::Gap => "gap",
-                _ => "constraint",
-            };
-            let name = worst.name.as_deref();
-            class!(py, "Violation")?.call1((kind, worst.knot, worst.row, name, worst.entry, worst.amount))
-        });
-        let worst = worst.transpose()?;
-        class!(py, "Outcome")?.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst))
+        give_outcome(py, lock("solver", &self.solver)?.outcome())
     }
 }
 }
@@ -518,4 +522,115 @@ impl AugmentedLagrangian {
         let (problem, solver) = (problem.unbind(), Mutex::new(solver));
         Ok(Self { problem, solver, settings: kept(py, settings)?, inner: kept(py, inner)? })
     }
+}
+
+solver! {
+/// The primal–dual interior point method with multiple shooting: for robots with `Limit`s, bounds on controls, and
+/// `ConstrainedAction`s.
+///
+/// A slack variable s replaces each limited number. The method replaces each bound by a barrier term −μ log(s − lower)
+/// or −μ log(upper − s). It makes Newton steps for states, controls, slack variables and multipliers, while μ falls to
+/// zero. Each step is a single sweep over the horizon, which costs little more than a sweep without limits. A filter
+/// accepts a step if either the violation or the cost with barrier terms decreases enough. If no step is accepted,
+/// or the violation stalls, the method starts anew with careful steps. Later, a restoration reduces the violation
+/// alone.
+///
+/// Use `InteriorPoint` for problems with limits, and `tick` for model predictive control with limits. It takes fewer
+/// iterations than `AugmentedLagrangian`, but its trajectory has gaps until it converges. Use `AugmentedLagrangian`
+/// if `InteriorPoint` does not converge, or if the result of each iteration must satisfy the dynamics. Use `Fddp` if
+/// there are no limits.
+///
+/// `solve` computes the first slack variables and multipliers from the warm start. `resume` and `tick` begin with the
+/// slack variables and multipliers of the last solve, and `shift` also shifts them. `settings` may be assigned before
+/// each of these calls. The status is "converged" if the gradient of the Lagrangian, the complementarity and the gaps
+/// are below the tolerance, and the violation is below a tenth of it. A violated limit is never reported as
+/// "converged". The status is "infeasible" if the restoration ended where no small step reduces the violation, or if
+/// the initial state itself violates a limit of knot 0 that no control can change. The first case does not prove that
+/// no solution exists: another warm start may find one. The status is "constraints_violated" if the restoration reached
+/// its maximum number of iterations. `outcome.worst` contains the knot, the limit and the amount of the largest
+/// violation. "regularisation_limit", "max_iterations", "time_limit", "interrupted" and "not_finite" have the same
+/// meanings as for `Fddp`; the solution is then the best iterate. The status is also "regularisation_limit" if the
+/// residuals no longer decrease near a solution. The costs of the solution and of `outcome` are equal and do not
+/// include terms of the limits.
+///
+/// The gains K contain the limits. Near a bound, the feedback is stiff in the direction of this bound. With μ near
+/// zero, active rows are equations: K does not move a control that is at its bound, and keeps other active limits at
+/// their bounds for small deviations of the state. Rows that are not active do not change K.
+///
+/// problem: the problem to solve. All memory is allocated once, for the size of this problem.
+/// settings: any of the following settings, by name. `tolerance`: see above, default 1e-6; the gradient and the
+///     complementarity are scaled as in IPOPT. `max_iterations`: default 300. `barrier_start`: μ of the first
+///     iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `second_order`:
+///     whether to use the curvature of the dynamics near the solution, if the models provide it. This saves iterations
+///     if this curvature is large compared with the costs. `inverse_dynamics_form`, `time_budget` (s), `threads`: as
+///     for `Fddp`; the results are bit-identical for any number of threads. `regularisation_min`, `regularisation_max`:
+///     the smallest and the largest regularisation; a solve that reaches the largest one stops.
+///
+/// >>> from condyle.optimal import Cost, FreeDynamics, InteriorPoint, Limit, Problem, Residual
+/// >>> arm = condyle.robots.arm7()
+/// >>> x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+/// >>> costs = [Cost("rest", 1e-1, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+/// >>> weak = Limit("weak", Residual.control(np.zeros(7)), lower=np.full(7, -30.0), upper=np.full(7, 30.0))
+/// >>> knot = FreeDynamics(arm, 0.05, costs, limits=[weak])
+/// >>> reach = Limit("reach", Residual.frame_translation(arm, "tool", [0.5, 0.1, 0.6]))  # exactly
+/// >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [], limits=[reach]))
+/// >>> solver = InteriorPoint(problem)
+/// >>> solution = solver.solve(np.tile(x0, (11, 1)), np.tile(knot.quasi_static(x0), (10, 1)))
+/// >>> solution.status, bool(np.abs(solution.us).max() < 30.0 + 1e-6), solver.outcome.primal < 1e-6
+/// ('converged', True, True)
+/// >>> solver.shift(0)
+/// >>> problem.set_x0(solution.xs[1])
+/// >>> solver.tick(2).us.shape
+/// (10, 7)
+InteriorPoint, set_interior_point, show_interior_point {
+    #[new]
+    #[pyo3(signature = (problem, **settings))]
+    fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        Self::with(problem, None, settings)
+    }
+
+    /// Makes one linearisation at the last trajectory and up to `sweeps` Newton steps for its quadratic program, as a
+    /// controller does in each period. Returns a `Solution`.
+    ///
+    /// No step length is searched, so the time is known in advance. The result is close to the optimum only if the last
+    /// trajectory is: begin with a `solve`, then `shift`, `set_x0` and `tick` in each period. Other threads can run
+    /// meanwhile. The status is "converged" if the quadratic program is solved, "max_iterations" after all steps,
+    /// and "time_limit" if the `time_budget` ended the steps. The first step is always made. The cost, the gap and
+    /// `outcome` belong to the trajectory before the tick, from the present initial state. `outcome.dual` is infinite,
+    /// because a tick does not measure it. The gains belong to the last step.
+    ///
+    /// sweeps: the maximum number of steps, at least 1. Two steps follow changes of the active limits better than one.
+    ///
+    /// Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
+    #[pyo3(signature = (sweeps=2))]
+    fn tick<'py>(&self, py: Python<'py>, sweeps: usize) -> PyResult<Bound<'py, PyAny>> {
+        let quiet = Observer { callback: None, verbose: false, progress: false };
+        run(py, &self.problem, &self.solver, None, quiet, |solver, problem, _, interruptions| {
+            solver.tick_with(problem, sweeps, interruptions)
+        })
+    }
+
+    /// The violation of limits and other results of the last solve or tick, as an `Outcome`.
+    #[getter]
+    fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give_outcome(py, lock("solver", &self.solver)?.outcome())
+    }
+}
+}
+
+/// Converts an outcome to a Python object.
+fn give_outcome<'py>(py: Python<'py>, o: &rust::Outcome) -> PyResult<Bound<'py, PyAny>> {
+    let multipliers = o.multipliers.iter().map(|y| y.give(py, None)).collect::<PyResult<Vec<_>>>()?;
+    let worst = o.worst.as_ref().map(|worst| {
+        let kind = match worst.kind {
+            rust::ViolationKind::Gap => "gap",
+            rust::ViolationKind::ControlBound => "control_bound",
+            _ => "constraint",
+        };
+        let name = worst.name.as_deref();
+        class!(py, "Violation")?.call1((kind, worst.knot, worst.row, name, worst.entry, worst.amount))
+    });
+    let worst = worst.transpose()?;
+    let outcome = class!(py, "Outcome")?;
+    outcome.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst, o.barrier))
 }

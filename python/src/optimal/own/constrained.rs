@@ -10,7 +10,8 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::ActionModel;
 
-/// An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
+/// An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `InteriorPoint` and `AugmentedLagrangian`
+/// enforce.
 ///
 /// `Fddp` without `AugmentedLagrangian` treats the constraint as a cost of values outside the bounds. For residuals of
 /// a robot, `Limit` is faster.
