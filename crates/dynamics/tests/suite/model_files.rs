@@ -65,6 +65,19 @@ fn mistakes_have_names() {
     assert!(read(&file).unwrap_err().starts_with("unknown field `nodes`"));
 }
 
+/// Reads a file of an earlier version, whose limits of effort are the same in both directions.
+#[test]
+fn one_limit_of_effort_is_read_as_two() {
+    let mut file = arm();
+    let limits = file.pointer_mut("/limits").unwrap().as_object_mut().unwrap();
+    limits.remove("effort_lower");
+    limits.remove("effort_upper");
+    limits.insert("effort".into(), json!([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, null]));
+    let model = read(&file).unwrap();
+    assert_eq!(model.limits().effort_upper, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, f64::INFINITY]);
+    assert_eq!(model.limits().effort_lower, [-1.0, -2.0, -3.0, -4.0, -5.0, -6.0, f64::NEG_INFINITY]);
+}
+
 /// Checks that edited values of a file have an effect on computations.
 #[test]
 fn edits_count() {
