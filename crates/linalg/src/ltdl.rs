@@ -176,7 +176,7 @@ impl<S: Scalar> Ltdl<S> {
     }
 
     /// Factorizes M = Lᵀ D L, in O(n d²) for n = nv and a tree of depth d. Reads only the diagonal and the entries
-    /// below it, in the [`order`](Self::order) of positions.
+    /// below it, after rows and columns are put in the [`order`](Self::order) of positions.
     ///
     /// M: nv × nv, symmetric, positive definite (as `crba` returns it). If M is not positive definite, at least one
     /// entry of D is not positive. Allocates nothing. Source: Featherstone (2005).

@@ -207,7 +207,7 @@ def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
         driven |= moment != 0.0
         if mujoco.mjtGain(m.actuator_gaintype[i]) not in fixed or m.actuator_biasprm[i, 1:3].any():
             # If an actuator's force depends on length or velocity, only the range of the force limits its effort.
-            # So the test replaces such an actuator by a motor with the same range of force.
+            # The test replaces an actuator of this kind by a motor with the same range of force.
             m.actuator_gaintype[i], m.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
             m.actuator_gainprm[i, 0], m.actuator_ctrllimited[controls] = 1.0, 0
         d.ctrl[controls] = sign * np.sign(moment * m.actuator_gainprm[i, 0]) * HUGE

@@ -116,7 +116,7 @@ class Copies:
 
 @cache
 def copies(folder: Path) -> Copies:
-    """Returns the copies of all SDFs below a folder."""
+    """Copies all SDFs below a folder to a temporary folder, and returns the copies."""
     return Copies(folder)
 
 

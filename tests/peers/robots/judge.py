@@ -170,7 +170,7 @@ class Trial:
         self.beside("MuJoCo", lambda: beside_mujoco.read_urdf(path), partial(beside_mujoco.compare_urdf, path))
 
     def sdf(self) -> None:
-        """Compares an SDF with Drake."""
+        """Compares the robot of an SDF in Condyle and in Drake."""
         path, folder = self.robot.path, self.folder
         if beside_drake is not None:
             old = re.search(r"<(?:sdf|gazebo)[^>]*version\s*=\s*[\"']1\.[0-6]\b", text_of(path))

@@ -29,8 +29,8 @@ const RULES: [Rule; 3] = [
     ("energy, semi-implicit Euler", Integrator::SemiImplicitEuler, 1e-2, 0.7),
 ];
 
-/// Returns a row for each integrator. If limbs are too light for every step length, all joints receive armature, and a
-/// note in the row states the armature.
+/// Returns a row for each integrator. If limbs are so light that the motion is unstable at every step length, all
+/// joints receive armature, and a note in the row states the armature.
 pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
     let mut heavier = model.armature().to_vec();
     for body in model.bodies()[1..].iter().filter(|body| body.joint.nv() == 1) {

@@ -70,7 +70,7 @@ pub(crate) struct Ties<S> {
     H: DMatrix<S>,
     factor_A: Cholesky<S>,
     factor_H: Cholesky<S>,
-    /// Accelerations ÿ of the shared coordinates. Shape: y. Written by: `solve`.
+    /// Accelerations ÿ of the shared coordinates y. Shape: number of shared coordinates. Written by: `solve`.
     ydd: Vec<S>,
     /// Difference G ÿ − a_Z between the accelerations of the joints Z in the tied robot and in the free robot. The
     /// tying efforts w overwrite this difference. Shape: Z. Written by: `solve`.

@@ -250,7 +250,7 @@ impl<'a> Problem<'a> {
     /// Computes a step d of Newton's method for the contact conditions F(λ) = 0, with the impulses λ and the velocities
     /// u. For each point, F depends on the point's state:
     ///
-    /// - open: F = λ;
+    /// - open: F = λ, so that F = 0 means no force;
     /// - closed: F_n = u_n, whose slope is the row of G, plus ε on the diagonal;
     /// - sticking: F_t = u_t;
     /// - sliding: F_t = λ_t − μ λ_n e, with e = z/‖z‖ and z = λ_t − u_t/g_t, so that dF_t = dλ_t − μ e dλ_n − μ λ_n/‖z‖

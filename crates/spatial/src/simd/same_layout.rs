@@ -29,7 +29,7 @@ pub trait Rename<B> {
 /// Reinterprets a value as another type.
 ///
 /// # Safety
-/// `A` and `B` are the same type, as the generic caller has checked; or they are [`SameLayout`].
+/// The caller guarantees one of two conditions: `A` and `B` are the same type, or they are [`SameLayout`].
 #[inline(always)]
 pub unsafe fn same<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
