@@ -12,6 +12,7 @@ mod own;
 mod problem;
 mod residuals;
 mod robot_action;
+mod settings;
 mod solvers;
 mod sweep;
 

@@ -24,7 +24,7 @@ pub use group::GroupModel;
 pub(crate) use group::{Evaluation, KnotGroup, Results, evaluate, innermost};
 pub use horizon::Problem;
 pub use lqr::Lqr;
-pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a_value};
+pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a_value, outside};
 pub use numdiff::NumDiff;
 pub use path_constraint::{AutoDiffConstraint, GenericConstraint, PathConstraint};
 pub(crate) use shape::{MOST_KNOTS, Shape};

@@ -114,7 +114,7 @@ fn unit(lower: f64, upper: f64) -> f64 {
 
 /// Returns the signed distance of z from the interval [lower, upper]; zero within it.
 #[inline(always)]
-fn outside(z: f64, lower: f64, upper: f64) -> f64 {
+pub(crate) fn outside(z: f64, lower: f64, upper: f64) -> f64 {
     match z {
         z if z > upper => z - upper,
         z if z >= lower => 0.0,
