@@ -81,7 +81,7 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
         let c = (cos[k] * z).mul_add(z, z.mul_add(S::splat(-0.5), one)); // 1 − r²/2 + r⁴ Q(r²)
         // m is the quadrant: n modulo 4, between −2 and 2.
         let m = (n[k].mul_add(S::splat(0.25), magic) - magic).mul_add(S::splat(-4.0), n[k]);
-        // Of cos(m π/2) and sin(m π/2), one is 0 and the other is ±1. So products with these two values are exact.
+        // One of cos(m π/2) and sin(m π/2) is 0 and the other is ±1, so products with them are exact.
         let along = one - m.abs();
         let across = m.mul_add(along, m);
         sin[k] = across.mul_add(c, along * s);

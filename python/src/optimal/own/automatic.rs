@@ -21,7 +21,7 @@ const TOGETHER: u8 = 0;
 const ALONE: u8 = 1;
 const DIFFERENCES: u8 = 3;
 
-/// The first method of differentiation that has not yet failed for a function.
+/// Method of differentiation of a function: the first one that has not failed yet.
 #[derive(Clone, Default)]
 pub(in crate::optimal) struct Way(Arc<AtomicU8>);
 
