@@ -125,15 +125,15 @@ fn give_rows<'py>(py: Python<'py>, knot: &LqKnot) -> PyResult<Option<Bound<'py, 
         return Ok(None);
     }
     let [C, D] = rows.dense(ndx, nu);
-    let column = |of: fn(ConstraintRow<'_>) -> f64| {
-        output(py, None, &[rows.len()], |out| out.iter_mut().zip(rows.iter()).for_each(|(out, row)| *out = of(row)))
+    let column = |k: usize| {
+        output(py, None, &[rows.len()], |out| out.iter_mut().zip(rows.bounds()).for_each(|(out, row)| *out = row[k]))
     };
     let given = (
         output(py, None, &[rows.len(), ndx], |out| C.write(out))?,
         output(py, None, &[rows.len(), nu], |out| D.write(out))?,
-        column(|row| row.c)?,
-        column(|row| row.lower)?,
-        column(|row| row.upper)?,
+        column(0)?,
+        column(1)?,
+        column(2)?,
     );
     class!(py, "ConstraintRows")?.call1(given).map(Some)
 }

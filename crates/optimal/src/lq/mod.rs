@@ -22,6 +22,7 @@ pub(crate) use knot::DIVERGED;
 pub use knot::{Hessian, LqKnot};
 pub(crate) use row_terms::RowTerms;
 pub use rows::{ConstraintRow, ConstraintRows};
+pub(crate) use rows::MOST_FORMS;
 pub use step::SweepError;
 pub(crate) use step::SweepOutput;
 pub use structure::{DynamicsStructure, EulerBlock};

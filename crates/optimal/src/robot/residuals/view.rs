@@ -5,7 +5,7 @@ use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
-use crate::lq::{ConstraintRow, Hessian, LARGEST_BLOCK, LqKnot};
+use crate::lq::{ConstraintRow, Hessian, LARGEST_BLOCK, LqKnot, MOST_FORMS};
 use crate::robot::knot_data::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::outputs::Output;
 use crate::robot::state::{groups, state_difference};
@@ -226,7 +226,7 @@ impl ResidualView<'_> {
 
     /// Appends the residual that was just computed to the constraint rows of an LQ knot, with the given bounds. At a
     /// knot in inverse-dynamics form, the columns of the unknowns replace the columns of δu, and the columns of δu
-    /// follow.
+    /// follow. The rows of a cone become a group, whose forms are the components of the force.
     pub(crate) fn push_constraint_rows(
         &mut self,
         residual: &Residual,
@@ -260,6 +260,18 @@ impl ResidualView<'_> {
             _ if residual.part() == Part::Diagonal => {
                 let first = n + if inverse { nu } else { 0 };
                 (0..plan.n).for_each(|i| push(first + i, &[1.0], i, s.r[i]));
+            }
+            _ if residual.output() == Some(Output::Force)
+                && (1..=MOST_FORMS.min(plan.n - 1)).contains(&plan.rows.len())
+                && nu > 0 =>
+            {
+                s.clear();
+                for (k, row) in plan.rows.clone().enumerate() {
+                    sensitivities.add_row(Output::Force, row, 1.0, &mut s.rows.push([1.0, 0.0]));
+                    knot.rows.push_form(0, s.rows.of_knot(k));
+                }
+                let numbers = (0..plan.n).map(|i| [s.r[i], lower[i], upper[i]]);
+                knot.rows.push_group(&plan.W, numbers);
             }
             _ => {
                 s.clear();

@@ -2,7 +2,7 @@
 
 use super::InteriorPoint;
 use super::filter::Measure;
-use super::kkt::Kkt;
+use super::kkt::{Coordinates, Kkt};
 use super::step::sum_abs;
 use crate::lq::{SweepError, SweepOutput};
 use crate::problem::Problem;
@@ -117,14 +117,13 @@ impl InteriorPoint {
             if iteration == 0 {
                 self.start_slacks();
             }
-            let mut kkt = self.measure(problem);
+            let mut kkt = self.measure(problem, Coordinates::Unknowns);
             if self.equations(curved) {
                 let of_unknowns = kkt.dual;
                 kkt.dual *= now.control_scale;
                 if kkt.is_converged(tolerance) {
                     // the gradient with respect to the controls themselves decides
-                    self.differentiate(problem, settings, false);
-                    kkt = self.measure(problem);
+                    kkt = self.measure(problem, Coordinates::Controls);
                     now.control_scale = (kkt.dual / of_unknowns.max(f64::MIN_POSITIVE)).max(1.0);
                 }
             }
@@ -199,9 +198,9 @@ impl InteriorPoint {
     }
 
     /// Computes λ and the residuals of the optimality conditions at the iterate.
-    pub(super) fn measure(&mut self, problem: &Problem) -> Kkt {
+    pub(super) fn measure(&mut self, problem: &Problem, coordinates: Coordinates) -> Kkt {
         let Self { solver: SolverLoop { iterate, knots, .. }, slacks, adjoint, step, .. } = self;
-        adjoint.run(knots, slacks, [&step.q, &step.r], &iterate.gaps, problem.shape())
+        adjoint.run(knots, slacks, [&step.q, &step.r], &iterate.gaps, problem.shape(), coordinates)
     }
 
     /// Sweeps, searches and makes a step. Repeats this with a larger regularisation, and restores feasibility at last.

@@ -4,7 +4,7 @@
 use super::slacks::Slacks;
 use crate::lq::{InverseDynamicsForm, LqKnot};
 use crate::problem::Shape;
-use condyle_linalg::{dot, max_abs};
+use condyle_linalg::{View, add_scaled_product, dot, max_abs};
 
 /// Residuals of the optimality conditions of an iterate.
 #[derive(Debug, Clone, Copy, Default)]
@@ -46,6 +46,17 @@ pub(super) struct Adjoint {
     of_u: Vec<f64>,
     /// Gradient Δt Eᵀλ_q + λ_v with respect to the velocity after the step. Shape: ndx / 2.
     pi: Vec<f64>,
+    /// Matrix ∂u/∂w, which an elimination overwrites. Shape: nu × nu.
+    matrix: Vec<f64>,
+}
+
+/// Coordinates of the gradient of the Lagrangian at knots in inverse-dynamics form.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Coordinates {
+    /// Unknowns w.
+    Unknowns,
+    /// Controls: ∂L/∂u = (∂u/∂w)⁻ᵀ ∂L/∂w.
+    Controls,
 }
 
 impl Adjoint {
@@ -55,7 +66,7 @@ impl Adjoint {
     /// λ = q + Aᵀλ⁺ + Cᵀy,     ∂L/∂u = r + Bᵀλ⁺ + Dᵀy
     /// ```
     ///
-    /// and returns the residuals. At knots in inverse-dynamics form, the unknowns replace u.
+    /// and returns the residuals, with the gradient in the given coordinates.
     pub(super) fn run(
         &mut self,
         knots: &[LqKnot],
@@ -63,13 +74,14 @@ impl Adjoint {
         [q, r]: [&[f64]; 2],
         gaps: &[f64],
         shape: &Shape,
+        coordinates: Coordinates,
     ) -> Kkt {
         let n = shape.ndx;
         self.lambda.resize(q.len(), 0.0);
         let (mut dual, mut sum) = (0.0_f64, 0.0);
         for t in (0..knots.len()).rev() {
             let (knot, range) = (&knots[t], shape.dx(t));
-            let Self { lambda, gradient, of_x, of_u, pi } = self;
+            let Self { lambda, gradient, of_x, of_u, pi, matrix } = self;
             let (own, ahead) = lambda.split_at_mut(range.end);
             let own = &mut own[range.clone()];
             of_x.clear();
@@ -84,6 +96,9 @@ impl Adjoint {
                 add_equations(knot, gradient, [of_x, of_u], pi, &ahead[..n]);
                 own[..n / 2].copy_from_slice(&gradient[m + n / 2..]);
                 own[n / 2..].copy_from_slice(&gradient[m..m + n / 2]);
+                if coordinates == Coordinates::Controls {
+                    convert_to_controls(knot, &mut gradient[..m], matrix);
+                }
             } else {
                 slacks.add_gradient(t, knot, of_x, of_u, &mut []);
                 own.copy_from_slice(of_x);
@@ -110,6 +125,32 @@ impl Adjoint {
             gap: max_abs(gaps),
             violation: rows.violation,
         }
+    }
+}
+
+/// Solves (∂u/∂w)ᵀ x = ∂L/∂w by Gaussian elimination with row pivots, and writes x to `gradient`.
+fn convert_to_controls(knot: &LqKnot, gradient: &mut [f64], matrix: &mut Vec<f64>) {
+    let (m, InverseDynamicsForm { efforts, stride, .. }) = (gradient.len(), &knot.inverse_dynamics);
+    matrix.clear();
+    for row in 0..m {
+        matrix.extend(efforts.numbers.chunks_exact(*stride).take(m).map(|U| U[row]));
+    }
+    for k in 0..m {
+        let largest = |a: &usize, b: &usize| matrix[a * m + k].abs().total_cmp(&matrix[b * m + k].abs());
+        let pivot = (k..m).max_by(largest).unwrap_or(k);
+        gradient.swap(k, pivot);
+        (0..m).for_each(|j| matrix.swap(k * m + j, pivot * m + j));
+        let (above, below) = matrix.split_at_mut((k + 1) * m);
+        let row = &above[k * m..];
+        for (i, other) in below.chunks_exact_mut(m).enumerate() {
+            let factor = other[k] / row[k];
+            other[k..].iter_mut().zip(&row[k..]).for_each(|(x, pivot)| *x -= factor * pivot);
+            gradient[k + 1 + i] -= factor * gradient[k];
+        }
+    }
+    for k in (0..m).rev() {
+        let (known, sum) = (&gradient[k + 1..], &matrix[k * m + k + 1..(k + 1) * m]);
+        gradient[k] = (gradient[k] - dot(sum, known)) / matrix[k * m + k];
     }
 }
 
@@ -143,10 +184,8 @@ fn add_equations(knot: &LqKnot, gradient: &mut [f64], [of_x, of_u]: [&[f64]; 2],
     for &[c, k, length] in own {
         gradient[k..k + length].iter_mut().zip(&pi[c..]).for_each(|(g, pi)| *g += pi);
     }
-    let mut add = |row: &[f64], factor: f64| {
-        gradient.iter_mut().zip(row).for_each(|(g, x)| *g += factor * x);
-    };
-    dependent.iter().zip(steps.numbers.chunks_exact(*stride)).for_each(|(&d, D)| add(D, pi[d]));
-    of_u.iter().zip(efforts.numbers.chunks_exact(*stride)).for_each(|(r, U)| add(U, *r));
-    slopes.iter().zip(costs.numbers.chunks_exact(*stride)).for_each(|([d, _], G)| add(G, *d));
+    let mut add = |rows: &[f64], factors: &[f64]| add_scaled_product(gradient, 1.0, View::new(rows, *stride), factors);
+    dependent.iter().zip(steps.numbers.chunks_exact(*stride)).for_each(|(&d, D)| add(D, &[pi[d]]));
+    add(&efforts.numbers, of_u);
+    slopes.iter().zip(costs.numbers.chunks_exact(*stride)).for_each(|([d, _], G)| add(G, &[*d]));
 }

@@ -22,7 +22,7 @@ use crate::problem::Problem;
 use crate::time::Instant;
 use condyle_linalg::max_abs;
 use filter::Filter;
-use kkt::{Adjoint, Kkt};
+use kkt::{Adjoint, Coordinates, Kkt};
 pub use settings::InteriorPointSettings;
 use slacks::Slacks;
 use step::{Step, Trial};
@@ -347,8 +347,8 @@ impl InteriorPoint {
         }
         if status != Status::NotFinite {
             if !matches!(status, Status::Converged | Status::TimeLimit) {
-                self.differentiate(problem, settings, false);
-                self.kkt = self.measure(problem);
+                self.differentiate(problem, settings, self.equations(false));
+                self.kkt = self.measure(problem, Coordinates::Controls);
             }
             self.slacks.write_terms(&mut self.solver.knots, &self.step.r, problem.shape(), self.mu);
             self.sweep_for_gains(problem, settings.regularisation_min);

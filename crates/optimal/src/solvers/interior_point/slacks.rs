@@ -1,11 +1,13 @@
 //! Constraint rows of a horizon, with their slack variables and multipliers.
 
+mod barrier;
 mod steps;
 
 use crate::error::Error;
 use crate::lq::{ConstraintRow, LqKnot, RowTerms};
 use crate::problem::{Problem, Shape, outside};
 use crate::solvers::outcome::{Violation, ViolationKind};
+use barrier::{Barrier, StepLimits, padded};
 use core::ops::Range;
 
 /// Smallest distance of an initial slack variable from a bound, relative to the bound and to the distance of the
@@ -45,17 +47,17 @@ pub(super) struct Slacks {
     kinds: Vec<RowKind>,
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// Indices of the equations.
+    equations: Vec<usize>,
     /// Values g at the iterate, and at a trial.
     g: Vec<f64>,
     trial: Vec<f64>,
-    s: Vec<f64>,
-    /// Multipliers of the lower bounds, and of the upper bounds.
-    z: [Vec<f64>; 2],
-    /// Multipliers of the rows.
+    /// Slack variables and multipliers of the inequalities.
+    barrier: Barrier,
+    /// Multipliers of the rows, and their steps.
     y: Vec<f64>,
-    ds: Vec<f64>,
-    dz: [Vec<f64>; 2],
     dy: Vec<f64>,
+    limits: StepLimits,
     /// Slope and curvature with which each row enters the sweep.
     terms: Vec<[f64; 2]>,
     /// Diagonals of R at knots in inverse-dynamics form, without the terms of bounds. Shape: flat controls.
@@ -116,9 +118,21 @@ impl Slacks {
             }
             offsets.push(lower.len());
         }
-        let all = lower.len();
-        let Self { g, trial, s, z: [zl, zu], y, ds, dz: [dzl, dzu], dy, .. } = self;
-        for numbers in [g, trial, s, zl, zu, y, ds, dzl, dzu, dy] {
+        self.barrier.clear();
+        self.equations.clear();
+        for (i, kind) in kinds.iter().enumerate() {
+            self.barrier.push(match kind {
+                RowKind::Inequality => [lower[i], upper[i]],
+                _ => [f64::NEG_INFINITY, f64::INFINITY],
+            });
+            if *kind == RowKind::Equation {
+                self.equations.push(i);
+            }
+        }
+        self.barrier.complete();
+        let all = padded(lower.len());
+        let Self { g, trial, y, dy, .. } = self;
+        for numbers in [g, trial, y, dy] {
             numbers.resize(all, 0.0);
         }
         self.terms.resize(all, [0.0; 2]);
@@ -132,11 +146,12 @@ impl Slacks {
     pub(super) fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         let (offsets, numbers) = &mut self.old;
         offsets.clone_from(&self.offsets);
-        for (old, now) in numbers.iter_mut().zip([&self.s, &self.z[0], &self.z[1], &self.y]) {
+        let Barrier { s, z: [zl, zu], .. } = &self.barrier;
+        for (old, now) in numbers.iter_mut().zip([s, zl, zu, &self.y]) {
             old.clone_from(now);
         }
         self.arrange(problem)?;
-        let Self { offsets, s, z: [zl, zu], y, old: (before, numbers), .. } = self;
+        let Self { offsets, barrier: Barrier { s, z: [zl, zu], .. }, y, old: (before, numbers), .. } = self;
         let horizon = problem.horizon();
         if before.len() != offsets.len() {
             return Ok(());
@@ -173,20 +188,9 @@ impl Slacks {
         self.offsets[t]..self.offsets[t + 1]
     }
 
-    fn inequalities(&self) -> impl Iterator<Item = usize> {
-        (0..self.len()).filter(|&i| self.kinds[i] == RowKind::Inequality)
-    }
-
-    /// Returns the distances of s from both bounds of row i, for a step of length α; infinite where a bound is.
-    fn distances(&self, i: usize, alpha: f64) -> [f64; 2] {
-        let s = self.s[i] + alpha * self.ds[i];
-        [s - self.lower[i], self.upper[i] - s]
-    }
-
     /// Returns the number of finite bounds of inequalities.
     pub(super) fn bound_count(&self) -> usize {
-        let finite = |i: usize| usize::from(self.lower[i].is_finite()) + usize::from(self.upper[i].is_finite());
-        self.inequalities().map(finite).sum()
+        self.barrier.count
     }
 
     /// Takes the values of a trial from `values` (N + 1 equal parts) and from the controls.
@@ -219,11 +223,7 @@ impl Slacks {
                 knot.rows.push(ConstraintRow { first: first + j, entries: &[1.0], c: self.g[i], lower, upper });
             }
             if t == 0 {
-                for (row, kind) in knot.rows.iter().zip(&mut self.kinds) {
-                    if row.first + row.entries.len() <= n && *kind != RowKind::Free {
-                        *kind = RowKind::Fixed; // no control changes the row
-                    }
-                }
+                self.fix_rows(knot);
             }
             if inverse {
                 self.diagonals[shape.u(t)].copy_from_slice(&knot.inverse_dynamics.diagonal[n / 2..]);
@@ -231,35 +231,54 @@ impl Slacks {
         }
     }
 
-    /// Sets s to the values g, moved into the interior, and z to the central path. Sets y to zero for equations.
-    pub(super) fn start(&mut self, mu: f64) {
-        for i in 0..self.len() {
-            let z = if self.kinds[i] == RowKind::Inequality {
-                self.s[i] = self.inside(i, INTERIOR);
-                self.distances(i, 0.0).map(|distance| mu / distance)
-            } else {
-                [0.0; 2]
+    /// Marks the rows of knot 0 that no control changes.
+    fn fix_rows(&mut self, knot: &LqKnot) {
+        let is_of_state = |(first, entries): (usize, &[f64])| first + entries.len() <= knot.ndx();
+        let mut groups = knot.rows.groups().peekable();
+        for (i, run) in knot.rows.runs().enumerate() {
+            while groups.next_if(|group| group.rows.end <= i).is_some() {}
+            let fixed = match groups.peek().filter(|group| group.rows.contains(&i)) {
+                Some(group) => group.forms().all(is_of_state),
+                None => is_of_state(run),
             };
-            (self.z[0][i], self.z[1][i], self.y[i]) = (z[0], z[1], z[1] - z[0]);
+            if !fixed || matches!(self.kinds[i], RowKind::Free | RowKind::Fixed) {
+                continue;
+            }
+            self.kinds[i] = RowKind::Fixed;
+            self.equations.retain(|&equation| equation != i);
+            self.barrier.free(i);
+            self.y[i] = 0.0;
         }
     }
 
-    /// Sets s to the values g where they are inside, and moves z to the neighbourhood of the central path. Keeps y.
-    pub(super) fn resume(&mut self, mu: f64) {
+    /// Sets s to the values g, moved into the interior, and z to the central path. Sets y to zero for equations.
+    pub(super) fn start(&mut self, mu: f64) {
         for i in 0..self.len() {
-            if self.kinds[i] != RowKind::Inequality {
-                continue;
+            self.y[i] = 0.0;
+            if self.kinds[i] == RowKind::Inequality {
+                self.barrier.s[i] = self.inside(i, INTERIOR);
+                let [zl, zu] = self.barrier.distances(i).map(|distance| mu / distance);
+                (self.barrier.z[0][i], self.barrier.z[1][i], self.y[i]) = (zl, zu, zu - zl);
             }
-            let old = self.s[i];
+        }
+        self.barrier.renew();
+    }
+
+    /// Sets s to the values g where they are inside, and moves z to the neighbourhood of the central path. Keeps y of
+    /// equations.
+    pub(super) fn resume(&mut self, mu: f64) {
+        for i in (0..self.len()).filter(|&i| self.kinds[i] == RowKind::Inequality) {
+            let old = self.barrier.s[i];
             let is_inside = |s: f64| s > self.lower[i] && s < self.upper[i];
-            self.s[i] = match is_inside(self.g[i]) {
+            self.barrier.s[i] = match is_inside(self.g[i]) {
                 true => self.inside(i, 1e-6),
                 false if is_inside(old) => old,
                 false => self.inside(i, INTERIOR),
             };
-            self.center(i, mu, OFF_PATH_RESUMED);
-            self.y[i] = self.z[1][i] - self.z[0][i];
+            self.barrier.center(i, mu, OFF_PATH_RESUMED);
+            self.y[i] = self.barrier.z[1][i] - self.barrier.z[0][i];
         }
+        self.barrier.renew();
     }
 
     /// Returns g of row i, moved away from the bounds by the given relative margin.
@@ -276,54 +295,31 @@ impl Slacks {
         s
     }
 
-    /// Moves the multipliers of row i to the neighbourhood of the central path.
-    fn center(&mut self, i: usize, mu: f64, factor: f64) {
-        for (z, distance) in [0, 1].into_iter().zip(self.distances(i, 0.0)) {
-            let path = mu / distance;
-            self.z[z][i] = self.z[z][i].clamp(path / factor, path * factor); // 0 for an infinite bound
-        }
-    }
-
     /// Returns the multiplier of row i in the gradient of the Lagrangian.
     fn multiplier(&self, i: usize) -> f64 {
-        match self.kinds[i] {
-            RowKind::Free | RowKind::Fixed => 0.0,
-            RowKind::Equation | RowKind::Inequality => self.y[i],
-        }
+        if self.kinds[i].is_imposed() { self.y[i] } else { 0.0 }
     }
 
     /// Returns the mean and the smallest product of a multiplier and its distance; `None` without inequalities.
     pub(super) fn products(&self) -> Option<[f64; 2]> {
-        let (mut sum, mut least, mut count) = (0.0, f64::INFINITY, 0);
-        for i in self.inequalities() {
-            for (z, distance) in self.z.iter().zip(self.distances(i, 0.0)).filter(|(_, d)| *d != f64::INFINITY) {
-                sum += z[i] * distance;
-                least = least.min(z[i] * distance);
-                count += 1;
-            }
-        }
-        (count > 0).then(|| [sum / count as f64, least])
+        let Barrier { products, count, .. } = &self.barrier;
+        (*count > 0).then(|| [products.sum / *count as f64, products.least])
     }
 
     /// Returns the residuals of all rows at the iterate.
     pub(super) fn residuals(&self) -> RowResiduals {
-        let mut all = RowResiduals::default();
-        for i in 0..self.len() {
-            if matches!(self.kinds[i], RowKind::Free | RowKind::Fixed) {
-                continue;
-            }
-            let e = outside(self.g[i], self.lower[i], self.upper[i]).abs();
-            all.violation = if e > all.violation || e.is_nan() { e } else { all.violation };
-            if self.kinds[i] == RowKind::Equation {
-                (all.sum, all.count) = (all.sum + self.y[i].abs(), all.count + 1);
-                continue;
-            }
-            for (z, distance) in self.z.iter().zip(self.distances(i, 0.0)).filter(|(_, d)| *d != f64::INFINITY) {
-                all.complementarity = all.complementarity.max(z[i] * distance);
-                (all.sum, all.count) = (all.sum + z[i], all.count + 1);
-            }
+        let Self { barrier: Barrier { products, count, .. }, equations, g, lower, upper, .. } = self;
+        let mut violation = 0.0;
+        for ((kind, g), (lower, upper)) in self.kinds.iter().zip(g).zip(lower.iter().zip(upper)) {
+            let e = if kind.is_imposed() { outside(*g, *lower, *upper).abs() } else { 0.0 };
+            violation = if e > violation || e.is_nan() { e } else { violation };
         }
-        all
+        RowResiduals {
+            violation,
+            complementarity: products.largest,
+            sum: products.multipliers + equations.iter().map(|&i| self.y[i].abs()).sum::<f64>(),
+            count: count + equations.len(),
+        }
     }
 
     /// Returns the row with the largest violation among the rows that are imposed, or else among the rows that no
@@ -378,5 +374,10 @@ impl RowKind {
             false if lower.is_finite() || upper.is_finite() => Self::Inequality,
             false => Self::Free,
         }
+    }
+
+    /// Returns whether the row takes part in the problem.
+    fn is_imposed(self) -> bool {
+        matches!(self, Self::Equation | Self::Inequality)
     }
 }

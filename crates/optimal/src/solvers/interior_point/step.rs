@@ -208,8 +208,9 @@ impl InteriorPoint {
                 Some(next) => forward.step(knot, &sweep.feedback()[t].factors, x, u, next),
                 None => &[],
             };
-            slacks.find_steps(t, knot, x, w, u, *mu);
+            slacks.find_changes(t, knot, x, w, u);
         }
+        slacks.find_steps(*mu);
     }
 
     /// Evaluates the trial of step length α. Returns its cost, and θ and φ.
