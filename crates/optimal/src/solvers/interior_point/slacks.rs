@@ -262,6 +262,21 @@ impl Slacks {
         }
     }
 
+    /// Sets y of consecutive rows of knot t, from row `first` on. The multiplier |y| goes to the bound to which the sign
+    /// of y belongs. The multiplier of the other bound is 0, so that [`resume`](Self::resume) moves it to the central
+    /// path. A new problem must have been [arranged](Self::arrange).
+    pub(super) fn set_multipliers(&mut self, t: usize, first: usize, y: &[f64]) {
+        for (i, &y) in (self.offsets[t] + first..).zip(y) {
+            (self.z[0][i], self.z[1][i], self.y[i]) = ((-y).max(0.0), y.max(0.0), y);
+        }
+    }
+
+    /// Sets all multipliers to 0.
+    pub(super) fn forget(&mut self) {
+        let Self { z: [zl, zu], y, .. } = self;
+        [zl, zu, y].into_iter().for_each(|numbers| numbers.fill(0.0));
+    }
+
     /// Returns g of row i, moved away from the bounds by the given relative margin.
     fn inside(&self, i: usize, margin: f64) -> f64 {
         let (lower, upper) = (self.lower[i], self.upper[i]);
@@ -276,11 +291,12 @@ impl Slacks {
         s
     }
 
-    /// Moves the multipliers of row i to the neighbourhood of the central path.
+    /// Moves the multipliers of row i to the neighbourhood of the central path, and multipliers of 0 to the path itself.
     fn center(&mut self, i: usize, mu: f64, factor: f64) {
         for (z, distance) in [0, 1].into_iter().zip(self.distances(i, 0.0)) {
             let path = mu / distance;
-            self.z[z][i] = self.z[z][i].clamp(path / factor, path * factor); // 0 for an infinite bound
+            let given = if self.z[z][i] == 0.0 { path } else { self.z[z][i] };
+            self.z[z][i] = given.clamp(path / factor, path * factor); // 0 for an infinite bound
         }
     }
 
