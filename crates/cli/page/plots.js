@@ -52,6 +52,7 @@ function axis(more) {
 function makePlots(data, on) {
   const joints = data.joints, times = data.times, last = times.length - 1;
   const quantities = quantitiesOf(data), drawn = [...quantities, ...multipliersOf(data)];
+  const side = drawn.length > quantities.length ? 60 : 50; // width of a vertical axis; small multipliers have long labels
   for (const { id } of drawn) document.getElementById(`plot-${id}`).parentElement.hidden = false;
   const mixed = new Set(joints.map((joint) => joint.unit)).size > 1; // with metres and radians, each unit has its own axis
   const hidden = new Set();
@@ -151,9 +152,9 @@ function makePlots(data, on) {
     const values = quantity.apart && { values: (_, splits) => splits.map((y) => brief(y)) }; // multipliers may be small
     const axes = [
       axis({ label: "time (s)", labelSize: 18, size: 26 }),
-      axis({ scale: "y", label: label(joints[0]?.unit ?? ""), labelSize: 20, size: 50, ...values }),
+      axis({ scale: "y", label: label(joints[0]?.unit ?? ""), labelSize: 20, size: side, ...values }),
     ];
-    if (mixed) axes.push(axis({ scale: shares ? "y" : "y2", side: 1, size: 50, labelSize: 20, label: shares ? " " : label(second), grid: { show: false }, ...values, ...(shares && { values: () => [], ticks: { show: false } }) }));
+    if (mixed) axes.push(axis({ scale: shares ? "y" : "y2", side: 1, size: side, labelSize: 20, label: shares ? " " : label(second), grid: { show: false }, ...values, ...(shares && { values: () => [], ticks: { show: false } }) }));
 
     const u = new uPlot({
       width: host.clientWidth || 600,

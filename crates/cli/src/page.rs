@@ -188,8 +188,8 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
     (data, note)
 }
 
-/// Returns the multipliers of the limits over time, for each quantity with a reached bound. A joint that reaches no bound
-/// has no numbers.
+/// Returns the multipliers of the limits over time, for each quantity with a reached bound. A joint that reaches no
+/// bound has no numbers.
 fn multipliers(plan: &Plan, knots: &[usize], met: &[Met]) -> Option<Value> {
     let held = plan.held.as_ref()?;
     let of = |what: &str, knots: &[usize]| -> Option<Vec<Vec<Option<f64>>>> {

@@ -76,8 +76,8 @@ impl Watch {
 /// Returns the largest expected decrease of the cost, relative to the cost, if the last iterations of a solve changed
 /// nothing and kept the constraints.
 ///
-/// For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance. A solve
-/// would then go on until its last iteration, although the motion no longer changes.
+/// For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance. A
+/// solve would then go on until its last iteration, although the motion no longer changes.
 pub(crate) fn settled(trace: &[Iteration]) -> Option<f64> {
     let last = trace.last_chunk::<STILL>()?;
     let decreases = last.map(|now| now.d1.abs() / now.cost.abs());

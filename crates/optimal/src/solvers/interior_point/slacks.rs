@@ -262,9 +262,9 @@ impl Slacks {
         }
     }
 
-    /// Sets y of consecutive rows of knot t, from row `first` on. The multiplier |y| goes to the bound to which the sign
-    /// of y belongs. The multiplier of the other bound is 0, so that [`resume`](Self::resume) moves it to the central
-    /// path. A new problem must have been [arranged](Self::arrange).
+    /// Sets y of consecutive rows of knot t, from row `first` on. The sign of y chooses the bound whose multiplier is
+    /// |y|. The multiplier of the other bound is 0, so that [`resume`](Self::resume) moves it to the central path. A
+    /// new problem must have been [arranged](Self::arrange).
     pub(super) fn set_multipliers(&mut self, t: usize, first: usize, y: &[f64]) {
         for (i, &y) in (self.offsets[t] + first..).zip(y) {
             (self.z[0][i], self.z[1][i], self.y[i]) = ((-y).max(0.0), y.max(0.0), y);
@@ -291,7 +291,7 @@ impl Slacks {
         s
     }
 
-    /// Moves the multipliers of row i to the neighbourhood of the central path, and multipliers of 0 to the path itself.
+    /// Moves the multipliers of row i to the neighbourhood of the central path. Multipliers of 0 move to the path.
     fn center(&mut self, i: usize, mu: f64, factor: f64) {
         for (z, distance) in [0, 1].into_iter().zip(self.distances(i, 0.0)) {
             let path = mu / distance;
