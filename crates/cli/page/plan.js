@@ -39,7 +39,8 @@
 //                     value (cost per unit) and its knot; multiplier null: the solver did not need the limits
 //   multipliers       { q, v, tau }: multipliers of the limits, in the shapes of q, v and tau above, null for joints that
 //                     reach no bound; each may be null, if no bound of the quantity is reached; or null
-//   worst             text about the row that an unsolved problem violates most, or null
+//   worst             { text, is_gap } of the row that an unsolved problem violates most, or null; is_gap: the row belongs
+//                     to the dynamics
 //   version, command  version of the program that wrote the page; its command line, or null
 //
 // `#t=0.4` in the address opens the page paused at 0.4 s. While the player is paused, the address shows its time.
@@ -104,7 +105,7 @@ function header(data) {
   };
   const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly decreases" }[data.status];
   badge(solved ? "good" : "bad", solved ?? `Not converged: ${data.status}`);
-  if (data.worst) badge("bad", data.worst[0].toUpperCase() + data.worst.slice(1));
+  if (data.worst) badge("bad", data.worst.text[0].toUpperCase() + data.worst.text.slice(1));
   if (data.miss != null) {
     const reached = data.tolerance == null || data.miss <= data.tolerance;
     const within = data.tolerance == null ? "" : reached ? ` (within ${length(data.tolerance)})` : ` (more than ${length(data.tolerance)})`;
@@ -119,8 +120,8 @@ function header(data) {
   const kinds = `${positions} of ${of} positions, ${velocities} of ${of} velocities, ${efforts} of ${of} efforts`;
   if (!total) badge("warn", `No limits checked: ${source} has none`);
   else if (breaches) badge("bad", `${breaches} of ${total} limits exceeded (${source}: ${kinds})`);
-  else if (data.worst) badge("warn", `The limits hold, but the motion does not follow the dynamics (${source}: ${kinds})`);
-  else badge("good", `${total === 1 ? "1 limit holds" : `All ${total} limits hold`} (${source}: ${kinds})`);
+  else if (data.worst?.is_gap) badge("warn", `The limits hold, but the motion does not follow the dynamics (${source}: ${kinds})`);
+  else badge("good", `${total === 1 ? "1 limit holds" : `All ${total} limits hold${data.worst ? " up to rounding" : ""}`} (${source}: ${kinds})`);
   $("footer").append("Made by Condyle", data.version ? ` ${data.version}` : "", ...(data.command ? [" with ", element("code", {}, data.command)] : []), ". Drawn with three.js and uPlot (MIT).");
 }
 

@@ -132,6 +132,11 @@ impl Worst {
         let joint = bodies.rev().find(|body| body.idx_v <= index).map_or_else(String::new, |b| b.joint_name.clone());
         Some(Self { knot, time: plan.times[knot], what, joint, amount })
     }
+
+    /// Returns whether the row belongs to the dynamics.
+    pub(crate) fn is_gap(&self) -> bool {
+        self.what == "gap"
+    }
 }
 
 impl core::fmt::Display for Worst {

@@ -181,7 +181,9 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
             shown
         }).collect::<Vec<_>>(),
         "multipliers": multipliers(plan, &knots, met),
-        "worst": report::worst(plan).map(|worst| worst.to_string().replace('`', "")),
+        "worst": report::worst(plan).map(|worst| json!({
+            "text": worst.to_string().replace('`', ""), "is_gap": worst.is_gap(),
+        })),
         "version": env!("CARGO_PKG_VERSION"),
         "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),
     });

@@ -4,7 +4,7 @@
 use crate::error::{Error, positive};
 use crate::gait::Gait;
 use crate::limits::{LimitCounts, check_start, last_frame, start};
-use crate::met::Held;
+use crate::met::{Held, Worst};
 use crate::motion::{Goal, Plan};
 use crate::robot::{self, ReadingOptions};
 use crate::task::{self, Task};
@@ -194,7 +194,10 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
             let worst = report::worst(plan).map_or_else(String::new, |worst| format!("; {worst}"));
             Err(Error::NegativeAnswer(format!("the solver stopped: {}{worst}", report::status(plan))))
         }
-        None => report::worst(plan).map_or(Ok(()), |worst| Err(Error::NegativeAnswer(worst.to_string()))),
+        None => match report::worst(plan).filter(Worst::is_gap) {
+            Some(gap) => Err(Error::NegativeAnswer(gap.to_string())),
+            None => Ok(()),
+        },
     }
 }
 

@@ -129,7 +129,7 @@ pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
         let worst = values.into_iter().map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let range = if (upper - lower).is_finite() { upper - lower } else { 1.0 };
         if let Some((at_knot, (amount, limit))) = worst
-            && amount > ROUNDING * range.max(1.0)
+            && (amount > ROUNDING * range.max(1.0) || amount.is_nan())
         {
             found.push(Violation { what, joint: joint.to_owned(), at_knot, amount, limit });
         }
@@ -164,7 +164,8 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation], met: 
             "settled: the constraints hold, and the expected decrease of the cost is {left:.0e} of the cost; {why}\n"
         );
     }
-    if let Some(worst) = worst(plan) {
+    let worst = worst(plan);
+    if let Some(worst) = &worst {
         text += &format!("{worst}\n");
     }
     if let Some(goal) = &plan.goal {
@@ -191,13 +192,15 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation], met: 
     let verdict = if budget.total_ms <= budget.budget_ms { "within" } else { "OVER" };
     text += &format!("one iteration is {verdict} the budget of {} ms\n", budget.budget_ms);
     let limits = LimitCounts::new(&plan.robot);
+    let but = match &worst {
+        Some(worst) if worst.is_gap() => ", but the motion does not follow the dynamics",
+        Some(_) => " up to rounding",
+        None => "",
+    };
     text += &match (limits.total(), violations.len()) {
         (0, _) => format!("\n{limits}: nothing to check\n"),
-        (1, 0) => format!("\n{limits}: the limit holds at all knots\n"),
-        (total, 0) if worst(plan).is_some() => {
-            format!("\n{limits}: all {total} hold at all knots, but the motion does not follow the dynamics\n")
-        }
-        (total, 0) => format!("\n{limits}: all {total} hold at all knots\n"),
+        (1, 0) => format!("\n{limits}: the limit holds at all knots{but}\n"),
+        (total, 0) => format!("\n{limits}: all {total} hold at all knots{but}\n"),
         (total, beyond) => {
             let are = if beyond == 1 { "is" } else { "are" };
             format!("\n{limits}\n{}\n", styled(Style::Bad, &format!("{beyond} of these {total} {are} exceeded:")))

@@ -216,7 +216,7 @@ fn an_unsolved_plan_names_its_largest_violation() {
     assert!(!said.contains("hold at all knots\n"), "{said}");
     let data = page_data(&folder.join("plan.html"));
     assert_eq!(data["status"], "iteration limit");
-    assert!(data["worst"].as_str().unwrap().starts_with("at knot "), "{}", data["worst"]);
+    assert!(data["worst"]["text"].as_str().unwrap().starts_with("at knot "), "{}", data["worst"]);
     let summary = plan(&folder, &[&arguments[..], &["--json"]].concat());
     let summary: Value = serde_json::from_slice(&summary.stdout).unwrap();
     let worst = &summary["worst"];
