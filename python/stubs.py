@@ -85,7 +85,8 @@ ARGUMENTS = {
         lower pi placement point rest stiffness
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
-        _check_pose.pose _controller_from_numbers.numbers""",
+        _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
+        InteriorPoint.set_multipliers.values""",
     "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
@@ -267,8 +268,8 @@ RESULTS = {
     "None": """
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
-        AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift InteriorPoint.shift
-        Ltdl.factorize
+        AugmentedLagrangian.set_multipliers AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target
+        Fddp.shift InteriorPoint.set_multipliers InteriorPoint.shift Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_costs Problem.set_duration Problem.set_knot

@@ -2835,6 +2835,19 @@ class AugmentedLagrangian:
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
         """
 
+    def set_multipliers(self, name: str, values: ArrayLike) -> None:
+        """Sets the multipliers of the limit `name`. The next `solve` or `resume` starts from them.
+
+        Other limits keep the multipliers of the last solve; without a solve, they start at 0. The penalty and `outcome`
+        do not change. A positive number belongs to the upper bound, a negative one to the lower bound.
+
+        name: the name of a limit of the problem.
+        values: the multipliers, (N + 1, rows), as `outcome.multipliers_of(name)` returns them. Numbers at knots without
+            this limit are ignored.
+
+        Raises `ProblemError` if no limit has this name, or a number is not finite; then all multipliers are kept.
+        """
+
     def shift(self, last: int) -> None:
         """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
 
@@ -3402,6 +3415,20 @@ class InteriorPoint:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def set_multipliers(self, name: str, values: ArrayLike) -> None:
+        """Sets the multipliers of the limit `name`. The next `solve`, `resume` or `tick` starts from them.
+
+        Other limits keep the multipliers of the last solve; without a solve, they start as usual. `outcome` does not
+        change. A positive number belongs to the upper bound, a negative one to the lower bound. Numbers without such a
+        bound have no effect, and numbers far from the central path are moved towards it.
+
+        name: the name of a limit of the problem.
+        values: the multipliers, (N + 1, rows), as `outcome.multipliers_of(name)` returns them. Numbers at knots without
+            this limit are ignored.
+
+        Raises `ProblemError` if no limit has this name, or a number is not finite; then all multipliers are kept.
         """
 
     def shift(self, last: int) -> None:

@@ -799,6 +799,25 @@ class Outcome(NamedTuple):
     """The largest violation; None if all limits hold exactly."""
     barrier: float = 0.0
     """The barrier parameter μ at the end of the solve of `InteriorPoint`; 0 for `AugmentedLagrangian`."""
+    limits: dict[str, list[slice]] = {}  # noqa: RUF012 - a named tuple has no mutable attributes of its own
+    """The rows of each named limit: for each knot a slice of `multipliers[knot]`, empty at a knot without the limit."""
+
+    def multipliers_of(self, name: str) -> _Array:
+        """Returns the multipliers of the limit `name`, (N + 1, rows): positive at an upper bound, negative at a lower
+        bound. They are 0 at a knot without this limit. `solver.set_multipliers` accepts the result.
+
+        Raises `ProblemError` if no limit has this name.
+        """
+        from ._condyle import ProblemError
+
+        if name not in self.limits:
+            names = f"; the limits are {', '.join(f'`{known}`' for known in self.limits)}" if self.limits else ""
+            raise ProblemError(f"multipliers of `{name}`: no limit has this name{names}")
+        found = [y[rows] for y, rows in zip(self.multipliers, self.limits[name], strict=True)]
+        result = np.zeros((len(found), max(map(len, found))))
+        for row, y in zip(result, found, strict=True):
+            row[: len(y)] = y
+        return result
 
 
 class Control(NamedTuple):
@@ -888,6 +907,8 @@ def _shown(value: object) -> str:
         if value.ndim > 1 or value.size > _NUMBERS:
             return f"<array {value.shape}>"
         return np.array2string(value, separator=", ", max_line_width=1000)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{k!r}: {_shown(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list) and len(value) > _NUMBERS:
         return f"<list of {len(value)}>"
     return repr(value)
@@ -908,6 +929,7 @@ _MODULES = {
     "LqKnot": "optimal",
     "ConstraintRows": "optimal",
     "Outcome": "optimal",
+    "Violation": "optimal",
     "Sphere": "optimal",
     "Control": "simulation",
     "Ground": "simulation",

@@ -51,7 +51,18 @@ from ._condyle import (
     Unicycle,
     WrenchCone,
 )
-from ._types import ConstraintRows, Evaluation, Iteration, LqKnot, Outcome, Solution, Sphere, SweepResult, Timings
+from ._types import (
+    ConstraintRows,
+    Evaluation,
+    Iteration,
+    LqKnot,
+    Outcome,
+    Solution,
+    Sphere,
+    SweepResult,
+    Timings,
+    Violation,
+)
 
 __all__ = [
     "Action",
@@ -84,6 +95,7 @@ __all__ = [
     "SweepResult",
     "Timings",
     "Unicycle",
+    "Violation",
     "WrenchCone",
     "ode_action",
     "thrusters",

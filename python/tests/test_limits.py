@@ -19,6 +19,7 @@ from condyle.optimal import (
     FreeInverseDynamics,
     FrictionCone,
     ImpulseDynamics,
+    InteriorPoint,
     Limit,
     Problem,
     ProblemError,
@@ -303,3 +304,48 @@ def test_a_receding_horizon_goes_on_from_its_multipliers() -> None:
     np.testing.assert_allclose(np.array(warm.us), np.array(fresh.us), atol=1e-4)
     with pytest.raises(ProblemError, match="there is no action model 7"):
         solver.shift(7)
+
+
+@pytest.mark.parametrize("kind", [InteriorPoint, AugmentedLagrangian])
+def test_multipliers_are_read_and_set_by_the_limits_name(kind: Any) -> None:
+    problem, xs, us = reach()
+    solver = kind(problem)
+    solution, outcome = solver.solve(xs, us), solver.outcome
+    weak, there = outcome.multipliers_of("weak"), outcome.multipliers_of("reach")
+    assert list(outcome.limits) == ["weak", "reach", "stop"]
+    assert weak.shape == (KNOTS + 1, 7) and there.shape == (KNOTS + 1, 3) and not there[:KNOTS].any()
+    np.testing.assert_array_equal(weak[:-2], outcome.multipliers[:-2])
+    np.testing.assert_array_equal(np.r_[there[KNOTS], outcome.multipliers_of("stop")[KNOTS]], outcome.multipliers[-1])
+    assert not weak[-2:].any()  # the limits of these two knots are others
+    assert pickle.loads(pickle.dumps(outcome)).limits == outcome.limits
+    again, fresh = kind(problem), kind(problem)
+    for name in outcome.limits:
+        again.set_multipliers(name, outcome.multipliers_of(name))
+    for other in (again, fresh):
+        assert other.solve(solution.xs, solution.us).status == "converged"
+        assert other.outcome.cost == pytest.approx(outcome.cost, rel=1e-5)
+    assert again.outcome.iterations < fresh.outcome.iterations
+    again.set_multipliers("weak", list(weak))
+    assert again.resume().status == "converged"
+    assert again.outcome.iterations <= 10
+
+
+@pytest.mark.parametrize("kind", [InteriorPoint, AugmentedLagrangian])
+def test_wrong_multipliers_are_refused(kind: Any) -> None:
+    problem, xs, us = reach()
+    solver = kind(problem)
+    nan = np.zeros((KNOTS + 1, 7))
+    nan[3, 2] = np.nan
+    known = "no limit has this name; the limits are `weak`, `reach`, `stop`"
+    with pytest.raises(ProblemError, match=f"multipliers of `weka`: {known}"):
+        solver.set_multipliers("weka", nan)
+    with pytest.raises(ProblemError, match="multipliers of `weak`: knot 3: entry 2 is NaN, which is not finite"):
+        solver.set_multipliers("weak", nan)
+    with pytest.raises(ValueError, match=r"multipliers of `weak`: expected shape \(13, 7\), found \(12, 7\)"):
+        solver.set_multipliers("weak", np.zeros((KNOTS, 7)))
+    solver.solve(xs, us)
+    with pytest.raises(ProblemError, match=f"multipliers of `weka`: {known}"):
+        solver.outcome.multipliers_of("weka")
+    free = Problem(X0, [FreeDynamics(ARM, DT, [])], [0], FreeDynamics(ARM, None, []))
+    with pytest.raises(ProblemError, match="no limit has this name"):
+        kind(free).set_multipliers("weak", np.zeros((2, 7)))

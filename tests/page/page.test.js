@@ -1,5 +1,5 @@
-// Tests the pages of plans in headless Chromium: an arm that reaches, a quadruped that trots, meshes. PAGES names their
-// folder.
+// Tests the pages of plans in headless Chromium: an arm that reaches, with and without limits that it meets, a
+// quadruped that trots, meshes. PAGES names their folder.
 //
 // Checks that a page causes no requests and no errors, and that slider, player and keys move the robot. Also checks a
 // gait, dark mode, small windows, printing, and a link to a time. Pictures are written to PAGES.
@@ -182,6 +182,28 @@ for (const name of ["trot", "talos"]) {
     await page.close();
   });
 }
+
+test("reached bounds have a table with bars, and their multipliers have plots", async () => {
+  const { page, wrong } = await open("limits", { width: 1200, height: 900 });
+  const data = await page.evaluate(() => JSON.parse(document.getElementById("data").textContent));
+  assert.ok(data.met.length > 0);
+  assert.equal(await page.$$eval("#met tbody tr", (rows) => rows.length), data.met.length);
+  const bars = await page.$$eval("#met .when", (strips) => strips.map((strip) => [...strip.querySelectorAll("i")].map((bar) => parseFloat(bar.style.left))));
+  const span = data.times.at(-1) - data.times[0];
+  data.met.forEach(({ knots }, i) => knots.forEach(([first], n) => assert.ok(Math.abs(bars[i][n] - (100 * data.times[first]) / span) < 1e-3)));
+  for (const [id, what] of [["q", "position"], ["v", "velocity"], ["tau", "torque"]]) {
+    const reached = data.met.some((met) => met.what === what);
+    assert.equal(await page.$eval(`#plot-limit-${id}`, (plot) => plot.parentElement.hidden), !reached, what);
+    assert.equal(await page.$$eval(`#plot-limit-${id} canvas`, (drawn) => drawn.length), reached ? 1 : 0, what);
+  }
+  // a click on the knot of the largest multiplier moves the robot to this knot
+  await page.$eval("#met tbody button", (button) => button.click());
+  assert.ok(Math.abs((await clock(page)) - data.times[data.met[0].at_knot]) < 0.006);
+  await page.$eval("input[name=scale][value=share]", (input) => input.click()); // multipliers keep their units
+  await page.screenshot({ path: join(folder, "limits.png"), fullPage: true });
+  assert.deepEqual(wrong, []);
+  await page.close();
+});
 
 test("the tables of iterations and of the budget are full", async () => {
   const { page } = await open("reach");

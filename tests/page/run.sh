@@ -22,6 +22,7 @@ if ! cmp -s "$folder/package-lock.json" "$folder/installed"; then
     cp "$folder/package-lock.json" "$folder/installed"
 fi
 "$program" plan --out "$folder/pages/reach.html" >/dev/null
+"$program" plan --target 0.5,0.3,0.4 --knots 70 --out "$folder/pages/limits.html" >/dev/null
 "$program" plan --example trot >"$folder/pages/trot.toml"
 "$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
 # A page is also written for a motion that does not reach its target, so exit status 1 is not an error here.

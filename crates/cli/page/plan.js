@@ -34,6 +34,13 @@
 //                     each kind, and number of degrees of freedom of the robot
 //   violations        [] of { what: "position" | "velocity" | "torque", joint (its name), at_knot, amount, limit }: the
 //                     worst knot of each joint and quantity that exceeds a limit; the excess, and the exceeded limit
+//   met               [] of { what, joint, bound: "lower" | "upper", limit, knots: [] of [first, last], multiplier, at_knot }:
+//                     each bound that the motion reaches, the knots at the bound, the multiplier with the largest absolute
+//                     value (cost per unit) and its knot; multiplier null: the solver did not need the limits
+//   multipliers       { q, v, tau }: multipliers of the limits, in the shapes of q, v and tau above, null for joints that
+//                     reach no bound; each may be null, if no bound of the quantity is reached; or null
+//   worst             { text, is_gap } of the row that an unsolved problem violates most, or null; is_gap: the row belongs
+//                     to the dynamics
 //   version, command  version of the program that wrote the page; its command line, or null
 //
 // `#t=0.4` in the address opens the page paused at 0.4 s. While the player is paused, the address shows its time.
@@ -98,6 +105,7 @@ function header(data) {
   };
   const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly decreases" }[data.status];
   badge(solved ? "good" : "bad", solved ?? `Not converged: ${data.status}`);
+  if (data.worst) badge("bad", data.worst.text[0].toUpperCase() + data.worst.text.slice(1));
   if (data.miss != null) {
     const reached = data.tolerance == null || data.miss <= data.tolerance;
     const within = data.tolerance == null ? "" : reached ? ` (within ${length(data.tolerance)})` : ` (more than ${length(data.tolerance)})`;
@@ -112,7 +120,8 @@ function header(data) {
   const kinds = `${positions} of ${of} positions, ${velocities} of ${of} velocities, ${efforts} of ${of} efforts`;
   if (!total) badge("warn", `No limits checked: ${source} has none`);
   else if (breaches) badge("bad", `${breaches} of ${total} limits exceeded (${source}: ${kinds})`);
-  else badge("good", `${total === 1 ? "1 limit holds" : `All ${total} limits hold`} (${source}: ${kinds})`);
+  else if (data.worst?.is_gap) badge("warn", `The limits hold, but the motion does not follow the dynamics (${source}: ${kinds})`);
+  else badge("good", `${total === 1 ? "1 limit holds" : `All ${total} limits hold${data.worst ? " up to rounding" : ""}`} (${source}: ${kinds})`);
   $("footer").append("Made by Condyle", data.version ? ` ${data.version}` : "", ...(data.command ? [" with ", element("code", {}, data.command)] : []), ". Drawn with three.js and uPlot (MIT).");
 }
 
@@ -245,6 +254,29 @@ function violationTable(data, quantities, go) {
   }
 }
 
+/** Fills the table of reached bounds, with bars over time that show when each bound is reached. */
+function metTable(data, quantities, go) {
+  if (!data.met?.length) return;
+  $("met").hidden = false;
+  const { times } = data, start = times[0], span = times.at(-1) - start || 1;
+  for (const { what, joint, bound, limit, knots, multiplier, at_knot: k } of data.met) {
+    const quantity = quantities.find((q) => q.what === what), j = data.joints.findIndex((one) => one.name === joint);
+    const unit = quantity.unit(data.joints[j]?.unit ?? "");
+    const seconds = (k) => times[Math.min(k, times.length - 1)];
+    const strip = element("p", { class: "when" });
+    for (const [first, last] of knots) {
+      // a torque acts until the next knot
+      const from = seconds(first), to = seconds(quantity.held ? last + 1 : last);
+      const title = to > from ? `${brief(from)} to ${brief(to)} s (knots ${first} to ${last})` : `${brief(from)} s (knot ${first})`;
+      strip.append(element("i", { title, style: `left: ${(100 * (from - start)) / span}%; width: ${(100 * (to - from)) / span}%; --tint: var(--hue-${Math.max(j, 0) % HUES.light.length})` }));
+    }
+    const button = element("button", { type: "button", class: "quiet" }, `knot ${k}, ${brief(seconds(k))} s`);
+    button.addEventListener("click", () => go(k, j));
+    $("met").querySelector("tbody").append(element("tr", {}, element("th", { scope: "row" }, what), element("td", {}, joint), element("td", {}, bound),
+      element("td", { class: "n" }, `${brief(limit)} ${unit}`), element("td", { class: "meter" }, strip), element("td", { class: "n" }, multiplier == null ? "–" : number(multiplier, 3)), element("td", { class: "n" }, button)));
+  }
+}
+
 /** Draws the gait: bars over time that show when each foot touches. Returns a function that moves the playback line. */
 function makeGait({ times, contacts }) {
   if (!contacts) return { show() {} };
@@ -374,12 +406,14 @@ const player = makePlayer(data.times, (t) => {
   joints.show(k);
   gait.show(t);
 });
-violationTable(data, plots.quantities, (k, j) => {
+const go = (k, j) => {
   player.pause();
   player.seek(data.times[k]);
   if (j >= 0) joints.reveal(j);
   $("plots").scrollIntoView({ behavior: "smooth", block: "nearest" });
-});
+};
+violationTable(data, plots.quantities, go);
+metTable(data, plots.quantities, go);
 
 let progress = null;
 if (data.iterations.length) {

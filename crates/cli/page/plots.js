@@ -1,5 +1,5 @@
 "use strict";
-// Plots: joint positions, velocities and torques over time, and the solver's progress.
+// Plots: joint positions, velocities and torques, the multipliers of their limits, and the solver's progress.
 
 // Hues that remain distinguishable for colour-blind readers and on both backgrounds. Red is reserved for exceeded limits.
 const HUES = {
@@ -25,6 +25,13 @@ function quantitiesOf(data) {
   ];
 }
 
+/** Returns the multipliers of the limits as quantities without limits of their own; none where no bound is reached. */
+function multipliersOf(data) {
+  const reached = quantitiesOf(data).filter(({ id }) => data.multipliers?.[id]);
+  return reached.map(({ id, what, unit, held }) => ({ id: `limit-${id}`, what: "multiplier", of: what, rows: data.multipliers[id],
+    unit: (u) => `1/${unit(u).includes("·") ? `(${unit(u)})` : unit(u)}`.replace(/^1\/(\w+)\/s$/, "s/$1"), limits: () => [null, null], held, apart: true }));
+}
+
 /** Returns the position of `value` between its limits: −1 at the lower, 1 at the upper limit; null without limits. */
 function shareOf(value, [lower, upper]) {
   if (value == null || lower == null || upper == null || upper <= lower) return null;
@@ -44,7 +51,9 @@ function axis(more) {
  */
 function makePlots(data, on) {
   const joints = data.joints, times = data.times, last = times.length - 1;
-  const quantities = quantitiesOf(data);
+  const quantities = quantitiesOf(data), drawn = [...quantities, ...multipliersOf(data)];
+  const side = drawn.length > quantities.length ? 60 : 50; // width of a vertical axis; small multipliers have long labels
+  for (const { id } of drawn) document.getElementById(`plot-${id}`).parentElement.hidden = false;
   const mixed = new Set(joints.map((joint) => joint.unit)).size > 1; // with metres and radians, each unit has its own axis
   const hidden = new Set();
   let inShares = false, focus = null, plots = [], now = times[0], zoom = null;
@@ -54,13 +63,14 @@ function makePlots(data, on) {
 
   function build(quantity) {
     const host = document.getElementById(`plot-${quantity.id}`);
+    const shares = inShares && !quantity.apart; // a multiplier has no limits of its own
     const columns = joints.map((joint, j) => times.map((_, k) => {
       const value = valueAt(quantity, k, j);
-      if (!inShares) return value;
+      if (!shares) return value;
       const share = shareOf(value, quantity.limits(joint));
       return share == null ? null : 100 * share;
     }));
-    const scaleOf = (joint) => (inShares || joint.unit === joints[0].unit ? "y" : "y2");
+    const scaleOf = (joint) => (shares || joint.unit === joints[0].unit ? "y" : "y2");
     const inScale = (key) => joints.map((joint, j) => j).filter((j) => scaleOf(joints[j]) === key);
 
     // The range covers all shown curves, and also their limits, unless the limits would flatten the curves.
@@ -69,7 +79,8 @@ function makePlots(data, on) {
       const take = (y) => { if (y != null) { low = Math.min(low, y); high = Math.max(high, y); } };
       const shown = inScale(key).filter((j) => !hidden.has(j));
       for (const j of shown) columns[j].forEach(take);
-      if (inShares) [-100, 100].forEach(take);
+      if (shares) [-100, 100].forEach(take);
+      else if (quantity.apart) take(0);
       else {
         const reach = 3 * Math.max(Math.abs(low), Math.abs(high));
         for (const j of shown) for (const limit of quantity.limits(joints[j])) if (Math.abs(limit) <= reach) take(limit);
@@ -96,7 +107,7 @@ function makePlots(data, on) {
       };
       ctx.lineWidth = 1.25 * ratio;
       ctx.setLineDash([5 * ratio, 4 * ratio]);
-      if (inShares) {
+      if (shares) {
         ctx.fillStyle = css("--bad");
         ctx.globalAlpha = 0.07;
         const upper = u.valToPos(100, "y", true), lower = u.valToPos(-100, "y", true);
@@ -136,13 +147,14 @@ function makePlots(data, on) {
       ctx.restore();
     }
 
-    const label = (unit) => `${quantity.what} (${inShares ? "% of limit" : quantity.unit(unit)})`;
+    const label = (unit) => `${quantity.what} (${shares ? "% of limit" : quantity.unit(unit)})`;
     const second = mixed && joints.find((joint) => joint.unit !== joints[0].unit)?.unit;
+    const values = quantity.apart && { values: (_, splits) => splits.map((y) => brief(y)) }; // multipliers may be small
     const axes = [
       axis({ label: "time (s)", labelSize: 18, size: 26 }),
-      axis({ scale: "y", label: label(joints[0]?.unit ?? ""), labelSize: 20, size: 50 }),
+      axis({ scale: "y", label: label(joints[0]?.unit ?? ""), labelSize: 20, size: side, ...values }),
     ];
-    if (mixed) axes.push(axis({ scale: inShares ? "y" : "y2", side: 1, size: 50, labelSize: 20, label: inShares ? " " : label(second), grid: { show: false }, ...(inShares && { values: () => [], ticks: { show: false } }) }));
+    if (mixed) axes.push(axis({ scale: shares ? "y" : "y2", side: 1, size: side, labelSize: 20, label: shares ? " " : label(second), grid: { show: false }, ...values, ...(shares && { values: () => [], ticks: { show: false } }) }));
 
     const u = new uPlot({
       width: host.clientWidth || 600,
@@ -152,7 +164,7 @@ function makePlots(data, on) {
       scales: {
         x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) },
         y: { range: () => range("y") },
-        ...(mixed && !inShares && { y2: { range: () => range("y2") } }),
+        ...(mixed && !shares && { y2: { range: () => range("y2") } }),
       },
       focus: { alpha: 0.18 },
       cursor: {
@@ -174,7 +186,7 @@ function makePlots(data, on) {
         setScale: [(self, key) => { if (key === "x") follow(self); }],
       },
     }, [times, ...columns], host);
-    host.setAttribute("aria-label", `${quantity.what} of ${joints.length} joints over ${times[last].toFixed(2)} s, with their limits. The joint table has the numbers at the playback time.`);
+    host.setAttribute("aria-label", quantity.apart ? `Multipliers of the ${quantity.of} limits of ${joints.length} joints over ${times[last].toFixed(2)} s. The table of reached bounds has the largest numbers.` : `${quantity.what} of ${joints.length} joints over ${times[last].toFixed(2)} s, with their limits. The joint table has the numbers at the playback time.`);
     wire(u, quantity, columns, scaleOf);
     return u;
   }
@@ -236,7 +248,7 @@ function makePlots(data, on) {
     const kept = zoom;
     for (const u of plots) u.destroy();
     plots = [];
-    plots = quantities.map(build);
+    plots = drawn.map(build);
     if (kept) plots[0].setScale("x", kept);
     show(now);
   }

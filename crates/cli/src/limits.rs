@@ -8,6 +8,10 @@ use condyle::{Model, neutral};
 use serde::Serialize;
 use std::fmt;
 
+/// Names of the limits that become constraints: of the state, and of the efforts.
+pub(crate) const STATES: &str = "positions and speeds";
+pub(crate) const EFFORTS: &str = "efforts";
+
 /// Limited quantity of a joint coordinate, with the limits.
 pub(crate) struct Limited<'a> {
     /// Limited quantity: `position`, `velocity` or `torque`.
@@ -16,6 +20,8 @@ pub(crate) struct Limited<'a> {
     pub joint: &'a str,
     /// Index in q for a position; index in v for a velocity or a torque.
     pub index: usize,
+    /// Index in v of the same coordinate.
+    pub index_v: usize,
     pub lower: f64,
     pub upper: f64,
 }
@@ -30,7 +36,8 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
         for index in (body.idx_q..body.idx_q + body.joint.nq()).filter(|_| body.joint.nq() == body.joint.nv()) {
             let (lower, upper) = (limits.lower[index], limits.upper[index]);
             if lower.is_finite() || upper.is_finite() {
-                all.push(Limited { what: "position", joint, index, lower, upper });
+                let index_v = index - body.idx_q + body.idx_v;
+                all.push(Limited { what: "position", joint, index, index_v, lower, upper });
             }
         }
         for index in body.idx_v..body.idx_v + body.joint.nv() {
@@ -38,7 +45,7 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
             let (least, most) = (limits.effort_lower[index], limits.effort_upper[index]);
             for (what, lower, upper) in [("velocity", -speed, speed), ("torque", least, most)] {
                 if lower < upper && (lower.is_finite() || upper.is_finite()) {
-                    all.push(Limited { what, joint, index, lower, upper });
+                    all.push(Limited { what, joint, index, index_v: index, lower, upper });
                 }
             }
         }
@@ -146,7 +153,7 @@ pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
         (lower[nv + k], upper[nv + k]) = (-speed, speed);
     }
     let reference = [q, &vec![0.0; nv]].concat();
-    bounded("positions and speeds", Residual::State { reference }, lower, upper)
+    bounded(STATES, Residual::State { reference }, lower, upper)
 }
 
 /// Returns the lower and upper effort limits of the last nu degrees of freedom. An empty range, such as an effort limit
@@ -162,7 +169,7 @@ pub(crate) fn efforts(model: &Model, nu: usize) -> (Vec<f64>, Vec<f64>) {
 /// Returns the effort limits of the last nu degrees of freedom as constraints.
 pub(crate) fn efforts_of(model: &Model, nu: usize) -> Vec<Limit> {
     let (lower, upper) = efforts(model, nu);
-    bounded("efforts", Residual::Control { reference: vec![0.0; nu] }, lower, upper)
+    bounded(EFFORTS, Residual::Control { reference: vec![0.0; nu] }, lower, upper)
 }
 
 fn bounded(name: &str, residual: Residual, lower: Vec<f64>, upper: Vec<f64>) -> Vec<Limit> {

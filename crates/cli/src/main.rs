@@ -13,6 +13,7 @@ mod generate;
 mod inspect;
 mod limits;
 mod lines;
+mod met;
 mod motion;
 mod page;
 mod plan;

@@ -1,5 +1,7 @@
 //! Planned motion: the request and the result.
 
+use crate::limits::Limited;
+use crate::met::Held;
 use crate::robot::Robot;
 use condyle::optimal::{Iteration, Solution, Status};
 use condyle::{Model, Vec3};
@@ -35,6 +37,8 @@ pub(crate) struct Plan {
     pub dt: f64,
     pub budget_ms: f64,
     pub solution: Solution,
+    /// Result for the limits, if the motion was solved with limits as constraints.
+    pub held: Option<Held>,
     /// Expected decrease of the cost, relative to the cost. The value exists only if three conditions hold: the limits
     /// hold, the cost can hardly decrease, and the solver did not reach its own tolerance.
     pub settled: Option<f64>,
@@ -51,6 +55,16 @@ impl Plan {
     /// Returns the number of knots that have a control.
     pub(crate) fn knots(&self) -> usize {
         self.times.len() - 1
+    }
+
+    /// Returns the values of a limited quantity at all knots. An effort has no value at the last knot.
+    pub(crate) fn values(&self, quantity: &Limited<'_>) -> Vec<f64> {
+        let state = |t: usize| self.solution.x(t);
+        match quantity.what {
+            "position" => (0..=self.knots()).map(|t| state(t)[quantity.index]).collect(),
+            "velocity" => (0..=self.knots()).map(|t| state(t)[self.model.nq() + quantity.index]).collect(),
+            _ => (0..self.knots()).map(|t| self.effort(t)[quantity.index]).collect(),
+        }
     }
 
     /// Returns the efforts of all degrees of freedom at a knot. The effort is 0 for degrees of freedom without a motor,

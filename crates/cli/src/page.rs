@@ -2,6 +2,7 @@
 
 use crate::budget::held;
 use crate::limits::LimitCounts;
+use crate::met::Met;
 use crate::motion::Plan;
 use crate::report::{self, Budget, Violation};
 use crate::scene;
@@ -28,12 +29,13 @@ pub(crate) fn write(
     plan: &Plan,
     budget: &Budget,
     violations: &[Violation],
+    met: &[Met],
 ) -> std::io::Result<Option<String>> {
     let mut page = include_str!("../page/plan.html").to_owned();
     for (place, text) in PARTS {
         page = page.replacen(place, text, 1);
     }
-    let (data, note) = data(plan, budget, violations);
+    let (data, note) = data(plan, budget, violations, met);
     let data = rounded(data).to_string().replace('<', "\\u003c");
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
@@ -95,7 +97,7 @@ fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> 
 
 /// Returns all data of the page, and a note about the meshes that are left out. The comment at the top of `plan.js`
 /// describes each entry of the data.
-fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Option<String>) {
+fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> (Value, Option<String>) {
     let Plan { model, solution, .. } = plan;
     let (nq, limits) = (model.nq(), model.limits());
     let knots = with_time(plan);
@@ -130,12 +132,13 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     }
     let driven = &knots[..knots.len() - 1];
     let efforts: Vec<Vec<f64>> = (0..plan.knots()).map(|t| plan.effort(t)).collect();
-    // If the page does not show the knot of a violation, use the next knot that the page shows.
+    // If the page does not show a knot, use the next knot that the page shows.
+    let on_page = |t: usize| knots.partition_point(|&shown| shown < t);
     let violations: Vec<Value> = violations
         .iter()
         .map(|v| {
             let mut shown = json!(v);
-            shown["at_knot"] = json!(knots.partition_point(|&t| t < v.at_knot));
+            shown["at_knot"] = json!(on_page(v.at_knot));
             shown
         })
         .collect();
@@ -171,10 +174,34 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
         "limits": LimitCounts::new(&plan.robot),
         "violations": violations,
+        "met": met.iter().map(|met| {
+            let mut shown = json!(met);
+            shown["at_knot"] = json!(on_page(met.at_knot));
+            shown["knots"] = json!(met.knots.iter().map(|part| part.map(on_page)).collect::<Vec<_>>());
+            shown
+        }).collect::<Vec<_>>(),
+        "multipliers": multipliers(plan, &knots, met),
+        "worst": report::worst(plan).map(|worst| json!({
+            "text": worst.to_string().replace('`', ""), "is_gap": worst.is_gap(),
+        })),
         "version": env!("CARGO_PKG_VERSION"),
         "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),
     });
     (data, note)
+}
+
+/// Returns the multipliers of the limits over time, for each quantity with a reached bound. A joint that reaches no
+/// bound has no numbers.
+fn multipliers(plan: &Plan, knots: &[usize], met: &[Met]) -> Option<Value> {
+    let held = plan.held.as_ref()?;
+    let of = |what: &str, knots: &[usize]| -> Option<Vec<Vec<Option<f64>>>> {
+        let reached = |joint: &str| met.iter().any(|met| met.what == what && met.joint == joint);
+        let rows = held.multipliers(what);
+        let row = |&t: &usize| shown(&plan.model).map(|b| reached(&b.joint_name).then(|| rows[t][b.idx_v])).collect();
+        met.iter().any(|met| met.what == what).then(|| knots.iter().map(row).collect())
+    };
+    let driven = &knots[..knots.len() - 1];
+    Some(json!({"q": of("position", knots), "v": of("velocity", knots), "tau": of("torque", driven)}))
 }
 
 /// Rounds all numbers to six significant digits, which are enough for a screen.

@@ -1,15 +1,17 @@
-//! `condyle plan`: plans motions with FDDP. An arm reaches for a point; a robot with feet stands, steps and jumps.
+//! `condyle plan`: plans motions with FDDP, and with an interior point where limits are exceeded. An arm reaches for a
+//! point; a robot with feet stands, steps and jumps.
 
 use crate::error::{Error, positive};
 use crate::gait::Gait;
 use crate::limits::{LimitCounts, check_start, last_frame, start};
+use crate::met::{Held, Worst};
 use crate::motion::{Goal, Plan};
 use crate::robot::{self, ReadingOptions};
 use crate::task::{self, Task};
 use crate::terminal::say;
 use crate::watch::{self, Watch};
-use crate::{page, posture, reach, record, report};
-use condyle::optimal::{AugmentedLagrangian, Fddp, Problem, Solution, Status};
+use crate::{met, page, posture, reach, record, report};
+use condyle::optimal::{Fddp, InteriorPoint, Problem, Status};
 use condyle::{Data, Model, Vec3, forward_kinematics};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,10 +25,10 @@ use std::sync::Arc;
   condyle plan trot.toml --out trot.html --record trot.csv
 
 A task file is TOML; --example writes one with comments on its entries. Limits of positions, speeds and efforts in the
-robot's file are enforced, and the report counts them. The exit status is 1 if a limit is exceeded or the target is missed.
-A motion is `settled`, with exit status 0, if the limits hold and the expected decrease of the cost is below 1e-7 of the
-cost, but the solver did not reach its tolerance for the gradient of the Lagrangian. Ctrl-C stops the solver; the page and
-the record then contain the best motion so far.")]
+robot's file are enforced. The report counts them, and lists the bounds that the motion reaches. The exit status is 1 if a
+limit is exceeded or the target is missed. A motion is `settled`, with exit status 0, if the limits hold and the expected
+decrease of the cost is below 1e-9 of the cost, but the solver did not reach its tolerance for the gradient of the
+Lagrangian. Ctrl-C stops the solver; the page and the record then contain the best motion so far.")]
 pub(crate) struct Arguments {
     /// Task file, which replaces the options for robot, frame and target
     #[arg(value_name = "TASK.toml", conflicts_with_all = ["robot", "frame", "target", "q0", "knots", "tolerance"])]
@@ -62,7 +64,7 @@ pub(crate) struct Arguments {
     /// Distance to the target that counts as reached (m)
     #[arg(long, default_value_t = 0.01, value_name = "METRES", allow_negative_numbers = true)]
     tolerance: f64,
-    /// Maximum solver iterations (per inner solve when limits are enforced)
+    /// Maximum number of iterations of each solve: without limits, and then with limits if any is exceeded
     #[arg(long, default_value_t = 200)]
     max_iterations: usize,
     /// File for the HTML page
@@ -106,16 +108,9 @@ const DEFAULT_DT: f64 = 0.01;
 /// Tolerance of the solver for gaits. The cost of a gait is several hundred, so the tolerance is less than a millionth
 /// of the cost.
 const GAIT_TOLERANCE: f64 = 1e-4;
-/// Maximum entry of the Lagrangian's gradient at a solution, for problems with limits as constraints. The first number
-/// is for reaching (costs of about 1), the second for gaits (costs of several hundred).
-const DUAL: [f64; 2] = [1e-4, 1e0];
-/// Maximum violation of a limit that still counts as held (rad, rad/s, m, m/s, N m, N). It is half of
-/// `report::ROUNDING`.
-const HELD: f64 = 5e-6;
-/// Maximum number of inner solves. After these solves, the limits must hold.
-const SOLVES: usize = 15;
-/// Maximum expected decrease of the cost, relative to the cost, of a solve that counts as settled.
-const SETTLED: f64 = 1e-7;
+/// Maximum violation of a limit that still counts as held (rad, rad/s, m, m/s, N m, N), and maximum gap of the
+/// dynamics. It is half of `report::ROUNDING`.
+pub(crate) const HELD: f64 = 5e-6;
 
 /// Runs `condyle plan`.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
@@ -150,12 +145,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
 /// Writes the page, the record and the report. Returns an error if the result does not meet the request.
 fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::Format)>) -> Result<(), Error> {
     let budget = report::measure(plan);
-    let violations = report::violations(plan);
+    let (violations, met) = (report::violations(plan), met::met(plan));
     let unwritten = |path: &Path| {
         let file = path.display().to_string();
         move |source| Error::Write { file, source }
     };
-    let note = page::write(&arguments.out, plan, &budget, &violations).map_err(unwritten(&arguments.out))?;
+    let note = page::write(&arguments.out, plan, &budget, &violations, &met).map_err(unwritten(&arguments.out))?;
     if let Some((path, format)) = record {
         record::write(path, format, plan).map_err(unwritten(path))?;
     }
@@ -163,9 +158,9 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
         eprintln!("note: {note}");
     }
     if arguments.json {
-        crate::terminal::say_json(&report::summary(plan, &budget, &violations));
+        crate::terminal::say_json(&report::summary(plan, &budget, &violations, &met));
     } else {
-        say(&report::text(plan, &budget, &violations));
+        say(&report::text(plan, &budget, &violations, &met));
         let files: Vec<String> = std::iter::once(&*arguments.out)
             .chain(record.map(|r| r.0))
             .map(|path| path.display().to_string())
@@ -196,9 +191,13 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
             v.what, v.joint, v.amount, v.limit, v.at_knot
         ))),
         None if plan.goal.is_none() && !plan.is_solved() => {
-            Err(Error::NegativeAnswer(format!("the solver stopped: {}", report::status(plan))))
+            let worst = report::worst(plan).map_or_else(String::new, |worst| format!("; {worst}"));
+            Err(Error::NegativeAnswer(format!("the solver stopped: {}{worst}", report::status(plan))))
         }
-        None => Ok(()),
+        None => match report::worst(plan).filter(Worst::is_gap) {
+            Some(gap) => Err(Error::NegativeAnswer(gap.to_string())),
+            None => Ok(()),
+        },
     }
 }
 
@@ -274,12 +273,13 @@ fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
         meshes: arguments.meshes == Show::Auto,
         model,
         solution,
+        held: None,
         settled: None,
         trace: vec![],
     };
     if must_hold(arguments, &plan) {
         let (problem, ..) = reach::problem(&plan.model, frame, target, (&q0, &q_end), (knots, dt), true)?;
-        (plan.solution, plan.settled) = hold(arguments, &plan, problem, &mut watch, DUAL[0])?;
+        hold(arguments, &mut plan, problem, &mut watch)?;
     }
     plan.trace = watch.end();
     let mut data = Data::new(&plan.model);
@@ -332,11 +332,12 @@ fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
         meshes: arguments.meshes == Show::Auto,
         model: model.clone(),
         solution,
+        held: None,
         settled: None,
         trace: vec![],
     };
     if must_hold(arguments, &plan) {
-        (plan.solution, plan.settled) = hold(arguments, &plan, posed(true)?.problem, &mut watch, DUAL[1])?;
+        hold(arguments, &mut plan, posed(true)?.problem, &mut watch)?;
     }
     plan.trace = watch.end();
     Ok(plan)
@@ -358,29 +359,22 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
     true
 }
 
-/// Solves a problem with limits as constraints, starting from a solution that exceeds the limits.
-///
-/// The second result is the expected decrease of the cost, relative to the cost. It exists only if three conditions
-/// hold: the limits hold, the cost can hardly decrease, and the solver did not reach its own tolerance.
-fn hold(
-    arguments: &Arguments,
-    plan: &Plan,
-    mut problem: Problem,
-    watch: &mut Watch,
-    dual: f64,
-) -> Result<(Solution, Option<f64>), Error> {
-    let mut solver = AugmentedLagrangian::new(&problem);
-    (solver.inner.max_iterations, solver.settings.max_solves) = (arguments.max_iterations, SOLVES);
-    (solver.settings.tolerance, solver.settings.tolerance_dual) = (HELD, dual);
+/// Solves a problem with limits as constraints, starting from the solution of a plan that exceeds the limits. Replaces
+/// the solution.
+fn hold(arguments: &Arguments, plan: &mut Plan, mut problem: Problem, watch: &mut Watch) -> Result<(), Error> {
+    let mut solver = InteriorPoint::new(&problem);
+    solver.settings.max_iterations = arguments.max_iterations;
     let (xs, us) = (&plan.solution.xs, &plan.solution.us);
-    let solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
-    // For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance. So
-    // also accept a solution if the limits hold and the expected decrease of the cost is small. The expected decrease
-    // is half of Newton's squared decrement; FDDP uses the same criterion.
-    let last = solution.trace.last().filter(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
-    let settled = last.filter(|_| solution.status == Status::MaxIterations && solver.outcome().primal <= HELD);
-    let settled = settled.map(|last| last.stop / solution.cost.abs());
-    Ok((solution, settled))
+    let first = watch.trace.len();
+    plan.solution = solver.solve_with(&mut problem, xs, us, watch.settling(arguments.json))?.clone();
+    let outcome = solver.outcome().clone();
+    let stopped = plan.solution.status == Status::Interrupted && !watch::interrupted();
+    plan.settled = watch::settled(&watch.trace[first..]).filter(|_| stopped && outcome.primal <= HELD);
+    if stopped {
+        plan.solution.status = Status::RegularisationLimit; // as where the interior point finds no further decrease
+    }
+    plan.held = Some(Held::new(outcome, plan.model.nv()));
+    Ok(())
 }
 
 /// Prints the name of the robot and the task.

@@ -1,6 +1,7 @@
 //! Prints the result of `condyle plan`: iterations, computing times, and exceeded limits.
 
 use crate::limits::{LimitCounts, Limited, limited};
+use crate::met::{Met, Worst};
 use crate::motion::Plan;
 use crate::terminal::{Style, styled};
 use condyle::optimal::{Iteration, Status};
@@ -12,6 +13,9 @@ use std::time::{Duration, Instant};
 /// Relative tolerance for limits. An excess is not reported if it is below this fraction of the range, or below this
 /// number if the range is less than 1.
 const ROUNDING: f64 = 1e-5;
+/// Largest number of reached bounds, and of times for each of them, that the text lists.
+const MOST_LINES: usize = 12;
+const MOST_SPANS: usize = 4;
 /// Number of timed repetitions of a function. The median of these times is reported.
 const REPETITIONS: usize = 11;
 
@@ -117,21 +121,15 @@ pub(crate) struct Violation {
 
 /// Returns all quantities that exceed their limits.
 pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
-    let (model, solution) = (&plan.model, &plan.solution);
-    let knots = plan.knots();
-    let efforts: Vec<Vec<f64>> = (0..knots).map(|t| plan.effort(t)).collect();
     let mut found = Vec::new();
-    for Limited { what, joint, index, lower, upper } in limited(model) {
-        let values: Vec<f64> = match what {
-            "position" => (0..=knots).map(|t| solution.x(t)[index]).collect(),
-            "velocity" => (0..=knots).map(|t| solution.x(t)[model.nq() + index]).collect(),
-            _ => efforts.iter().map(|effort| effort[index]).collect(),
-        };
+    for quantity in limited(&plan.model) {
+        let values = plan.values(&quantity);
+        let Limited { what, joint, lower, upper, .. } = quantity;
         let beyond = |x: f64| if x > upper { (x - upper, upper) } else { (lower - x, lower) };
         let worst = values.into_iter().map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let range = if (upper - lower).is_finite() { upper - lower } else { 1.0 };
         if let Some((at_knot, (amount, limit))) = worst
-            && amount > ROUNDING * range.max(1.0)
+            && (amount > ROUNDING * range.max(1.0) || amount.is_nan())
         {
             found.push(Violation { what, joint: joint.to_owned(), at_knot, amount, limit });
         }
@@ -145,17 +143,18 @@ pub(crate) fn status(plan: &Plan) -> &'static str {
         _ if plan.settled.is_some() => "settled",
         Status::Converged => "converged",
         Status::MaxIterations => "iteration limit",
+        Status::RegularisationLimit if plan.held.is_some() => "no step accepted",
         Status::RegularisationLimit => "no descent found",
         Status::TimeLimit => "out of time",
         Status::Interrupted => "interrupted",
-        Status::ConstraintsViolated => "limits violated at the greatest penalty",
-        Status::Infeasible => "no motion from this start holds the limits",
+        Status::ConstraintsViolated => "the limits could not be restored",
+        Status::Infeasible => "infeasible: no small change reduces the violation of the limits",
         _ => "not finite",
     }
 }
 
 /// Returns the part of the report that is printed after the list of iterations.
-pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> String {
+pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> String {
     let (model, iterations) = (&plan.model, plan.trace.len());
     let ended = styled(if plan.is_solved() { Style::Good } else { Style::Bad }, status(plan));
     let mut text = format!("\n{ended} after {iterations} iterations, {:.1} ms\n", budget.solve_ms);
@@ -164,6 +163,10 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
         text += &format!(
             "settled: the constraints hold, and the expected decrease of the cost is {left:.0e} of the cost; {why}\n"
         );
+    }
+    let worst = worst(plan);
+    if let Some(worst) = &worst {
+        text += &format!("{worst}\n");
     }
     if let Some(goal) = &plan.goal {
         text += &format!("`{}` ends {:.2} mm from the target\n", model.frames()[goal.frame].name, 1e3 * goal.miss);
@@ -189,10 +192,15 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
     let verdict = if budget.total_ms <= budget.budget_ms { "within" } else { "OVER" };
     text += &format!("one iteration is {verdict} the budget of {} ms\n", budget.budget_ms);
     let limits = LimitCounts::new(&plan.robot);
+    let but = match &worst {
+        Some(worst) if worst.is_gap() => ", but the motion does not follow the dynamics",
+        Some(_) => " up to rounding",
+        None => "",
+    };
     text += &match (limits.total(), violations.len()) {
         (0, _) => format!("\n{limits}: nothing to check\n"),
-        (1, 0) => format!("\n{limits}: the limit holds at all knots\n"),
-        (total, 0) => format!("\n{limits}: all {total} hold at all knots\n"),
+        (1, 0) => format!("\n{limits}: the limit holds at all knots{but}\n"),
+        (total, 0) => format!("\n{limits}: all {total} hold at all knots{but}\n"),
         (total, beyond) => {
             let are = if beyond == 1 { "is" } else { "are" };
             format!("\n{limits}\n{}\n", styled(Style::Bad, &format!("{beyond} of these {total} {are} exceeded:")))
@@ -202,11 +210,39 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
         text +=
             &format!("  {} of `{}` by {:.3e} (limit {}) at knot {}\n", v.what, v.joint, v.amount, v.limit, v.at_knot);
     }
+    if !met.is_empty() {
+        let bounds = if met.len() == 1 { "bound is" } else { "bounds are" };
+        text += &format!("{} {bounds} reached:\n", met.len());
+    }
+    met.iter().take(MOST_LINES).for_each(|met| text += &line_of(met));
+    if met.len() > MOST_LINES {
+        text += &format!("  and {} more: see the page\n", met.len() - MOST_LINES);
+    }
     text
 }
 
+/// Returns the line about a bound that the motion reaches.
+fn line_of(met: &Met) -> String {
+    let Met { what, joint, bound, limit, times, multiplier, .. } = met;
+    let span = |&[first, last]: &[f64; 2]| match last > first {
+        true => format!("{first:.3} to {last:.3} s"),
+        false => format!("{first:.3} s"),
+    };
+    let mut spans: Vec<String> = times.iter().take(MOST_SPANS).map(span).collect();
+    if times.len() > MOST_SPANS {
+        spans.push("…".to_owned());
+    }
+    let multiplier = multiplier.map_or_else(String::new, |y| format!(", multiplier {y:.2e}"));
+    format!("  {what} of `{joint}` at its {bound} limit {limit}: {}{multiplier}\n", spans.join(", "))
+}
+
+/// Returns the largest violation that a solve with limits left, unless the limits and the dynamics hold.
+pub(crate) fn worst(plan: &Plan) -> Option<Worst> {
+    Worst::new(plan, crate::plan::HELD)
+}
+
 /// Returns the report as JSON.
-pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
+pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> Value {
     let goal = plan.goal.as_ref().map(|goal| {
         let frame = &plan.model.frames()[goal.frame].name;
         json!({"frame": frame, "target": goal.target.to_array(), "miss": goal.miss, "tolerance": goal.tolerance})
@@ -215,5 +251,6 @@ pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation]) ->
         "robot": plan.model.name(), "title": plan.title, "status": plan.solution.status, "settled": plan.settled, "cost": plan.solution.cost,
         "iterations": plan.trace.len(), "knots": plan.knots(), "duration_s": plan.times.last(), "goal": goal,
         "solve_ms": budget.solve_ms, "budget": budget, "limits": LimitCounts::new(&plan.robot), "violations": violations,
+        "limits_met": met, "worst": worst(plan),
     })
 }

@@ -22,6 +22,12 @@ pub(crate) fn catch_interrupts() {
     });
 }
 
+/// Number of consecutive iterations that change nothing, after which a solve with limits has settled.
+const STILL: usize = 10;
+/// Largest gap or violation of such an iteration, and its largest expected decrease of the cost, relative to the cost.
+const CLOSED: f64 = 1e-7;
+const SETTLED: f64 = 1e-9;
+
 /// Returns whether Ctrl-C was pressed.
 pub(crate) fn interrupted() -> bool {
     STOP.load(Ordering::SeqCst)
@@ -51,7 +57,13 @@ impl Watch {
 
     /// Returns an observer of a solve, which prints nothing if `quiet` is set.
     pub(crate) fn quiet(&mut self, quiet: bool) -> Eye<'_> {
-        Eye { watch: self, quiet }
+        Eye { watch: self, quiet, settles_from: None }
+    }
+
+    /// Returns an observer that also ends the solve when it has [settled](settled).
+    pub(crate) fn settling(&mut self, quiet: bool) -> Eye<'_> {
+        let settles_from = Some(self.trace.len());
+        Eye { watch: self, quiet, settles_from }
     }
 
     /// Removes the progress bar and returns all iterations.
@@ -61,10 +73,24 @@ impl Watch {
     }
 }
 
+/// Returns the largest expected decrease of the cost, relative to the cost, if the last iterations of a solve changed
+/// nothing and kept the constraints.
+///
+/// For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance. A
+/// solve would then go on until its last iteration, although the motion no longer changes.
+pub(crate) fn settled(trace: &[Iteration]) -> Option<f64> {
+    let last = trace.last_chunk::<STILL>()?;
+    let decreases = last.map(|now| now.d1.abs() / now.cost.abs());
+    let closed = last.iter().all(|now| now.gap <= CLOSED);
+    (closed && decreases.iter().all(|decrease| *decrease < SETTLED)).then(|| decreases.into_iter().fold(0.0, f64::max))
+}
+
 /// Observer of one solve.
 pub(crate) struct Eye<'a> {
     watch: &'a mut Watch,
     quiet: bool,
+    /// Index of the solve's first iteration in the trace, if the solve ends when it has settled.
+    settles_from: Option<usize>,
 }
 
 impl Observer for Eye<'_> {
@@ -75,7 +101,10 @@ impl Observer for Eye<'_> {
         }
         self.watch.bar.inc(1);
         self.watch.trace.push(numbered);
-        self.go_on()
+        match self.settles_from {
+            Some(first) if settled(&self.watch.trace[first..]).is_some() => ControlFlow::Break(()),
+            _ => self.go_on(),
+        }
     }
 
     fn go_on(&mut self) -> ControlFlow<()> {

@@ -153,6 +153,82 @@ fn limits_that_are_exceeded_are_counted() {
     assert!(!said.contains("hold at all knots"), "{said}");
 }
 
+/// Returns the data in the page of a plan.
+fn page_data(page: &Path) -> Value {
+    let page = std::fs::read_to_string(page).unwrap();
+    let data = page.split("application/json").nth(1).and_then(|rest| rest.split_once('>')).unwrap().1;
+    serde_json::from_str(data.split("</script>").next().unwrap()).unwrap()
+}
+
+/// Checks the reached bounds of a fast reach: where and when the values are at the bounds, that multipliers have the
+/// signs of their bounds, and that they are zero elsewhere.
+#[test]
+fn reached_bounds_are_listed_with_their_multipliers() {
+    let folder = folder("reached");
+    let record = folder.join("motion.json");
+    let arguments = ["--target", "0.5,0.3,0.4", "--knots", "70", "--record", record.to_str().unwrap()];
+    let output = plan(&folder, &[&arguments[..], &["--json"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&summary["status"], &summary["worst"]), (&"converged".into(), &Value::Null));
+    let data = page_data(&folder.join("plan.html"));
+    let motion: Value = serde_json::from_str(&std::fs::read_to_string(&record).unwrap()).unwrap();
+    let met = summary["limits_met"].as_array().unwrap();
+    assert!(!met.is_empty());
+    for met in met {
+        let quantity = match met["what"].as_str().unwrap() {
+            "position" => "q",
+            "velocity" => "v",
+            _ => "tau",
+        };
+        let number = |value: &Value| value.as_f64().unwrap();
+        let joint = data["joints"].as_array().unwrap().iter().position(|j| j["name"] == met["joint"]).unwrap();
+        let (limit, multiplier) = (number(&met["limit"]), number(&met["multiplier"]));
+        let is_at = |t: usize| (number(&motion[quantity][t][joint]) - limit).abs() < 1e-2 * limit.abs();
+        let intervals: Vec<[usize; 2]> = serde_json::from_value(met["knots"].clone()).unwrap();
+        assert!(intervals.iter().flat_map(|[first, last]| *first..=*last).all(is_at), "{met}");
+        let upper = met["bound"] == "upper";
+        assert!(upper == (limit > 0.0) && upper == (multiplier > 0.0), "{met}");
+        let curve: Vec<f64> =
+            data["multipliers"][quantity].as_array().unwrap().iter().map(|row| number(&row[joint])).collect();
+        assert_eq!(curve.len(), if quantity == "tau" { 70 } else { 71 });
+        let at_knot = met["at_knot"].as_u64().unwrap() as usize;
+        assert!((curve[at_knot] - multiplier).abs() <= 1e-5 * multiplier.abs(), "{met}");
+        for (t, y) in curve.iter().enumerate() {
+            let inside = intervals.iter().any(|[first, last]| (*first..=*last).contains(&t));
+            assert!(inside || y.abs() < 1e-2 * multiplier.abs(), "{met} {t} {y}");
+        }
+    }
+    let said = String::from_utf8(plan(&folder, &arguments).stdout).unwrap();
+    assert!(said.contains("reached:") && said.contains("at its upper limit") && said.contains("multiplier"), "{said}");
+}
+
+/// Checks a reach with too few iterations: the report names the row that is violated most, and does not claim that the
+/// motion is one of the robot.
+#[test]
+fn an_unsolved_plan_names_its_largest_violation() {
+    let folder = folder("unsolved");
+    let arguments = ["--target", "0.5,0.3,0.4", "--knots", "40", "--max-iterations", "25"];
+    let output = plan(&folder, &arguments);
+    let (said, error) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{said}{error}");
+    assert!(said.contains("iteration limit after") && said.contains("\nat knot "), "{said}");
+    assert!(!said.contains("hold at all knots\n"), "{said}");
+    let data = page_data(&folder.join("plan.html"));
+    assert_eq!(data["status"], "iteration limit");
+    assert!(data["worst"]["text"].as_str().unwrap().starts_with("at knot "), "{}", data["worst"]);
+    let summary = plan(&folder, &[&arguments[..], &["--json"]].concat());
+    let summary: Value = serde_json::from_slice(&summary.stdout).unwrap();
+    let worst = &summary["worst"];
+    let time = 0.01 * worst["knot"].as_u64().unwrap() as f64;
+    assert!(
+        (worst["time"].as_f64().unwrap() - time).abs() < 1e-9 && worst["amount"].as_f64().unwrap() > 5e-6,
+        "{worst}"
+    );
+    assert!(["position", "velocity", "torque", "gap"].contains(&worst["what"].as_str().unwrap()), "{worst}");
+    assert!(worst["joint"].as_str().unwrap().starts_with("joint"), "{worst}");
+}
+
 #[test]
 fn a_target_out_of_reach_is_reported_as_missed() {
     let error = complaint("far", &["--target", "3,0,0", "--max-iterations", "3"]);

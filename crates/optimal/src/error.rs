@@ -157,6 +157,15 @@ pub enum Error {
         what: String,
     },
 
+    /// Multipliers do not fit the limit whose name is given.
+    #[error("multipliers of `{limit}`: {what}")]
+    Multipliers {
+        /// Given name of the limit.
+        limit: String,
+        /// Description of the fault: the names of all limits, or the invalid numbers.
+        what: String,
+    },
+
     /// A friction cone or a wrench cone is invalid.
     #[error("cone: {what}")]
     Cone {

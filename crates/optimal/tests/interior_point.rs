@@ -371,3 +371,128 @@ fn settings_and_starts_are_checked() {
     assert_ne!(solution.status, Status::Converged);
     assert_eq!(solver.outcome().worst.as_ref().map(|worst| worst.kind), Some(ViolationKind::Constraint));
 }
+
+/// Checks that names lead to the rows that the flat list has: efforts at the knots before the last, states at all.
+#[test]
+fn multipliers_are_read_by_the_limits_name() {
+    let mut case = reach(34.0);
+    let (_, solver) = solve(&mut case, |_| {});
+    let mut augmented = AugmentedLagrangian::new(&case.problem);
+    augmented.solve(&mut case.problem, &case.xs, &case.us).unwrap();
+    for outcome in [solver.outcome(), augmented.outcome()] {
+        assert_eq!(outcome.limits, case.problem.limit_rows());
+        let (effort, state) = (outcome.multipliers_of("effort").unwrap(), outcome.multipliers_of("state").unwrap());
+        for (t, all) in outcome.multipliers.iter().enumerate() {
+            assert_eq!([effort[t], state[t]].concat(), *all, "knot {t}");
+            assert_eq!([effort[t].len(), state[t].len()], [if t < 25 { 7 } else { 0 }, 14]);
+        }
+        assert!(effort.iter().chain(&state).any(|y| y.iter().any(|y| y.abs() > 1e-3)));
+        let error = outcome.multipliers_of("efort").unwrap_err().to_string();
+        assert_eq!(error, "multipliers of `efort`: no limit has this name; the limits are `effort`, `state`");
+    }
+}
+
+/// Checks that a new solver with the solution and its multipliers needs few iterations, fewer than without them.
+#[test]
+fn multipliers_that_are_set_save_iterations() {
+    let mut case = reach(34.0);
+    let (solution, solver) = solve(&mut case, |_| {});
+    let outcome = solver.outcome().clone();
+    let names = ["effort", "state"];
+
+    let [mut with, mut without] = [(); 2].map(|()| InteriorPoint::new(&case.problem));
+    for name in names {
+        with.set_multipliers(&mut case.problem, name, &outcome.multipliers_of(name).unwrap()).unwrap();
+    }
+    for solver in [&mut with, &mut without] {
+        let again = solver.solve(&mut case.problem, &solution.xs, &solution.us).unwrap();
+        assert_eq!(again.status, Status::Converged);
+        assert!((again.cost - solution.cost).abs() < COST * (1.0 + solution.cost));
+    }
+    let [warm, cold] = [&with, &without].map(|solver| solver.outcome().iterations);
+    assert!(warm < cold && 2 * warm < outcome.iterations, "{warm} with, {cold} without, {} in all", outcome.iterations);
+
+    // before the first iteration, the outcome has the numbers that were set; a resumed solve converges soon
+    let mut resumed = solver.clone();
+    let doubled: Vec<Vec<f64>> =
+        outcome.multipliers_of("effort").unwrap().iter().map(|y| y.iter().map(|y| 2.0 * y).collect()).collect();
+    resumed.set_multipliers(&mut case.problem, "effort", &doubled).unwrap();
+    resumed.settings.max_iterations = 0;
+    resumed.resume(&mut case.problem).unwrap();
+    let found = resumed.outcome().multipliers_of("effort").unwrap();
+    for (found, set) in found.iter().zip(&doubled) {
+        assert!(found.iter().zip(set).all(|(a, b)| (a - b).abs() < 1e-3 * (1.0 + b.abs())), "{found:?} {set:?}");
+    }
+    resumed.settings.max_iterations = 100;
+    resumed.set_multipliers(&mut case.problem, "effort", &outcome.multipliers_of("effort").unwrap()).unwrap();
+    assert_eq!(resumed.resume(&mut case.problem).unwrap().status, Status::Converged);
+    assert!(resumed.outcome().iterations <= 8, "{}", resumed.outcome().iterations);
+
+    let mut first = AugmentedLagrangian::new(&case.problem);
+    let solution = first.solve(&mut case.problem, &case.xs, &case.us).unwrap().clone();
+    let [mut with, mut without] = [(); 2].map(|()| AugmentedLagrangian::new(&case.problem));
+    for name in names {
+        with.set_multipliers(&mut case.problem, name, &first.outcome().multipliers_of(name).unwrap()).unwrap();
+    }
+    for solver in [&mut with, &mut without] {
+        let again = solver.solve(&mut case.problem, &solution.xs, &solution.us).unwrap();
+        assert_eq!(again.status, Status::Converged);
+    }
+    let [warm, cold] = [&with, &without].map(|solver| solver.outcome().iterations);
+    assert!(2 * warm < cold, "{warm} with, {cold} without");
+    with.set_multipliers(&mut case.problem, "effort", &first.outcome().multipliers_of("effort").unwrap()).unwrap();
+    with.resume(&mut case.problem).unwrap();
+    assert!(2 * with.outcome().iterations < cold, "{}", with.outcome().iterations);
+}
+
+#[test]
+fn wrong_multipliers_are_refused() {
+    let mut case = reach(34.0);
+    let (_, mut solver) = solve(&mut case, |_| {});
+    let mut augmented = AugmentedLagrangian::new(&case.problem);
+    let right: Vec<Vec<f64>> = (0..26).map(|t| vec![0.0; if t < 25 { 7 } else { 0 }]).collect();
+    let (mut long, mut nan) = (right.clone(), right.clone());
+    long[25].push(1.0);
+    nan[3][2] = f64::NAN;
+    for (name, values, what) in [
+        ("joints", &right, "multipliers of `joints`: no limit has this name; the limits are `effort`, `state`"),
+        ("effort", &right[1..].to_vec(), "multipliers of `effort`: expected an entry for each of 26 knots, found 25"),
+        ("effort", &long, "multipliers of `effort`: knot 25: expected 0 numbers, found 1"),
+        ("state", &right, "multipliers of `state`: knot 0: expected 14 numbers, found 7"),
+        ("effort", &nan, "multipliers of `effort`: knot 3: entry 2 is NaN, which is not finite"),
+    ] {
+        for error in [
+            solver.set_multipliers(&mut case.problem, name, values).unwrap_err(),
+            augmented.set_multipliers(&mut case.problem, name, values).unwrap_err(),
+        ] {
+            assert_eq!(error.to_string(), what);
+        }
+    }
+    assert_eq!(solver.resume(&mut case.problem).unwrap().status, Status::Converged);
+    assert!(solver.outcome().iterations <= 5, "{}", solver.outcome().iterations); // the multipliers were kept
+    let x0 = case.problem.x0().to_vec();
+    let model = Arc::new(robots::arm7());
+    let (knot, end) = (FreeDynamics::running(model.clone(), 0.03, vec![]), FreeDynamics::terminal(model, vec![]));
+    let mut free = Problem::new(x0, vec![Box::new(knot.unwrap())], vec![0], Box::new(end.unwrap())).unwrap();
+    let error = InteriorPoint::new(&free).set_multipliers(&mut free, "effort", &[[0.0; 7]; 2]).unwrap_err();
+    assert_eq!(error.to_string(), "multipliers of `effort`: no limit has this name, and no limit has any name");
+}
+
+/// Checks that names still lead to the right rows after shifts, also where the last knots have other limits.
+#[test]
+fn names_follow_a_shifted_horizon() {
+    let mut case = hop(true);
+    let mut solver = AugmentedLagrangian::new(&case.problem);
+    solver.settings.max_solves = 2;
+    solver.solve(&mut case.problem, &case.xs, &case.us).unwrap();
+    for _ in 0..4 {
+        case.problem.shift(0).unwrap();
+        solver.shift(&mut case.problem).unwrap();
+        assert_eq!(solver.outcome().limits, case.problem.limit_rows());
+        for (t, y) in solver.outcome().multipliers_of("weak").unwrap().iter().enumerate() {
+            let all = &solver.outcome().multipliers[t];
+            assert_eq!(y.len(), all.len().min(12), "knot {t}");
+            assert_eq!(*y, &all[all.len() - y.len()..]);
+        }
+    }
+}

@@ -11,7 +11,7 @@ use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyMapping, PyMappingProxy};
+use pyo3::types::{PyDict, PyList, PyMapping, PyMappingProxy, PySlice};
 use std::sync::Mutex;
 
 /// The output that a user wants after each iteration of a solve.
@@ -380,6 +380,23 @@ AugmentedLagrangian, set_constraints, show_constraints {
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_outcome(py, lock("solver", &self.solver)?.outcome())
     }
+
+    /// Sets the multipliers of the limit `name`. The next `solve` or `resume` starts from them.
+    ///
+    /// Other limits keep the multipliers of the last solve; without a solve, they start at 0. The penalty and `outcome`
+    /// do not change. A positive number belongs to the upper bound, a negative one to the lower bound.
+    ///
+    /// name: the name of a limit of the problem.
+    /// values: the multipliers, (N + 1, rows), as `outcome.multipliers_of(name)` returns them. Numbers at knots without
+    ///     this limit are ignored.
+    ///
+    /// Raises `ProblemError` if no limit has this name, or a number is not finite; then all multipliers are kept.
+    fn set_multipliers(&self, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let values = multipliers_by_knot(&mut problem, name, values)?;
+        solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
+    }
 }
 }
 
@@ -490,6 +507,24 @@ InteriorPoint, set_interior_point, show_interior_point {
     fn outcome<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_outcome(py, lock("solver", &self.solver)?.outcome())
     }
+
+    /// Sets the multipliers of the limit `name`. The next `solve`, `resume` or `tick` starts from them.
+    ///
+    /// Other limits keep the multipliers of the last solve; without a solve, they start as usual. `outcome` does not
+    /// change. A positive number belongs to the upper bound, a negative one to the lower bound. Numbers without such a
+    /// bound have no effect, and numbers far from the central path are moved towards it.
+    ///
+    /// name: the name of a limit of the problem.
+    /// values: the multipliers, (N + 1, rows), as `outcome.multipliers_of(name)` returns them. Numbers at knots without
+    ///     this limit are ignored.
+    ///
+    /// Raises `ProblemError` if no limit has this name, or a number is not finite; then all multipliers are kept.
+    fn set_multipliers(&self, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let values = multipliers_by_knot(&mut problem, name, values)?;
+        solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
+    }
 }
 }
 
@@ -507,5 +542,37 @@ fn give_outcome<'py>(py: Python<'py>, o: &rust::Outcome) -> PyResult<Bound<'py, 
     });
     let worst = worst.transpose()?;
     let outcome = class!(py, "Outcome")?;
-    outcome.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst, o.barrier))
+    let limits = limits(py, o)?;
+    outcome.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst, o.barrier, limits))
+}
+
+/// Returns the rows of each named limit: for each knot a slice, which is empty at a knot without the limit.
+fn limits<'py>(py: Python<'py>, outcome: &rust::Outcome) -> PyResult<Bound<'py, PyDict>> {
+    let limits = PyDict::new(py);
+    for limit in &outcome.limits {
+        if !limits.contains(&*limit.name)? {
+            let knots = outcome.multipliers.len();
+            limits.set_item(&*limit.name, PyList::new(py, (0..knots).map(|_| PySlice::new(py, 0, 0, 1)))?)?;
+        }
+        if let Some(knots) = limits.get_item(&*limit.name)? {
+            let rows = PySlice::new(py, limit.rows.start as isize, limit.rows.end as isize, 1);
+            knots.set_item(limit.knot, rows)?;
+        }
+    }
+    Ok(limits)
+}
+
+/// Returns the multipliers of the limit `name` as a list for each knot, from an array with an equal number of columns
+/// at all knots. For an unknown name, the lists are empty.
+fn multipliers_by_knot(problem: &mut rust::Problem, name: &str, values: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<f64>>> {
+    let mut counts = vec![0; problem.horizon() + 1];
+    for limit in problem.limit_rows().iter().filter(|limit| &*limit.name == name) {
+        counts[limit.knot] = limit.rows.len();
+    }
+    let most = counts.iter().copied().max().unwrap_or(0);
+    if most == 0 {
+        return Ok(vec![vec![]; counts.len()]);
+    }
+    let values = matrix(&format!("multipliers of `{name}`"), values, [counts.len(), most])?;
+    Ok(counts.iter().zip(values.chunks(most)).map(|(&count, y)| y[..count].to_vec()).collect())
 }

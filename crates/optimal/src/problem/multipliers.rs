@@ -1,6 +1,7 @@
 //! Multipliers of an action's constraints, and the terms that the constraints add to the action's cost.
 
 use crate::error::Error;
+use core::ops::Range;
 use std::sync::Arc;
 
 /// Multipliers y of the constraints lower ≤ g(x, u) ≤ upper at the knots of an action, and the penalty 1/μ. At each
@@ -75,6 +76,17 @@ pub(crate) struct Part {
 pub(crate) type Visit<'a> = dyn FnMut(Bounded<'_>) + 'a;
 
 impl Bounded<'_> {
+    /// Returns the groups of constraints with a name, and the rows of each group.
+    pub(crate) fn named_rows(&self) -> impl Iterator<Item = (&Part, Range<usize>)> {
+        let ends = self.parts.iter().skip(1).map(|part| part.first).chain([self.count]);
+        self.parts.iter().zip(ends).map(|(part, end)| (part, part.first..end))
+    }
+
+    /// Returns the group with a name to which a row belongs.
+    pub(crate) fn part(&self, row: usize) -> Option<&Part> {
+        self.named_rows().find(|(_, rows)| rows.contains(&row)).map(|(part, _)| part)
+    }
+
     /// Checks that the bounds have the right lengths and that some value satisfies them.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! Solver of constrained problems by an augmented Lagrangian method.
 
+use super::limit_rows;
 use super::outcome::{Outcome, Violation, ViolationKind};
 use super::settings::{ConstraintSettings, Settings};
 use super::solution::{Iteration, Solution, Status};
@@ -109,6 +110,8 @@ struct Kept {
     penalty: Option<f64>,
     /// Whether a solve has failed since.
     failed: bool,
+    /// Whether multipliers were set since the last solve, so that also a new trajectory starts from them.
+    given: bool,
 }
 
 impl Kept {
@@ -252,6 +255,7 @@ impl AugmentedLagrangian {
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         self.solver.shift(problem, &self.inner)?;
         let horizon = problem.horizon();
+        limit_rows::shift(&mut self.outcome.limits, horizon);
         for multipliers in [&mut self.outcome.multipliers, &mut self.kept.multipliers] {
             let Some(knots) = multipliers.get_mut(..horizon) else { continue };
             knots.rotate_left(1);
@@ -259,6 +263,34 @@ impl AugmentedLagrangian {
                 last.clone_from(before);
             }
         }
+        Ok(())
+    }
+
+    /// Sets the multipliers of the limit `name`, one list for each knot 0 … N, which is empty at a knot without this
+    /// limit. The result of [`Outcome::multipliers_of`] has this form. The next [`solve`](Self::solve) or
+    /// [`resume`](Self::resume) starts from them. Other limits keep the multipliers of the last solve; without a
+    /// solve, they start at zero. The penalty stays as well. The [`outcome`](Self::outcome) does not change.
+    ///
+    /// # Errors
+    /// [`Error::Multipliers`] if no limit has this name, a length is wrong, or a number is not finite; then all
+    /// multipliers are kept.
+    pub fn set_multipliers(
+        &mut self,
+        problem: &mut Problem,
+        name: &str,
+        multipliers: &[impl AsRef<[f64]>],
+    ) -> Result<(), Error> {
+        let given = problem.check_multipliers(name, multipliers)?;
+        let counts: Vec<usize> = (0..=problem.horizon()).map(|t| problem.constraint_count(t)).collect();
+        let kept = &mut self.kept;
+        if kept.penalty.is_none() || !kept.multipliers.iter().map(Vec::len).eq(counts.iter().copied()) {
+            kept.multipliers = counts.iter().map(|&count| vec![0.0; count]).collect();
+        }
+        for (limit, y) in given {
+            kept.multipliers[limit.knot][limit.rows].copy_from_slice(y);
+        }
+        kept.penalty = kept.penalty.or(Some(self.settings.penalty_start));
+        (kept.failed, kept.given) = (false, true);
         Ok(())
     }
 
@@ -290,6 +322,7 @@ impl AugmentedLagrangian {
         }
         if let Ok(status) = result {
             problem.multipliers(&mut self.outcome.multipliers);
+            problem.write_limit_rows(&mut self.outcome.limits);
             self.kept.take(&self.outcome, status, self.lost);
         }
         problem.forget_multipliers();
@@ -307,17 +340,18 @@ impl AugmentedLagrangian {
     ) -> Result<Status, Error> {
         self.settings.check()?;
         let ConstraintSettings { tolerance, tolerance_dual, penalty_start, penalty_max, .. } = self.settings;
-        if warm_start.is_some() {
+        if warm_start.is_some() && !std::mem::take(&mut self.kept.given) {
             self.kept.penalty = None;
         }
+        self.kept.given = false;
         let penalty = self.kept.penalty.map_or(penalty_start, |penalty| penalty.clamp(penalty_start, penalty_max));
         let mut mu = 1.0 / penalty;
         problem.start_constraints(mu)?;
         if self.kept.penalty.is_some() {
             problem.set_multipliers(&self.kept.multipliers);
         }
-        let multipliers = std::mem::take(&mut self.outcome.multipliers);
-        self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
+        let Outcome { multipliers, limits, .. } = std::mem::take(&mut self.outcome);
+        self.outcome = Outcome { multipliers, limits, penalty, ..Outcome::default() };
         self.lost = false;
         self.solver.begin(problem, settings, warm_start)?;
         // tolerances of one pass, both functions of μ: eta for the constraints, omega for the gradient

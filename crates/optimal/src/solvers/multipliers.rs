@@ -1,6 +1,6 @@
 //! Access of the solvers to the multipliers of all constraints of a problem.
 
-use super::outcome::{Violation, ViolationKind};
+use super::outcome::Violation;
 use crate::error::Error;
 use crate::problem::{PENALTY, Problem, Visit};
 
@@ -27,6 +27,13 @@ impl Problem {
         }
     }
 
+    /// Returns the number of constraints of knot t, without bounds on controls.
+    pub(super) fn constraint_count(&mut self, t: usize) -> usize {
+        let mut all = 0;
+        self.constraints(t, &mut |bounded| all += bounded.count);
+        all
+    }
+
     /// Sets all multipliers to zero, the penalty to 1/μ, and the scale of each row from its bounds.
     ///
     /// # Errors
@@ -51,9 +58,7 @@ impl Problem {
     /// Sets the multipliers of each knot for which `y` has as many entries as the knot has constraints.
     pub(super) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
         for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
-            let mut all = 0;
-            self.constraints(t, &mut |bounded| all += bounded.count);
-            if all != y.len() {
+            if self.constraint_count(t) != y.len() {
                 continue;
             }
             let mut rest = &y[..];
@@ -109,7 +114,7 @@ impl Problem {
                 let (excess, next, term) = bounded.multipliers.measured(t, bounded.count);
                 all.terms += term;
                 for (i, (excess, y)) in excess.iter().zip(next).enumerate() {
-                    let part = || bounded.parts.iter().rfind(|part| part.first <= i);
+                    let part = || bounded.part(i);
                     let fixed =
                         t == 0 && starts_at_x0 && (without_controls || part().is_some_and(|part| part.of_state));
                     if !fixed {
@@ -121,9 +126,8 @@ impl Problem {
                     }
                     let worst = if fixed { &mut all.fixed } else { &mut all.worst };
                     if worst.as_ref().is_none_or(|worst| worst.amount < amount) {
-                        let (name, entry) = part().map_or((None, i), |part| (Some(part.name.clone()), i - part.first));
-                        let kind = ViolationKind::Constraint;
-                        *worst = Some(Violation { kind, knot: t, row: before + i, name, entry, amount });
+                        let named = part().map(|part| (part.name.clone(), i - part.first));
+                        *worst = Some(Violation::of_row(t, before + i, named, amount));
                     }
                 }
                 before += bounded.count;

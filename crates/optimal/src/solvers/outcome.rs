@@ -1,5 +1,6 @@
 //! Outcome of a solve with constraints, and the description of a violated constraint row.
 
+use super::limit_rows::LimitRows;
 use core::fmt;
 use std::sync::Arc;
 
@@ -26,6 +27,9 @@ pub struct Outcome {
     /// of the limits. The multipliers of a [`Constrained`](crate::Constrained) action that contains the robot's action
     /// follow. For an [`InteriorPoint`](crate::InteriorPoint), the multipliers of the bounds on controls are last.
     pub multipliers: Vec<Vec<f64>>,
+    /// Rows of `multipliers` that belong to each named limit, knot by knot. [`multipliers_of`](Self::multipliers_of)
+    /// uses them.
+    pub limits: Vec<LimitRows>,
     /// Penalty 1/μ at the end of the solve, of rows whose bounds do not exceed 1.
     pub penalty: f64,
     /// Barrier parameter μ at the end of a solve by an interior point; 0 for other solvers.

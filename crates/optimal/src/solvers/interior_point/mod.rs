@@ -142,6 +142,8 @@ pub struct InteriorPoint {
     finishing: Recent,
     /// Whether the slack variables and multipliers belong to the last trajectory.
     is_warm: bool,
+    /// Whether multipliers were set since the last solve, so that also a new trajectory starts from them.
+    is_given: bool,
 }
 
 impl InteriorPoint {
@@ -160,6 +162,7 @@ impl InteriorPoint {
             kkt: Kkt::default(),
             finishing: Recent::default(),
             is_warm: false,
+            is_given: false,
         }
     }
 
@@ -259,6 +262,36 @@ impl InteriorPoint {
         Ok(self.solver.end(&settings, &watch))
     }
 
+    /// Sets the multipliers of the limit `name`, one list for each knot 0 … N, which is empty at a knot without this
+    /// limit. The result of [`Outcome::multipliers_of`] has this form. The next [`solve`](Self::solve),
+    /// [`resume`](Self::resume) or [`tick`](Self::tick) starts from them. Other limits keep the multipliers of the last
+    /// solve; without a solve, they start at the central path. The [`outcome`](Self::outcome) does not change.
+    ///
+    /// A positive number belongs to the upper bound, a negative one to the lower bound. Numbers without such a bound
+    /// have no effect, and numbers far from the central path are moved towards it.
+    ///
+    /// # Errors
+    /// [`Error::Multipliers`] if no limit has this name, a length is wrong, or a number is not finite; then all
+    /// multipliers are kept. The errors of [`solve`](Self::solve) for invalid bounds.
+    pub fn set_multipliers(
+        &mut self,
+        problem: &mut Problem,
+        name: &str,
+        multipliers: &[impl AsRef<[f64]>],
+    ) -> Result<(), Error> {
+        let given = problem.check_multipliers(name, multipliers)?;
+        let rows = self.slacks.len();
+        self.slacks.arrange(problem)?;
+        if !self.is_warm || self.slacks.len() != rows {
+            self.slacks.forget();
+        }
+        for (limit, y) in given {
+            self.slacks.set_multipliers(limit.knot, limit.rows.start, y);
+        }
+        (self.is_warm, self.is_given) = (true, true);
+        Ok(())
+    }
+
     /// Returns the result of the last solve.
     pub fn solution(&self) -> &Solution {
         &self.solver.iterate.solution
@@ -293,8 +326,9 @@ impl InteriorPoint {
         warm_start: Option<[&[f64]; 2]>,
         watch: &Watch<'_>,
     ) -> Result<(), Error> {
-        self.is_warm &= warm_start.is_none();
         self.solver.begin(problem, settings, warm_start)?;
+        self.is_warm &= warm_start.is_none() || self.is_given;
+        self.is_given = false;
         self.solver.start_clock(settings, watch);
         self.solver.clock.reserve = self.finishing.median();
         self.slacks.arrange(problem)?;
@@ -404,5 +438,6 @@ impl InteriorPoint {
         (self.outcome.iterations, self.outcome.solves) = (solution.trace.len(), 1);
         (self.outcome.penalty, self.outcome.barrier) = (0.0, self.mu);
         self.slacks.write_multipliers(&mut self.outcome.multipliers);
+        problem.write_limit_rows(&mut self.outcome.limits);
     }
 }

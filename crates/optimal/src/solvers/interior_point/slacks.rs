@@ -281,6 +281,22 @@ impl Slacks {
         self.barrier.renew();
     }
 
+    /// Sets y of consecutive rows of knot t, from row `first` on. The sign of y chooses the bound whose multiplier is
+    /// |y|. The multiplier of the other bound is 0, so that [`resume`](Self::resume) moves it to the central path. A
+    /// new problem must have been [arranged](Self::arrange).
+    pub(super) fn set_multipliers(&mut self, t: usize, first: usize, y: &[f64]) {
+        for (i, &y) in (self.offsets[t] + first..).zip(y) {
+            let z = &mut self.barrier.z;
+            (z[0][i], z[1][i], self.y[i]) = ((-y).max(0.0), y.max(0.0), y);
+        }
+    }
+
+    /// Sets all multipliers to 0.
+    pub(super) fn forget(&mut self) {
+        let Self { barrier: Barrier { z: [zl, zu], .. }, y, .. } = self;
+        [zl, zu, y].into_iter().for_each(|numbers| numbers.fill(0.0));
+    }
+
     /// Returns g of row i, moved away from the bounds by the given relative margin.
     fn inside(&self, i: usize, margin: f64) -> f64 {
         let (lower, upper) = (self.lower[i], self.upper[i]);
