@@ -118,7 +118,7 @@ named!(rust::ConstraintSettings, set_constraints, show_constraints, {
 });
 
 named!(rust::InteriorPointSettings, set_interior_point, show_interior_point, {
-    tolerance, max_iterations, barrier_start, second_order, inverse_dynamics_form,
+    tolerance, max_iterations, barrier_start, tick_barrier, second_order, inverse_dynamics_form,
     time_budget by duration and seconds, threads, regularisation_min, regularisation_max,
 });
 

@@ -185,7 +185,7 @@ impl Step {
 
     /// Adds the regularisation ϱ 1 to Vxx, and writes Vx and Vxx to the feedback of knot t.
     fn finish(&mut self, t: usize, feedback: &mut KnotFeedback, regularisation: f64) -> Result<(), SweepError> {
-        match self.work.finish_value(feedback, regularisation, self.keep) {
+        match self.work.finish_value(feedback, regularisation, self.keep || t == 0) {
             true => Ok(()),
             false => Err(SweepError::NotFinite { knot: t }),
         }

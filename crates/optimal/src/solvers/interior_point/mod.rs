@@ -255,7 +255,8 @@ impl InteriorPoint {
     ) -> Result<&Solution, Error> {
         let settings = self.settings.shared()?;
         let mut watch = Watch::new(&mut observer);
-        self.begin(problem, &settings, None, &watch)?;
+        let disturbance = self.begin(problem, &settings, None, &watch)?;
+        self.mu = self.tick_barrier(disturbance);
         let status = self.solve_linearisation(problem, &settings, sweeps.max(1), &mut watch);
         self.report(problem, status);
         self.outcome.dual = f64::INFINITY; // not measured
@@ -318,14 +319,15 @@ impl InteriorPoint {
     }
 
     /// Begins a solve: checks the arguments, sets x₀ = x̂₀, and evaluates the start. A lost trajectory of a resumed
-    /// solve is replaced by x̂₀ held still, as in [`Fddp::resume`](crate::Fddp::resume).
+    /// solve is replaced by x̂₀ held still, as in [`Fddp::resume`](crate::Fddp::resume). Returns the cost of the
+    /// [disturbance](Self::disturbance).
     fn begin(
         &mut self,
         problem: &mut Problem,
         settings: &Settings,
         warm_start: Option<[&[f64]; 2]>,
         watch: &Watch<'_>,
-    ) -> Result<(), Error> {
+    ) -> Result<f64, Error> {
         self.solver.begin(problem, settings, warm_start)?;
         self.is_warm &= warm_start.is_none() || self.is_given;
         self.is_given = false;
@@ -333,6 +335,7 @@ impl InteriorPoint {
         self.solver.clock.reserve = self.finishing.median();
         self.slacks.arrange(problem)?;
         self.trial.start(problem, self.slacks.most(), self.equations(false));
+        let disturbance = self.disturbance(problem);
         let solution = &mut self.solver.iterate.solution;
         solution.trace.clear();
         solution.trace.reserve(settings.max_iterations.min(1000));
@@ -355,7 +358,7 @@ impl InteriorPoint {
                 self.is_warm = false;
             }
         }
-        Ok(())
+        Ok(disturbance)
     }
 
     /// Returns whether knots of robots are differentiated as equations of inverse dynamics, which have no curvature.

@@ -17,6 +17,9 @@ pub struct InteriorPointSettings {
     /// Barrier parameter μ of the first iteration; if `None`, the cost of the warm start divided by the
     /// number of bounds.
     pub barrier_start: Option<f64>,
+    /// Largest barrier parameter μ of a [`tick`](crate::InteriorPoint::tick), in the unit of the cost. A larger μ
+    /// tolerates larger disturbances, but keeps a larger distance from the bounds until they have decayed.
+    pub tick_barrier: f64,
     /// Whether the curvature λᵀ∂²φ of the dynamics is included near the solution, where an action computes it. Knots
     /// are then not given as equations of inverse dynamics. This saves iterations where the curvature of the dynamics
     /// exceeds the neglected curvature of the costs.
@@ -40,6 +43,7 @@ impl Default for InteriorPointSettings {
             tolerance: 1e-6,
             max_iterations: 300,
             barrier_start: None,
+            tick_barrier: 0.1,
             second_order: false,
             inverse_dynamics_form: true,
             time_budget: None,
@@ -65,6 +69,7 @@ impl InteriorPointSettings {
         check_all([
             ("tolerance", self.tolerance, from_zero(self.tolerance), "at least 0"),
             ("barrier_start", start, exceeds(0.0, start), "above 0"),
+            ("tick_barrier", self.tick_barrier, exceeds(0.0, self.tick_barrier), "above 0"),
             ("regularisation_min", min, exceeds(0.0, min), "above 0"),
             ("regularisation_max", max, exceeds(min, max), "above regularisation_min"),
         ])?;
