@@ -484,7 +484,7 @@ KINDS: dict[str, Any] = {
     "Cost of a cone": lambda: Cost("a", 2.0, Residual.friction_cone("foot", FrictionCone(0.7))),
     "Limit": lambda: Limit("a", Residual.control([0.0]), lower=[-1.0]),
     "Limit, equality": lambda: Limit("a", Residual.control([0.0])),
-    "Activation": lambda: Activation.barrier([-np.inf], [1.0]),
+    "Activation": lambda: Activation.relaxed_barrier([-np.inf], [1.0], 0.1, 5.0),
     "Residual": lambda: Residual.frame_translation(ARM, "tool", [1.0, 2.0, 3.0]),
     "Problem": gait,
     "Problem of all kinds": lambda: reach()[0],
