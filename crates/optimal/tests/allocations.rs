@@ -172,7 +172,10 @@ fn a_gait_allocates_nothing() {
     let force = Residual::ContactForce { contact: contact(), target: Force::zero() };
     let pushing = [
         driven(),
-        vec![Cost::new("grip", 1e-2, grip, Activation::Barrier { lower, upper }), quadratic("force", 1e-6, force)],
+        vec![
+            Cost::new("grip", 1e-2, grip, Activation::RelaxedBarrier { lower, upper, mu: 0.1, delta: 5.0 }),
+            quadratic("force", 1e-6, force),
+        ],
     ]
     .concat();
     let landing = [standing(), vec![quadratic("jump", 1e-2, Residual::ImpulseCenterOfMass)]].concat();
@@ -211,6 +214,35 @@ fn a_gait_allocates_nothing() {
         })
     });
     assert_eq!(count, 0);
+}
+
+/// Checks that shifts do not allocate where the contacts of the last knot change, which then gets a quasi-static
+/// control.
+#[test]
+fn a_shift_to_other_contacts_allocates_nothing() {
+    let model = std::sync::Arc::new(robots::quadruped());
+    let x0 = [neutral(&model), vec![0.0; model.nv()]].concat();
+    let knots = [&["LF_foot", "RH_foot"][..], &["RF_foot", "LH_foot"], &[]].map(|feet| {
+        let contact = |foot: &&str| Contact::new(foot, ContactConstraint::point(model.frame(foot).unwrap()));
+        let contacts: Vec<_> = feet.iter().map(contact).collect();
+        let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic);
+        let knot = ContactDynamics::running(model.clone(), &contacts, 0.01, vec![effort]).unwrap();
+        Box::new(knot) as Box<dyn condyle_optimal::ActionModel>
+    });
+    let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
+    let mut problem = Problem::new(x0.clone(), knots.into(), vec![0; 4], Box::new(end)).unwrap();
+    let us = problem.quasi_static(&x0.repeat(5)).unwrap();
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 1;
+    solver.solve(&mut problem, &x0.repeat(5), &us).unwrap();
+    for last in [0, 1, 2, 0, 2, 1] {
+        let count = allocations(|| {
+            problem.shift(last).unwrap();
+            solver.shift(&mut problem).unwrap();
+            solver.resume(&mut problem).unwrap();
+        });
+        assert_eq!(count, 0, "model {last}");
+    }
 }
 
 /// Checks that changes of multipliers, bounds and penalties do not allocate.

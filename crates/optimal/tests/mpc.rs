@@ -5,6 +5,8 @@ mod budgets;
 mod common;
 #[path = "mpc/recovery.rs"]
 mod recovery;
+#[path = "mpc/trot.rs"]
+mod trot;
 
 use common::{HANGING, Linear, cartpole, random, random_knot, random_matrix, straight};
 use condyle_dynamics::{Vec3, robots};

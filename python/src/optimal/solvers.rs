@@ -218,9 +218,10 @@ macro_rules! solver {
             ///
             /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
             /// limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-            /// model has for all knots. The last control is repeated, and the last state follows from this control. At
-            /// a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-            /// repeated controls would diverge.
+            /// model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+            /// before. If a robot's contacts change there, the last control holds the last state but one still, as
+            /// `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+            /// step in between, the last state is repeated, because a rollout with repeated controls would diverge.
             ///
             /// last: the index of the new last knot's model.
             ///

@@ -128,8 +128,14 @@ impl Fddp {
     }
 
     /// Turns the solution into a warm start for a problem that has since been [shifted](Problem::shift) by one knot.
-    /// States, controls and gains move one knot towards the beginning. The last control is repeated, or is zero if the
-    /// number of controls changes there. Allocates only if the number of controls differs along the horizon.
+    /// States, controls and gains move one knot towards the beginning. Allocates only if the number of controls differs
+    /// along the horizon.
+    ///
+    /// The last control is repeated, if the new last knot has the contacts of the knot before it. If a robot's
+    /// contacts, actuation or kind of dynamics change there, the last control holds the state x_{N−1} still, as
+    /// [`quasi_static`](crate::ActionModel::quasi_static) does. A repeated control would belong to other contacts: the
+    /// start of a trot then cost 1.74 instead of 0.13, where the optimum is 0.085. If the number of controls changes and
+    /// the knot has no such control, the last control is zero. The last gains are zero.
     ///
     /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory comes from a warm
     /// start or from a solve that took a step. If the trajectory is shifted again without such a solve, the last state

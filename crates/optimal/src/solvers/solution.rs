@@ -267,6 +267,16 @@ impl Solution {
         }
     }
 
+    /// Replaces the controls of knot t of a robot by the controls that hold its state still, if these are finite.
+    pub(crate) fn hold_still(&mut self, problem: &mut Problem, t: usize) {
+        let Self { xs, us, k, shape, .. } = self;
+        let (x, still) = (&xs[shape.x(t)], k[t].as_mut_slice()); // k of the new knot has no meaning yet
+        if problem.hold_still(t, x, still) && still.iter().all(|u| u.is_finite()) {
+            us[shape.u(t)].copy_from_slice(still);
+        }
+        still.fill(0.0);
+    }
+
     /// Returns whether a control lies on a bound.
     pub(crate) fn touches_bounds(&self, problem: &Problem) -> bool {
         (0..self.shape.horizon()).any(|t| {

@@ -6,6 +6,7 @@ use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use super::sensitivities::DynamicsSensitivities;
+use super::still::Still;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
 use crate::problem::{Evaluation, innermost};
@@ -85,6 +86,7 @@ struct Work {
     /// Data of each knot of a group.
     data: Vec<KnotData>,
     elimination: Option<KktElimination>,
+    still: Option<Still>,
     group_hessian: GroupHessian,
     /// Derivatives ∂q̈/∂u. Shape: nv × nu; empty if each control drives one coordinate.
     da_du: Vec<f64>,
@@ -178,6 +180,7 @@ impl Work {
             impact: Impact::new(model, kind),
             data: vec![data; lanes],
             elimination,
+            still: Still::new(model, actuation, kind),
             group_hessian: GroupHessian::new(nv, groups),
             da_du: actuation.scratch(),
         }
@@ -288,6 +291,29 @@ impl RobotDynamics {
             self.terms.append(&mut other.terms, place);
         }
         same
+    }
+
+    /// Returns whether the controls of this robot have the same meaning as the controls of `other`: both robots have
+    /// the same kind of dynamics, the same actuation, and contacts of the same frames.
+    pub(crate) fn has_controls_of(&self, other: &Self) -> bool {
+        let place = |contact: &Contact| {
+            let constraint = &contact.constraint;
+            (constraint.frame, constraint.other, constraint.kind.rows())
+        };
+        let (contacts, others) = (self.contacts().iter().map(place), other.contacts().iter().map(place));
+        core::mem::discriminant(&self.kind) == core::mem::discriminant(&other.kind)
+            && self.actuation == other.actuation
+            && contacts.eq(others)
+    }
+
+    /// Computes the controls that hold the robot still at x, as nearly as possible, into `u`. Returns whether such
+    /// controls exist: not at an impact or a terminal knot. Allocates nothing if the workspace exists.
+    pub(crate) fn hold_still(&mut self, x: &[f64], u: &mut [f64]) -> bool {
+        self.reserve();
+        let Self { model, actuation, kind, work, .. } = self;
+        let Some(Work { single, still: Some(still), .. }) = work.made_mut() else { return false };
+        still.run(model, (actuation, kind), single, x, u);
+        true
     }
 
     /// Returns the number of knots that are computed in one batch.
