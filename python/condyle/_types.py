@@ -634,6 +634,7 @@ class _Solution(NamedTuple):
     """Whether the trajectory satisfies the dynamics."""
     status: Literal[
         "converged",
+        "full_step",
         "max_iterations",
         "time_limit",
         "interrupted",
@@ -644,7 +645,13 @@ class _Solution(NamedTuple):
     ]
     """The reason why the solve ended.
 
-    "regularisation_limit": no acceptable step was found, away from a minimum. "constraints_violated": the penalty
+    A controller may execute the solution, with u = ū + K (x ⊖ x̄), after "converged" and "full_step": the trajectory
+    then begins at x̂₀ and has no gaps. After "max_iterations", "time_limit", "interrupted" and "regularisation_limit",
+    all numbers are finite, but the trajectory may have gaps, and x̄₀ may differ from x̂₀. If `trace` is empty, the gains
+    are from the previous solve. After "not_finite", continue with the previous solution. After
+    "constraints_violated" and "infeasible", the violation in `outcome.worst` decides.
+
+    "full_step": `resume(stop="full_step")` accepted a step of length 1. "regularisation_limit": no acceptable step was found, away from a minimum. "constraints_violated": the penalty
     reached its maximum, and limits do not hold at a minimum; this does not prove that no solution exists.
     "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no solution
     exists. `InteriorPoint` also ends with "infeasible" where no small change of the trajectory reduces the violation,

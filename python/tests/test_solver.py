@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import condyle
-from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, ProblemError, Residual
+from condyle.optimal import Activation, Cost, Fddp, FreeDynamics, Problem, ProblemError, Residual
 
 KNOTS = 12
 
@@ -75,3 +75,45 @@ def test_segments_and_threads_change_no_iterate() -> None:
     for name in ("segments", "threads"):
         with pytest.raises(ProblemError, match=f"setting `{name}` is 0, but it must be at least 1"):
             Fddp(problem, **{name: 0}).solve(xs, us)
+
+
+def test_a_tick_ends_with_the_first_full_step() -> None:
+    problem, xs, us = reach()
+    solver = Fddp(problem)
+    plan = solver.solve(xs, us)
+    solver.shift(0)
+    moved = plan.xs[1].copy()
+    moved[7:] += 0.5
+    problem.set_x0(moved)
+    seen = []
+    tick = solver.resume(lambda iteration: seen.append(iteration.step), stop="full_step", most=3)
+    assert tick.status == "full_step" and tick.gap == 0.0
+    assert seen[-1] == 1.0 and all(step < 1.0 for step in seen[:-1])
+    np.testing.assert_array_equal(tick.xs[0], moved)
+    assert solver.resume(stop="full_step").status in ("full_step", "converged")
+    for arguments, message in (
+        ({"stop": "half_step"}, "stop: expected 'full_step' or None, found 'half_step'"),
+        ({"most": 3}, "most: expected only with stop='full_step'"),
+        ({"stop": "full_step", "most": 0}, "most: expected at least 1, found 0"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            solver.resume(**arguments)
+
+
+def test_a_barrier_keeps_controls_inside_their_bounds() -> None:
+    problem, xs, us = reach()
+    free = Fddp(problem).solve(xs, us)
+    bound = 0.8 * np.abs(free.us).max()
+    effort = Residual.control(np.zeros(7))
+    barrier = Activation.relaxed_barrier(np.full(7, -bound), np.full(7, bound), 1e-3, 1e-2)
+    terms = [Cost("rest", 1e-1, Residual.state(xs[0])), Cost("effort", 1e-4, effort), Cost("most", 1.0, effort, barrier)]
+    arm = condyle.robots.arm7()
+    end = [terms[0], Cost("reach", 1e3, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))]
+    knot = FreeDynamics(arm, 0.05, terms)
+    limited = Problem(xs[0], [knot], [0] * KNOTS, FreeDynamics(arm, None, end))
+    solution = Fddp(limited).solve(xs, us)
+    assert solution.status == "converged" and np.abs(solution.us).max() < bound < np.abs(free.us).max()
+    again = Fddp(Problem.from_json(limited.to_json())).solve(xs, us)
+    np.testing.assert_array_equal(again.us, solution.us)
+    with pytest.raises(ProblemError, match="its μ is 0, but it must be above 0"):
+        FreeDynamics(arm, 0.05, [Cost("c", 1.0, effort, Activation.relaxed_barrier([0] * 7, [1] * 7, 0.0, 1.0))])

@@ -45,7 +45,8 @@ impl Activation {
     }
 
     /// Returns the relaxed logarithmic barrier Σ β(d) of the distances d = rᵢ − lowerᵢ and d = upperᵢ − rᵢ to all
-    /// finite bounds. β(d) = −μ log(d/δ) for d ≥ δ, and ½ μ (((d − 2δ)/δ)² − 1) for d < δ, where a bound is near or violated.
+    /// finite bounds. β(d) = −μ log(d/δ) for d ≥ δ, and ½ μ (((d − 2δ)/δ)² − 1) for d < δ, where a bound is near or
+    /// violated.
     ///
     /// β is convex and twice continuously differentiable. It has curvature inside the bounds too, so a step towards a
     /// bound that is not yet reached becomes more expensive; `barrier` has none there. β(δ) = 0, so the value does not

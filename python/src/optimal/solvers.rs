@@ -6,9 +6,10 @@ use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
 use crate::arrays::{Give, class, matrix};
-use crate::exceptions::problem_error;
+use crate::exceptions::{problem_error, wrong_word};
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
+use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyMappingProxy};
@@ -124,29 +125,6 @@ macro_rules! solver {
                 })
             }
 
-            /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
-            /// `Solution`.
-            ///
-            /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-            /// least one iteration.
-            ///
-            /// callback, verbose, progress: as for `solve`.
-            ///
-            /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
-            #[pyo3(signature = (callback=None, verbose=false, progress=false))]
-            fn resume<'py>(
-                &self,
-                py: Python<'py>,
-                callback: Option<Bound<'py, PyAny>>,
-                verbose: bool,
-                progress: bool,
-            ) -> PyResult<Bound<'py, PyAny>> {
-                let observer = Observer { callback, verbose, progress };
-                run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| {
-                    solver.resume_with(problem, interruptions)
-                })
-            }
-
             /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
             /// ("interrupted"); None before the first solve.
             #[getter]
@@ -238,6 +216,41 @@ macro_rules! solver {
     };
 }
 
+/// Defines a solver class as `solver` does, with a `resume` that has no criterion to stop of its own.
+macro_rules! plain_solver {
+    ($(#[$doc:meta])* $class:ident, $set:ident, $show:ident { $($own:tt)* }) => {
+        solver! {
+            $(#[$doc])*
+            $class, $set, $show {
+                /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+                /// `Solution`.
+                ///
+                /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
+                /// least one iteration.
+                ///
+                /// callback, verbose, progress: as for `solve`.
+                ///
+                /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
+                #[pyo3(signature = (callback=None, verbose=false, progress=false))]
+                fn resume<'py>(
+                    &self,
+                    py: Python<'py>,
+                    callback: Option<Bound<'py, PyAny>>,
+                    verbose: bool,
+                    progress: bool,
+                ) -> PyResult<Bound<'py, PyAny>> {
+                    let observer = Observer { callback, verbose, progress };
+                    run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| {
+                        solver.resume_with(problem, interruptions)
+                    })
+                }
+
+                $($own)*
+            }
+        }
+    };
+}
+
 solver! {
 /// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or plain, with the equations and
 /// constants of Crocoddyl.
@@ -268,6 +281,50 @@ Fddp, set_fddp, show_fddp {
     fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         Self::with(problem, None, settings)
     }
+
+    /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a `Solution`.
+    ///
+    /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
+    /// iteration.
+    ///
+    /// stop: "full_step" ends the solve when a step of length 1 is accepted, with the status "full_step". This is the
+    ///     mode for model predictive control. After the state has moved, the warm start has a gap at x₀. Shorter steps
+    ///     of length α keep the fraction 1 − α of each gap, and gaps may grow from period to period. A step of length 1
+    ///     closes all gaps. None (default) iterates until the solve has converged.
+    /// most: the maximum number of iterations, at least 1; None (default) takes `max_iterations` of the settings. Only
+    ///     with `stop`.
+    /// callback, verbose, progress: as for `solve`.
+    ///
+    /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
+    #[pyo3(signature = (callback=None, verbose=false, progress=false, *, stop=None, most=None))]
+    fn resume<'py>(
+        &self,
+        py: Python<'py>,
+        callback: Option<Bound<'py, PyAny>>,
+        verbose: bool,
+        progress: bool,
+        stop: Option<&str>,
+        most: Option<usize>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let to_full_step = match stop {
+            None => false,
+            Some("full_step") => true,
+            Some(other) => return Err(wrong_word("stop", "'full_step' or None", other)),
+        };
+        match most {
+            Some(_) if !to_full_step => return Err(PyValueError::new_err("most: expected only with stop='full_step'")),
+            Some(0) => return Err(PyValueError::new_err("most: expected at least 1, found 0")),
+            _ => {}
+        }
+        let observer = Observer { callback, verbose, progress };
+        run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| match to_full_step {
+            true => {
+                let most = most.unwrap_or(solver.settings.max_iterations);
+                solver.resume_to_full_step_with(problem, most, interruptions)
+            }
+            false => solver.resume_with(problem, interruptions),
+        })
+    }
 }
 }
 
@@ -297,7 +354,7 @@ macro_rules! construct {
 }
 construct!(Fddp by set_fddp, InteriorPoint by set_interior_point);
 
-solver! {
+plain_solver! {
 /// The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 ///
 /// The method repeats two steps. First FDDP minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖² with z = g + μ y, where
@@ -400,7 +457,7 @@ impl AugmentedLagrangian {
     }
 }
 
-solver! {
+plain_solver! {
 /// The primal–dual interior point method with multiple shooting: for robots with `Limit`s, bounds on controls, and
 /// `ConstrainedAction`s.
 ///

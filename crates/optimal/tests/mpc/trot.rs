@@ -34,7 +34,8 @@ fn stances() -> (Vec<f64>, [Vec<Contact>; 3]) {
     ([q, vec![0.0; 18]].concat(), feet.map(|feet| feet.iter().map(contact).collect()))
 }
 
-/// Creates the problem of a trot with 0.5 m/s that lifts the feet in the air by about 5 cm, and the controls that hold the robot still.
+/// Creates the problem of a trot with 0.5 m/s that lifts the feet in the air by about 5 cm. Also returns the controls
+/// that hold the robot still.
 fn trot() -> (Problem, Vec<f64>) {
     let (model, (x0, stances)) = (Arc::new(robots::quadruped()), stances());
     let mut reference = x0.clone();
