@@ -85,7 +85,11 @@ ARGUMENTS = {
         lower pi placement point rest stiffness
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
-        _check_pose.pose _controller_from_numbers.numbers""",
+        _check_pose.pose _controller_from_numbers.numbers Problem.set_references.values
+        Problem.set_entry_weights.weights""",
+    "float | ArrayLike": "Problem.set_weight.weight",
+    'Literal["full_step"]': "stop",
+    "int | None": "_casadi_hold_knot.t",
     "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
@@ -109,10 +113,10 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
-        facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps
+        facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
+        bias damping delta dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
         regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
@@ -200,7 +204,6 @@ ARGUMENTS = {
     "Any": """
         _borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model
         Model.from_mujoco.model""",
-    "int | None": "_casadi_hold_knot.t",
     "list[str]": "names _generate.frames inputs",
     "list[ContactConstraint]": "_generate.constraints",
 }
@@ -219,7 +222,7 @@ RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
+        Problem.references Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
@@ -271,7 +274,7 @@ RESULTS = {
         Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
-        Problem.set_costs Problem.set_duration Problem.set_knot
+        Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot Problem.set_references
         Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",

@@ -2710,6 +2710,21 @@ class Activation:
         """Returns the quadratic cost ½ Σ rᵢ²."""
 
     @staticmethod
+    def relaxed_barrier(lower: ArrayLike, upper: ArrayLike, mu: float, delta: float) -> Activation:
+        """Returns the relaxed logarithmic barrier Σ β(d) of the distances d = rᵢ − lowerᵢ and d = upperᵢ − rᵢ to all
+        finite bounds. β(d) = −μ log(d/δ) for d ≥ δ, and ½ μ (((d − 2δ)/δ)² − 1) for d < δ, where a bound is near or
+        violated.
+
+        β is convex and twice continuously differentiable. It has curvature inside the bounds too, so a step towards a
+        bound that is not yet reached becomes more expensive; `barrier` has none there. β(δ) = 0, so the value does not
+        depend on the unit of r. Source: Feller and Ebenbauer, 2017.
+
+        lower, upper: the bounds, infinite for no bound; `cone.bounds()` for a cone.
+        mu: μ > 0, in the unit of the cost; at the distance d ≥ δ the slope is μ/d.
+        delta: δ > 0, in the unit of r.
+        """
+
+    @staticmethod
     def smooth1(epsilon: float = 1.0) -> Activation:
         """Returns the smooth cost Σ √(ε + rᵢ²), approximately Σ |rᵢ|."""
 
@@ -2840,9 +2855,10 @@ class AugmentedLagrangian:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from this control. At
-        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-        repeated controls would diverge.
+        model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+        before. If a robot's contacts change there, the last control holds the last state but one still, as
+        `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+        step in between, the last state is repeated, because a rollout with repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3117,14 +3133,25 @@ class Fddp:
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
     def resume(
-        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+        self,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+        *,
+        stop: Literal["full_step"] | None | None = None,
+        most: int | None | None = None,
     ) -> Solution:
-        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
-        `Solution`.
+        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a `Solution`.
 
-        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-        least one iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
+        iteration.
 
+        stop: "full_step" ends the solve when a step of length 1 is accepted, with the status "full_step". This is the
+            mode for model predictive control. After the state has moved, the warm start has a gap at x₀. Shorter steps
+            of length α keep the fraction 1 − α of each gap, and gaps may grow from period to period. A step of length 1
+            closes all gaps. None (default) iterates until the solve has converged.
+        most: the maximum number of iterations, at least 1; None (default) takes `max_iterations` of the settings. Only
+            with `stop`.
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
@@ -3135,9 +3162,10 @@ class Fddp:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from this control. At
-        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-        repeated controls would diverge.
+        model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+        before. If a robot's contacts change there, the last control holds the last state but one still, as
+        `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+        step in between, the last state is repeated, because a rollout with repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3409,9 +3437,10 @@ class InteriorPoint:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from this control. At
-        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-        repeated controls would diverge.
+        model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+        before. If a robot's contacts change there, the last control holds the last state but one still, as
+        `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+        step in between, the last state is repeated, because a rollout with repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3581,6 +3610,13 @@ class Problem:
         xs: states, (N + 1, nx).
         """
 
+    def references(self, name: str) -> _Array:
+        """Returns the targets of the cost with this name at all knots: a copy of shape (N + 1, n) for a target of n numbers,
+        (N + 1, 3, 3) for rotations, and (N + 1, 4, 4) for placements. Rows of knots without this cost are NaN.
+
+        Raises `KeyError` if no knot has this cost, or if its residual has no target.
+        """
+
     def rollout(self, us: _Controls) -> _Array:
         """Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
@@ -3610,6 +3646,17 @@ class Problem:
         Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
         """
 
+    def set_entry_weights(self, name: str, weights: ArrayLike) -> None:
+        """Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or `weighted_barrier`,
+        at all knots. Call this method between solves.
+
+        name: the name of the cost.
+        weights: the weights, (N + 1, n); otherwise as for `set_references`.
+
+        Raises `KeyError` if no knot has this cost, and `ProblemError` if its activation has no weights, or a weight is
+        negative or not finite.
+        """
+
     def set_knot(self, knot: int, model: _Action) -> None:
         """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
         between solves. The solver's next iterations do not allocate.
@@ -3621,9 +3668,28 @@ class Problem:
         Raises `ProblemError` if the model does not fit.
         """
 
-    def set_weight(self, name: str, weight: float) -> None:
+    def set_references(self, name: str, values: ArrayLike) -> None:
+        """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in each
+        period, between solves.
+
+        name: the name of the cost.
+        values: the targets, in the shape that `references` returns. Row t belongs to knot t, and row N to the terminal
+            knot. Rows of knots without this cost are ignored.
+
+        A knot that shares its costs with other knots first gets separate costs with the same terms. They move with the
+        knot in a `shift`. Later calls write in place and allocate nothing; 25 knots of a quadruped take a few
+        microseconds.
+
+        Raises `KeyError` as `references` does, and `ProblemError` if a target is not finite or not a rotation. Then the
+        knots before the one in the message have their new targets.
+        """
+
+    def set_weight(self, name: str, weight: float | ArrayLike) -> None:
         """Changes the weight of all cost terms with this name, in all knots including the terminal knot. Call this method
         between solves.
+
+        weight: the weight of all knots, or N + 1 weights, one for each knot. Weights of knots without the term are
+            ignored. With one weight for each knot, each knot gets separate costs, as in `set_references`.
 
         Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
         """

@@ -10,6 +10,7 @@ mod inverse;
 mod models;
 mod own;
 mod problem;
+mod references;
 mod residuals;
 mod robot_action;
 mod settings;

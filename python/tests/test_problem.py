@@ -525,3 +525,67 @@ def test_a_problem_of_actions_of_ones_own_pickles() -> None:
 
 def falling(t: Any, x: Any, u: Any) -> Any:
     return u - x[7:], 0.5 * (u @ u)
+
+
+def test_references_are_written_into_all_knots_at_once() -> None:
+    arm = condyle.robots.arm7()
+    x0 = np.r_[np.full(7, 0.1), np.zeros(7)]
+    rest = Cost("rest", 0.1, Residual.state(x0), Activation.weighted(np.ones(14)))
+    pose = Cost("pose", 1.0, Residual.frame_placement(arm, "tool", np.eye(4)))
+    turn = Cost("turn", 1.0, Residual.frame_rotation(arm, "tool", np.eye(3)))
+
+    def problem(*at):
+        knots = [FreeDynamics(arm, 0.05, list(costs)) for costs in at[:-1]]
+        return Problem(x0, knots, None, FreeDynamics(arm, None, list(at[-1])))
+
+    changed = problem([rest, pose, turn], [rest, pose, turn], [rest])
+    rests = np.linspace(0.0, 1.0, 3 * 14).reshape(3, 14)
+    poses = np.stack([np.eye(4)] * 3)
+    poses[:, :3, 3] = [[0.1, 0.2, 0.3], [0.2, 0.3, 0.4], [np.nan] * 3]  # the terminal knot has no pose
+    poses[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    changed.set_references("rest", rests)
+    changed.set_references("pose", poses)
+    changed.set_references("turn", poses[:, :3, :3])
+    changed.set_weight("rest", [1.0, 2.0, 3.0])
+    weights = np.linspace(1.0, 2.0, 3 * 14).reshape(3, 14)
+    changed.set_entry_weights("rest", weights)
+    np.testing.assert_array_equal(changed.references("rest"), rests)
+    np.testing.assert_array_equal(changed.references("pose")[:2], poses[:2])
+    assert changed.references("turn").shape == (3, 3, 3) and np.isnan(changed.references("pose")[2]).all()
+    expected = problem(
+        *(
+            [
+                Cost("rest", 1.0 + t, Residual.state(rests[t]), Activation.weighted(weights[t])),
+                *(
+                    (
+                        Cost("pose", 1.0, Residual.frame_placement(arm, "tool", poses[t])),
+                        Cost("turn", 1.0, Residual.frame_rotation(arm, "tool", poses[t, :3, :3])),
+                    )
+                    if t < 2
+                    else ()
+                ),
+            ]
+            for t in range(3)
+        )
+    )
+    xs, us = np.full((3, 14), 0.2), np.full((2, 7), 0.3)
+    same = expected.evaluate(xs, us).costs
+    np.testing.assert_array_equal(changed.evaluate(xs, us).costs, same)
+    for copy in (Problem.from_json(changed.to_json()), pickle.loads(pickle.dumps(changed))):
+        np.testing.assert_array_equal(copy.evaluate(xs, us).costs, same)
+        np.testing.assert_array_equal(copy.references("rest"), rests)
+    changed.set_references("rest", rests + 1.0)  # another change after the text was written
+    again = Problem.from_json(changed.to_json())
+    np.testing.assert_array_equal(again.references("rest"), rests + 1.0)
+    with pytest.raises(KeyError, match="no knot has a cost 'reach'"):
+        changed.set_references("reach", rests)
+    with pytest.raises(ValueError, match=r"values: expected shape \(3, 14\), found \(2, 14\)"):
+        changed.set_references("rest", rests[:2])
+    rests[1, 2] = np.inf
+    with pytest.raises(ProblemError, match=r"cost `rest`: its reference holds an infinite number \(knot 1\)"):
+        changed.set_references("rest", rests)
+    with pytest.raises(ProblemError, match=r"cost `pose`: its activation has no weights \(knot 0\)"):
+        changed.set_entry_weights("pose", np.ones((3, 6)))
+    with pytest.raises(KeyError, match="the residual of the cost 'own' has no target"):
+        own = Residual.own(1, lambda t, x, u: x[:1])
+        problem([Cost("own", 1.0, own)], []).references("own")

@@ -245,6 +245,52 @@ fn a_shift_to_other_contacts_allocates_nothing() {
     }
 }
 
+/// Checks that new references of all knots allocate nothing in a loop that shifts the horizon, also with copies of
+/// actions for a second thread, which get the same references.
+#[test]
+fn references_of_a_moving_horizon_allocate_nothing() {
+    let arm = std::sync::Arc::new(robots::arm7());
+    let x0 = vec![0.1; 14];
+    let knot = |weight: f64| {
+        let follow = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.3, 0.0, 0.5) };
+        let costs = vec![
+            Cost::new("follow", weight, follow, Activation::Quadratic),
+            Cost::new("rest", 0.1, Residual::State { reference: x0.clone() }, Activation::Weighted(vec![1.0; 14])),
+            Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic),
+        ];
+        let knot = FreeDynamics::running(arm.clone(), 0.02, costs).unwrap();
+        Box::new(knot) as Box<dyn condyle_optimal::ActionModel>
+    };
+    let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap();
+    let mut problem = Problem::new(x0.clone(), vec![knot(1.0), knot(2.0)], vec![0; 8], Box::new(end)).unwrap();
+    let (mut solver, us) = (Fddp::new(&problem), vec![0.0; 56]);
+    let mut same = problem.try_clone().unwrap();
+    let mut other = Fddp::new(&same);
+    (solver.settings.max_iterations, other.settings.max_iterations) = (2, 2);
+    solver.settings.threads = 2;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    pool.install(|| solver.solve(&mut problem, &x0.repeat(9), &us).map(drop)).unwrap();
+    other.solve(&mut same, &x0.repeat(9), &us).unwrap();
+    let mut counts = Vec::new();
+    for tick in 0..24 {
+        let numbers: Vec<f64> =
+            (0..9).flat_map(|t| [0.3 + 0.1 * (0.2 * f64::from(tick + t)).sin(), 0.0, 0.5]).collect();
+        let weights: Vec<f64> = (0..9).map(|t| 1.0 + f64::from((tick + t) % 3)).collect();
+        let last = usize::from(tick % 3 == 0);
+        let run = |problem: &mut Problem, solver: &mut Fddp| {
+            problem.shift(last).unwrap();
+            solver.shift(problem).unwrap();
+            assert!(problem.set_references("follow", &numbers).unwrap());
+            assert!(problem.set_weights("rest", &weights).unwrap());
+            solver.resume(problem).unwrap();
+        };
+        counts.push(pool.install(|| allocations(|| run(&mut problem, &mut solver))));
+        run(&mut same, &mut other);
+        assert_eq!(solver.solution().xs, other.solution().xs, "tick {tick}");
+    }
+    assert_eq!(counts[12..], [0; 12], "{counts:?}");
+}
+
 /// Checks that changes of multipliers, bounds and penalties do not allocate.
 #[test]
 fn a_constrained_solve_of_a_robot_allocates_nothing() {

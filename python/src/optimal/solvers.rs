@@ -282,7 +282,8 @@ Fddp, set_fddp, show_fddp {
         Self::with(problem, None, settings)
     }
 
-    /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a `Solution`.
+    /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+    /// `Solution`.
     ///
     /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
     /// iteration.

@@ -160,6 +160,24 @@ impl Activation {
         }
     }
 
+    /// Copies another activation. Allocates nothing if both are equal or have weights of the same length.
+    pub(super) fn assign(&mut self, from: &Self) {
+        match (&mut *self, from) {
+            (Self::Weighted(own), Self::Weighted(others)) if own.len() == others.len() => own.copy_from_slice(others),
+            (own, others) if own == others => {}
+            (own, others) => own.clone_from(others),
+        }
+    }
+
+    /// Returns the weights of the entries of the residual, which may be changed in place; `None` for an activation
+    /// without weights.
+    pub(super) fn weights_mut(&mut self) -> Option<&mut [f64]> {
+        match self {
+            Self::Weighted(weights) | Self::WeightedBarrier { weights, .. } => Some(weights),
+            _ => None,
+        }
+    }
+
     /// Returns an error message if this activation is invalid or does not fit a residual with n entries.
     pub(super) fn wrong(&self, n: usize) -> Option<String> {
         let length = |name: &str, numbers: &[f64]| match numbers.len() == n {
@@ -167,13 +185,7 @@ impl Activation {
             true => None,
             false => Some(format!("its {name} has {} numbers, expected {n}", numbers.len())),
         };
-        let weighting = |w: &[f64]| {
-            let bad = |i: usize| format!("its weight {i} is {}, expected a finite number of at least 0", w[i]);
-            if w.len() != n {
-                return length("weighting", w);
-            }
-            w.iter().position(|x| !(*x >= 0.0 && x.is_finite())).map(bad)
-        };
+        let weighting = |w: &[f64]| wrong_weights(w, n);
         let ordered = |lower: &[f64], upper: &[f64]| {
             let i = lower.iter().zip(upper).position(|(&lower, &upper)| !leave_a_value(lower, upper))?;
             Some(format!("its bounds of entry {i} exclude each other: {} and {}", lower[i], upper[i]))
@@ -197,6 +209,15 @@ impl Activation {
             Self::Smooth1 { epsilon } | Self::Smooth2 { epsilon } => positive("ε", *epsilon),
         }
     }
+}
+
+/// Returns an error message if the weights of a residual with n entries are invalid.
+pub(super) fn wrong_weights(w: &[f64], n: usize) -> Option<String> {
+    if w.len() != n {
+        return Some(format!("its weighting has {} numbers, expected {n}", w.len()));
+    }
+    let bad = |i: usize| format!("its weight {i} is {}, expected a finite number of at least 0", w[i]);
+    w.iter().position(|x| !(*x >= 0.0 && x.is_finite())).map(bad)
 }
 
 /// Returns the relaxed logarithmic barrier β(d) of the distance d to a bound, and its first and second derivatives. All

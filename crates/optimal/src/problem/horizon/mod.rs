@@ -278,6 +278,20 @@ impl Problem {
         self.models.chosen(index)
     }
 
+    /// Calls `visit` for the action of knot t, then for the copies of this action that other threads use, if `visit`
+    /// returns no error. Later changes of these actions affect only the model of knot t. If `visit` changes all in the
+    /// same way, the copies stay equal to the action.
+    pub(crate) fn each_action_of<E>(
+        &mut self,
+        t: usize,
+        visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Some(&index) = self.knot_models.get(t) else { return visit(&mut *self.terminal) };
+        let [action, own] = self.models.place(index);
+        visit(self.models.chosen(index).expect("a knot has an existing model"))?;
+        self.copies.each_of(action, own, visit)
+    }
+
     /// Returns the number of models.
     pub(crate) fn model_count(&self) -> usize {
         self.models.len()

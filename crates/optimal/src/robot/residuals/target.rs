@@ -93,6 +93,19 @@ pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
 }
 
 impl Residual {
+    /// Returns whether the two residuals differ only in the numbers of their targets.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        match (self.target(), other.target()) {
+            (Some(Target::Numbers(own)), Some(Target::Numbers(others))) => {
+                own.len() == others.len() && core::mem::discriminant(self) == core::mem::discriminant(other)
+            }
+            (Some(_), Some(_)) => {
+                self.differs_in_target(other) && self.frame() == other.frame() && self.contact() == other.contact()
+            }
+            _ => self == other,
+        }
+    }
+
     /// Returns the target; `None` for a residual without a target and for a user-defined function.
     pub fn target(&self) -> Option<Target<'_>> {
         Some(match self {
