@@ -92,6 +92,7 @@ __all__ = [
     "NotPhysicalError",
     "ParseError",
     "Plan",
+    "Policy",
     "Problem",
     "ProblemError",
     "Residual",
@@ -2836,14 +2837,25 @@ class AugmentedLagrangian:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> AugmentedLagrangian: ...
+    def publish(self, policy: Policy, start: float = 0.0) -> None:
+        """Publishes the last solution for the threads that call a policy.
+
+        policy: a `Policy` of the same problem.
+        start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            their present durations; an impact takes no time.
+
+        Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+        the solution was not.
+        """
+
     def resume(
         self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
     ) -> Solution:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-        least one iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes
+        at least one iteration.
 
         callback, verbose, progress: as for `solve`.
 
@@ -3132,16 +3144,28 @@ class Fddp:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
+    def publish(self, policy: Policy, start: float = 0.0) -> None:
+        """Publishes the last solution for the threads that call a policy.
+
+        policy: a `Policy` of the same problem.
+        start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            their present durations; an impact takes no time.
+
+        Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+        the solution was not.
+        """
+
     def resume(
         self,
         callback: Callable[[Iteration], object] | None = None,
         verbose: bool = False,
         progress: bool = False,
         *,
-        stop: Literal["full_step"] | None | None = None,
-        most: int | None | None = None,
+        stop: Literal["full_step"] | None = None,
+        most: int | None = None,
     ) -> Solution:
-        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a `Solution`.
+        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+        `Solution`.
 
         With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
         iteration.
@@ -3418,14 +3442,25 @@ class InteriorPoint:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> InteriorPoint: ...
+    def publish(self, policy: Policy, start: float = 0.0) -> None:
+        """Publishes the last solution for the threads that call a policy.
+
+        policy: a `Policy` of the same problem.
+        start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            their present durations; an impact takes no time.
+
+        Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+        the solution was not.
+        """
+
     def resume(
         self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
     ) -> Solution:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-        least one iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes
+        at least one iteration.
 
         callback, verbose, progress: as for `solve`.
 
@@ -3537,6 +3572,42 @@ class Lqr:
     ) -> Lqr: ...
 
 @final
+class Policy:
+    """The feedback u = ū + K (x ⊖ x̄) of the last published solution, as a function of time and state.
+
+    Another thread can call the policy at its own rate while a solve runs, without waiting for the solve: the solver
+    publishes a solution into memory that is not being read. `solver.publish(policy, start)` publishes the last solution
+    of a solver.
+
+    `policy(t, x)` returns the controls at the time t (s), on the clock of `start`, and at the state x: nu numbers, moved
+    into the bounds of the knot. x̄ is the plan's state at the time t, interpolated between two knots; ū and K are the
+    controls and gains of the knot. If x has a number that is not finite, u is ū without feedback. Before the first
+    knot, x̄ is the first state; after the horizon, x̄ is the last state. A call raises `ProblemError` if no solution was
+    published yet.
+
+    problem: the problem that the solver solves, of a robot.
+
+    Raises `ProblemError` if the terminal model does not belong to a robot.
+
+    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Policy, Problem, Residual
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> knot = FreeDynamics(arm, 0.02, [Cost("effort", 1.0, Residual.control(np.zeros(7)))])
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [Cost("rest", 1.0, Residual.state(x0))]))
+    >>> solver, policy = Fddp(problem), Policy(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7)))
+    >>> solver.publish(policy, start=3.0)
+    >>> policy(3.01, x0 + 1e-3).shape
+    (7,)
+    """
+
+    def __new__(cls, problem: Problem) -> Policy: ...
+    @property
+    def end(self) -> float | None:
+        """The time of the end of the published plan (s); None before the first plan. A plan is too old after this time."""
+
+    def __call__(self, t: float, x: ArrayLike) -> _Array: ...
+
+@final
 class Problem:
     """An optimal control problem: a sequence of knots that begins at the state x0, and a terminal knot. Each knot has one
     of the models.
@@ -3573,6 +3644,9 @@ class Problem:
     @property
     def x0(self) -> _Array:
         """The initial state, nx numbers; `set_x0` sets it."""
+
+    def _between(self, x0: ArrayLike, x1: ArrayLike, s: float) -> _Array:
+        """Computes the state at a fraction of the way from x0 to x1. Locks nothing, so it can run during a solve."""
 
     def _evaluate(self, xs: ArrayLike, us: _Controls, moved: int) -> Evaluation:
         """Computes the evaluation of a solution; an error if the horizon was shifted after the solve."""
@@ -3611,8 +3685,8 @@ class Problem:
         """
 
     def references(self, name: str) -> _Array:
-        """Returns the targets of the cost with this name at all knots: a copy of shape (N + 1, n) for a target of n numbers,
-        (N + 1, 3, 3) for rotations, and (N + 1, 4, 4) for placements. Rows of knots without this cost are NaN.
+        """Returns the targets of the cost with this name at all knots: a copy of shape (N + 1, n) for a target of n
+        numbers, (N + 1, 3, 3) for rotations, and (N + 1, 4, 4) for placements. Rows of knots without this cost are NaN.
 
         Raises `KeyError` if no knot has this cost, or if its residual has no target.
         """
@@ -3647,8 +3721,8 @@ class Problem:
         """
 
     def set_entry_weights(self, name: str, weights: ArrayLike) -> None:
-        """Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or `weighted_barrier`,
-        at all knots. Call this method between solves.
+        """Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or
+        `weighted_barrier`, at all knots. Call this method between solves.
 
         name: the name of the cost.
         weights: the weights, (N + 1, n); otherwise as for `set_references`.
@@ -3669,8 +3743,8 @@ class Problem:
         """
 
     def set_references(self, name: str, values: ArrayLike) -> None:
-        """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in each
-        period, between solves.
+        """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
+        each period, between solves.
 
         name: the name of the cost.
         values: the targets, in the shape that `references` returns. Row t belongs to knot t, and row N to the terminal

@@ -664,6 +664,19 @@ class _Solution(NamedTuple):
     """The durations of the phases of the solve."""
 
 
+class PlanPoint(NamedTuple):
+    """A plan at one time, as `Solution.at` returns it."""
+
+    knot: int
+    """The index of the knot."""
+    x: _Array
+    """The state x̄, interpolated between the states of this knot and of the next one, nx numbers."""
+    u: _Array
+    """The controls ū of the knot, nu numbers."""
+    K: _Array
+    """The feedback gains of the knot, (nu, ndx)."""
+
+
 @disjoint_base
 class Solution(_Solution):
     """The result of a solve: the best iterate, for every status.
@@ -673,6 +686,29 @@ class Solution(_Solution):
 
     _source: Any = None
     _evaluation: Evaluation | None = None
+    _times: _Array | None = None
+
+    def at(self, t: float) -> PlanPoint:
+        """Returns the plan at the time t (s) after the beginning of knot 0, as a `PlanPoint`.
+
+        The state is x̄ = xₖ ⊕ s (xₖ₊₁ ⊖ xₖ) at the fraction s of knot k. The controls and gains belong to knot k,
+        because they are constant during a knot. Times outside the horizon give its first or its last state. An impact
+        takes no time. Another thread can call this method while a solve runs.
+
+        Raises `ValueError` if a knot has no duration: a knot of an `Action`.
+        """
+        if self._source is None:
+            raise AttributeError("this solution was copied from its problem, which interpolates states")
+        if (times := self._times) is None:
+            raise ValueError("a knot has no duration: only knots of robots have durations")
+        last = len(times) - 2
+        knot = int(np.searchsorted(times[1 : last + 1], t, side="right"))
+        span = times[knot + 1] - times[knot]
+        s = min(max((t - times[knot]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+        while len(self.us[knot]) == 0 and knot > 0:
+            knot, s = knot - 1, 1.0
+        x = self._source[0]._between(self.xs[knot], self.xs[knot + 1], s)
+        return PlanPoint(knot, x, self.us[knot], self.K[knot])
 
     def _evaluated(self) -> Evaluation:
         if self._evaluation is None:
@@ -909,6 +945,7 @@ def _repr(self: Any) -> str:
 _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",
+    "PlanPoint": "optimal",
     "Solution": "optimal",
     "Evaluation": "optimal",
     "SweepResult": "optimal",

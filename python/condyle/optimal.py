@@ -44,6 +44,7 @@ from ._condyle import (
     InteriorPoint,
     Limit,
     Lqr,
+    Policy,
     Problem,
     ProblemError,
     Residual,
@@ -51,7 +52,18 @@ from ._condyle import (
     Unicycle,
     WrenchCone,
 )
-from ._types import ConstraintRows, Evaluation, Iteration, LqKnot, Outcome, Solution, Sphere, SweepResult, Timings
+from ._types import (
+    ConstraintRows,
+    Evaluation,
+    Iteration,
+    LqKnot,
+    Outcome,
+    PlanPoint,
+    Solution,
+    Sphere,
+    SweepResult,
+    Timings,
+)
 
 __all__ = [
     "Action",
@@ -75,6 +87,8 @@ __all__ = [
     "LqKnot",
     "Lqr",
     "Outcome",
+    "PlanPoint",
+    "Policy",
     "Problem",
     "ProblemError",
     "Residual",

@@ -11,7 +11,9 @@ use condyle_optimal::robot::{
     FreeDynamics, FrictionCone, GenericResidual, Geometry, GeometryPair, ImpulseDynamics, Integrator, Limit,
     OwnResidual, Residual, RobotState, Shape,
 };
-use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, Problem, Status, Sweep};
+use condyle_optimal::{
+    AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, PolicyPublisher, Problem, Status, Sweep,
+};
 use condyle_spatial::Scalar;
 use counting::{allocated, allocations};
 
@@ -217,7 +219,7 @@ fn a_gait_allocates_nothing() {
 }
 
 /// Checks that shifts do not allocate where the contacts of the last knot change, which then gets a quasi-static
-/// control.
+/// control. Policies allocate nothing, either.
 #[test]
 fn a_shift_to_other_contacts_allocates_nothing() {
     let model = std::sync::Arc::new(robots::quadruped());
@@ -235,11 +237,17 @@ fn a_shift_to_other_contacts_allocates_nothing() {
     let mut solver = Fddp::new(&problem);
     solver.settings.max_iterations = 1;
     solver.solve(&mut problem, &x0.repeat(5), &us).unwrap();
+    let mut publisher = PolicyPublisher::new(&problem).unwrap();
+    let (mut policy, mut u) = (publisher.policy(), [0.0; 12]);
+    publisher.publish(&problem, solver.solution(), 0.0).unwrap();
+    policy.control(0.0, &x0, &mut u).unwrap();
     for last in [0, 1, 2, 0, 2, 1] {
         let count = allocations(|| {
             problem.shift(last).unwrap();
             solver.shift(&mut problem).unwrap();
             solver.resume(&mut problem).unwrap();
+            publisher.publish(&problem, solver.solution(), 0.0).unwrap();
+            policy.control(0.015, &x0, &mut u).unwrap();
         });
         assert_eq!(count, 0, "model {last}");
     }

@@ -3,6 +3,8 @@
 #[path = "mpc/budgets.rs"]
 mod budgets;
 mod common;
+#[path = "mpc/policies.rs"]
+mod policies;
 #[path = "mpc/recovery.rs"]
 mod recovery;
 #[path = "mpc/trot.rs"]

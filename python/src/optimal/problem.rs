@@ -58,6 +58,9 @@ pub(crate) struct Problem {
     faults: Mutex<Vec<Fault>>,
     /// Number of times that the horizon was shifted.
     moved: AtomicUsize,
+    /// States of a robot's problem, which need no lock. `None` for other problems, whose Python functions only
+    /// `objects` reports to the garbage collector.
+    pub(super) space: Option<rust::StateSpace>,
     /// Whether costs were changed in place, so that the descriptions of the models contain old numbers.
     is_outdated: AtomicBool,
 }
@@ -408,6 +411,19 @@ impl Problem {
         self.evaluate(py, xs, us)
     }
 
+    /// Computes the state at a fraction of the way from x0 to x1. Locks nothing, so it can run during a solve.
+    fn _between<'py>(&self, x0: &Bound<'py, PyAny>, x1: &Bound<'py, PyAny>, s: f64) -> PyResult<Bound<'py, PyAny>> {
+        let Some(space) = &self.space else {
+            return Err(ProblemError::new_err(
+                "terminal: expected an action of a robot, whose states are interpolated",
+            ));
+        };
+        let py = x0.py();
+        let (x0, x1) = (vector("x0", x0, space.nx())?, vector("x1", x1, space.nx())?);
+        let mut dx = vec![0.0; space.ndx()];
+        output(py, None, &[space.nx()], |x| space.between([&x0, &x1], s, &mut dx, x))
+    }
+
     /// Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
     /// `LqKnot`s, which a `Sweep` solves.
     ///
@@ -478,6 +494,7 @@ impl Problem {
         let end = actions.pop().expect("the terminal one is there");
         let problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
         let described: Vec<Option<Arc<Described>>> = described;
+        let space = described.last().and_then(Option::as_ref).and_then(|_| rust::StateSpace::new(&problem).ok());
         let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
         let (inner, described) = (Mutex::new(problem), Mutex::new(described));
         let (objects, written, faults) = (Mutex::new(objects), Mutex::new(written), Mutex::new(faults));
@@ -489,6 +506,7 @@ impl Problem {
             fault,
             faults,
             moved: AtomicUsize::new(0),
+            space,
             is_outdated: AtomicBool::new(false),
         })
     }

@@ -1,6 +1,7 @@
 //! Solvers and their solutions.
 
 use super::evaluation::{controls, solution as give};
+use super::policy::Policy;
 use super::problem::{Problem, lock};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
@@ -135,6 +136,22 @@ macro_rules! solver {
                 (!solution.timings.total.is_zero()).then(|| give(py, &self.problem, &problem, solution)).transpose()
             }
 
+            /// Publishes the last solution for the threads that call a policy.
+            ///
+            /// policy: a `Policy` of the same problem.
+            /// start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            ///     their present durations; an impact takes no time.
+            ///
+            /// Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+            /// the solution was not.
+            #[pyo3(signature = (policy, start=0.0))]
+            fn publish(&self, policy: &Bound<'_, Policy>, start: f64) -> PyResult<()> {
+                let problem = lock("problem", &self.problem.get().inner)?;
+                let solver = lock("solver", &self.solver)?;
+                let mut publisher = lock("policy", &policy.get().publisher)?;
+                publisher.publish(&problem, solver.solution(), start).map_err(problem_error)
+            }
+
             /// All settings by name, as a read-only mapping.
             ///
             /// An assignment of a mapping changes the settings that it names; the others stay. The next `solve` or
@@ -225,8 +242,8 @@ macro_rules! plain_solver {
                 /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
                 /// `Solution`.
                 ///
-                /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-                /// least one iteration.
+                /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes
+                /// at least one iteration.
                 ///
                 /// callback, verbose, progress: as for `solve`.
                 ///

@@ -238,6 +238,10 @@ impl KnotGroup for Constrained {
         self.action.knot_group().is_none_or(|group| group.has_controls_of(other))
     }
 
+    fn duration(&self, t: usize) -> Option<f64> {
+        self.action.knot_group()?.duration(t)
+    }
+
     fn dynamics_ref(&self) -> Option<&dyn Any> {
         self.action.knot_group()?.dynamics_ref()
     }

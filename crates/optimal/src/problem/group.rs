@@ -192,6 +192,12 @@ pub trait KnotGroup {
         None
     }
 
+    /// Returns the duration (s) of knot t, 0 for an impact; `None` for an action without a duration.
+    fn duration(&self, t: usize) -> Option<f64> {
+        let _ = t;
+        None
+    }
+
     /// Calls `show` for each vector that the dynamics of knot t compute in addition to the next state, with its name.
     fn show_outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         let _ = (t, x, u, show);

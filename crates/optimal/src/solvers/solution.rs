@@ -20,8 +20,9 @@ use std::time::Duration;
 ///   the dynamics,
 /// - after [`MaxIterations`](Self::MaxIterations), [`TimeLimit`](Self::TimeLimit),
 ///   [`Interrupted`](Self::Interrupted) and [`RegularisationLimit`](Self::RegularisationLimit), yes with care: the
-///   numbers are finite, but the trajectory may have gaps ([`Solution::gap`]), with x̄₀ ≠ x̂₀. The feedback then acts on the deviation from x̄₀. If the trace is
-///   empty, no iteration was made, and the gains are the gains of the solve before it,
+///   numbers are finite, but the trajectory may have gaps ([`Solution::gap`]), with x̄₀ ≠ x̂₀. The feedback then acts
+///   on the deviation from x̄₀. If the trace is empty, no iteration was made, and the gains are the gains of the solve
+///   before it,
 /// - after [`NotFinite`](Self::NotFinite), no: continue with the previous solution,
 /// - after [`ConstraintsViolated`](Self::ConstraintsViolated) and [`Infeasible`](Self::Infeasible), only if the
 ///   violation in [`Outcome::worst`](crate::Outcome::worst) is acceptable.

@@ -204,6 +204,17 @@ impl Problem {
         }
     }
 
+    /// Returns the duration (s) of knot t of a robot, 0 for an impact. Returns `None` for an action without a duration,
+    /// such as a user-defined one.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn duration(&self, t: usize) -> Option<f64> {
+        self.assert_running(t);
+        self.action(t).knot_group()?.duration(t)
+    }
+
     /// Returns the index of the model of each knot. Models added by [`set_knot`](Self::set_knot) have the indices after
     /// the models with which the problem was created.
     pub fn knot_models(&self) -> &[usize] {

@@ -383,6 +383,14 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         robot(&self.inner).zip(others).is_none_or(|(own, other)| own.has_controls_of(other))
     }
 
+    fn duration(&self, t: usize) -> Option<f64> {
+        match self.method {
+            Method::Terminal => None,
+            Method::Impact => Some(0.0),
+            _ => Some(*self.durations.at(t).at(t)),
+        }
+    }
+
     fn dynamics_ref(&self) -> Option<&dyn Any> {
         self.inner.robot()
     }
