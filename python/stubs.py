@@ -83,10 +83,10 @@ ARGUMENTS = {
         Model.with_damping.damping Model.with_damping.polynomial Model.with_friction.friction
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
         lower pi placement point rest stiffness
-        q q0 q1 r rotation target tau theta upper v velocity w x x0 x1 xs Residual.reference Model.effort
+        q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers Problem.set_references.values
-        Problem.set_entry_weights.weights""",
+        Problem.set_contact.kp Problem.set_entry_weights.weights""",
     "float | ArrayLike": "Problem.set_weight.weight",
     'Literal["full_step"]': "stop",
     "int | None": "_casadi_hold_knot.t",

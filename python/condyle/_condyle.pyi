@@ -3900,6 +3900,16 @@ class Residual:
         """Returns the deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
 
     @staticmethod
+    def heading_velocity(model: Model, frame: str | int, target: ArrayLike | None = None) -> Residual:
+        """Returns the deviation of a frame's velocity from a target in the frame's heading frame, r = Rz(ψ)ᵀ v − target, 6
+        numbers: forwards, to the left and up, then the rates about these axes. ψ is the heading of the frame's x axis,
+        and the z axis of the heading frame is vertical.
+
+        With `tilt`, and `frame_translation` with the weights (0, 0, w) for the height, this describes a walk that does
+        not depend on the place and the heading of the robot.
+        """
+
+    @staticmethod
     def own(
         size: int,
         calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
@@ -3945,6 +3955,12 @@ class Residual:
         """Returns the efforts of inverse dynamics in the directions without actuators: r = Nᵀτ, where Nᵀ S = 0 with the
         actuation matrix S. For a floating base, these are 6 numbers, the force on the base. The efforts are 0 in a
         feasible motion.
+        """
+
+    @staticmethod
+    def tilt(model: Model, frame: str | int, up: ArrayLike | None = None) -> Residual:
+        """Returns the tilt of a frame, r = Rᵀ e_z − up, 3 numbers: the vertical of the world along the frame's axes, minus
+        its desired value, a unit vector. None is (0, 0, 1), an upright frame. r does not depend on the heading.
         """
 
     @staticmethod

@@ -6,6 +6,7 @@ mod callers;
 mod distances;
 mod files;
 mod groups;
+mod heading;
 mod implicit;
 mod integrators;
 mod inverse;
