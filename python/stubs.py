@@ -116,7 +116,7 @@ ARGUMENTS = {
         facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping delta dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
+        bias damping delta dt eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
         regularisation
         restitution s smoothing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
@@ -225,7 +225,8 @@ RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Policy.__call__ Problem._between Problem.references Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
+        Policy.__call__ Problem._between Problem.references Problem.rollout Problem.x0
+        Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
@@ -278,7 +279,8 @@ RESULTS = {
         Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
-        Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot Problem.set_references
+        Problem.set_contact Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot
+        Problem.set_references
         Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",

@@ -3579,9 +3579,9 @@ class Policy:
     publishes a solution into memory that is not being read. `solver.publish(policy, start)` publishes the last solution
     of a solver.
 
-    `policy(t, x)` returns the controls at the time t (s), on the clock of `start`, and at the state x: nu numbers, moved
-    into the bounds of the knot. x̄ is the plan's state at the time t, interpolated between two knots; ū and K are the
-    controls and gains of the knot. If x has a number that is not finite, u is ū without feedback. Before the first
+    `policy(t, x)` returns the controls at the time t (s), on the clock of `start`, and at the state x: nu numbers,
+    moved into the bounds of the knot. x̄ is the plan's state at the time t, interpolated between two knots; ū and K are
+    the controls and gains of the knot. If x has a number that is not finite, u is ū without feedback. Before the first
     knot, x̄ is the first state; after the horizon, x̄ is the last state. A call raises `ProblemError` if no solution was
     published yet.
 
@@ -3698,6 +3698,27 @@ class Problem:
 
         Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
         between knots.
+        """
+
+    def set_contact(
+        self,
+        contact: str,
+        placement: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        kp: ArrayLike | None = None,
+        kd: float | None = None,
+    ) -> None:
+        """Changes targets and gains of the contact with this name at all knots that have it, without making new models.
+        Call this method between solves.
+
+        contact: the name of the contact.
+        placement, velocity, acceleration, kp, kd: as in `ContactConstraint`; None keeps the old value.
+
+        Contacts belong to the dynamics, which the knots of a stance share. Knots with another target, such as the next
+        foothold, need a model of their own.
+
+        Raises `KeyError` if no knot has this contact, and `ProblemError` for invalid numbers.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -3886,6 +3907,16 @@ class Residual:
         """Returns the rows r = A f of a friction cone, for a contact's force f."""
 
     @staticmethod
+    def heading_velocity(model: Model, frame: str | int, target: ArrayLike | None = None) -> Residual:
+        """Returns the deviation of a frame's velocity from a target in the frame's heading frame, r = Rz(ψ)ᵀ v − target, 6
+        numbers: forwards, to the left and up, then the rates about these axes. ψ is the heading of the frame's x axis,
+        and the z axis of the heading frame is vertical.
+
+        With `tilt`, and `frame_translation` with the weights (0, 0, w) for the height, this describes a walk that does
+        not depend on the place and the heading of the robot.
+        """
+
+    @staticmethod
     def impulse_center_of_mass() -> Residual:
         """Returns the jump of the centre of mass's velocity at an impact: r = J_c (v⁺ − v), 3 numbers (m/s), with the
         Jacobian J_c of the centre of mass and the velocity v⁺ after the impact.
@@ -3898,16 +3929,6 @@ class Residual:
     @staticmethod
     def joint_effort(reference: ArrayLike) -> Residual:
         """Returns the deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
-
-    @staticmethod
-    def heading_velocity(model: Model, frame: str | int, target: ArrayLike | None = None) -> Residual:
-        """Returns the deviation of a frame's velocity from a target in the frame's heading frame, r = Rz(ψ)ᵀ v − target, 6
-        numbers: forwards, to the left and up, then the rates about these axes. ψ is the heading of the frame's x axis,
-        and the z axis of the heading frame is vertical.
-
-        With `tilt`, and `frame_translation` with the weights (0, 0, w) for the height, this describes a walk that does
-        not depend on the place and the heading of the robot.
-        """
 
     @staticmethod
     def own(
@@ -3951,16 +3972,16 @@ class Residual:
         """Returns the deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
 
     @staticmethod
+    def tilt(model: Model, frame: str | int, up: ArrayLike | None = None) -> Residual:
+        """Returns the tilt of a frame, r = Rᵀ e_z − up, 3 numbers: the vertical of the world along the frame's axes, minus
+        its desired value, a unit vector. None is (0, 0, 1), an upright frame. r does not depend on the heading.
+        """
+
+    @staticmethod
     def undriven_effort() -> Residual:
         """Returns the efforts of inverse dynamics in the directions without actuators: r = Nᵀτ, where Nᵀ S = 0 with the
         actuation matrix S. For a floating base, these are 6 numbers, the force on the base. The efforts are 0 in a
         feasible motion.
-        """
-
-    @staticmethod
-    def tilt(model: Model, frame: str | int, up: ArrayLike | None = None) -> Residual:
-        """Returns the tilt of a frame, r = Rᵀ e_z − up, 3 numbers: the vertical of the world along the frame's axes, minus
-        its desired value, a unit vector. None is (0, 0, 1), an upright frame. r does not depend on the heading.
         """
 
     @staticmethod

@@ -312,8 +312,10 @@ class ContactConstraint(NamedTuple):
     """The other frame of the constraint; None is the world."""
     reference: Literal["local", "local_world_aligned"] = "local"
     """The axes of rows and forces: the axes of the frame or of the world."""
-    kp: float = 0.0
-    """The gain of the position error (1/s²)."""
+    kp: ArrayLike = 0.0
+    """The gain of the position error (1/s²): a number, or 3 or 6 numbers for the axes of `reference` (linear, then
+    angular). For example, (0, 0, kp) in "local_world_aligned" corrects only the height of a foot.
+    """
     kd: float = 0.0
     """The gain of the velocity error (1/s)."""
     placement: ArrayLike | None = None
@@ -651,12 +653,12 @@ class _Solution(NamedTuple):
     are from the previous solve. After "not_finite", continue with the previous solution. After
     "constraints_violated" and "infeasible", the violation in `outcome.worst` decides.
 
-    "full_step": `resume(stop="full_step")` accepted a step of length 1. "regularisation_limit": no acceptable step was found, away from a minimum. "constraints_violated": the penalty
-    reached its maximum, and limits do not hold at a minimum; this does not prove that no solution exists.
-    "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no solution
-    exists. `InteriorPoint` also ends with "infeasible" where no small change of the trajectory reduces the violation,
-    and with "constraints_violated" if its restoration did not reduce the violation enough. Another warm start may then
-    find a solution. `outcome.worst` contains the limit.
+    "full_step": `resume(stop="full_step")` accepted a step of length 1. "regularisation_limit": no acceptable step was
+    found, away from a minimum. "constraints_violated": the penalty reached its maximum, and limits do not hold at a
+    minimum; this does not prove that no solution exists. "infeasible": the initial state violates a limit of knot 0
+    that no control can change. This proves that no solution exists. `InteriorPoint` also ends with "infeasible" where
+    no small change of the trajectory reduces the violation, and with "constraints_violated" if its restoration did not
+    reduce the violation enough. Another warm start may then find a solution. `outcome.worst` contains the limit.
     """
     trace: list[Iteration]
     """The records of the iterations, one for each iteration."""

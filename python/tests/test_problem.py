@@ -586,6 +586,59 @@ def test_references_are_written_into_all_knots_at_once() -> None:
         changed.set_references("rest", rests)
     with pytest.raises(ProblemError, match=r"cost `pose`: its activation has no weights \(knot 0\)"):
         changed.set_entry_weights("pose", np.ones((3, 6)))
+    other = problem([Cost("own", 1.0, Residual.own(1, lambda t, x, u: x[:1]))], [])
     with pytest.raises(KeyError, match="the residual of the cost 'own' has no target"):
-        own = Residual.own(1, lambda t, x, u: x[:1])
-        problem([Cost("own", 1.0, own)], []).references("own")
+        other.references("own")
+
+
+def test_contacts_are_changed_in_place() -> None:
+    model = condyle.robots.quadruped()
+    x = np.r_[condyle.neutral(model), np.zeros(18)]
+    place = np.eye(4)
+    place[:3, 3] = [0.3, 0.2, 0.1]
+
+    def problem(**changes):
+        foot = condyle.ContactConstraint("LF_foot", "point", None, "local_world_aligned", **({"kd": 20.0} | changes))
+        other = condyle.ContactConstraint("RH_foot", "point")
+        effort = Cost("effort", 1.0, Residual.control(np.zeros(12)))
+        knots = [ContactDynamics(model, {"foot": foot, "other": other}, 0.02, [effort]), FreeDynamics(model, 0.02, [])]
+        return Problem(x, knots, [0, 1, 0], FreeDynamics(model, None, []))
+
+    us = np.full((3, 12), 0.3)
+    changed = problem()
+    before = changed.rollout(us)
+    changed.set_contact("foot", placement=place, kp=[0.0, 0.0, 50.0])
+    expected = problem(placement=place, kp=[0.0, 0.0, 50.0])
+    after = changed.rollout(us)
+    np.testing.assert_array_equal(after, expected.rollout(us))
+    assert (after != before).any()
+    text = changed.to_json()
+    assert '"kp":[0.0,0.0,50.0,0.0,0.0,0.0],"kd":20.0' in text and text == expected.to_json()
+    np.testing.assert_array_equal(Problem.from_json(text).rollout(us), after)
+    np.testing.assert_array_equal(Problem.from_json(text.replace("50.0,0.0,0.0,0.0]", "50.0]")).rollout(us), after)
+    changed.set_contact("foot", kp=3.0, kd=1.0)  # the placement stays
+    np.testing.assert_array_equal(changed.rollout(us), problem(placement=place, kp=3.0, kd=1.0).rollout(us))
+    with pytest.raises(KeyError, match="no knot has a contact 'hand'"):
+        changed.set_contact("hand", kd=1.0)
+    with pytest.raises(ProblemError, match="contact `foot`: kd must be a number of at least 0, found -1"):
+        changed.set_contact("foot", kd=-1.0)
+    with pytest.raises(ValueError, match="kp: expected a number, or 3 or 6 numbers, found 2"):
+        changed.set_contact("foot", kp=[1.0, 2.0])
+
+
+def test_velocity_and_tilt_do_not_depend_on_the_heading() -> None:
+    def costs(yaw):
+        x = STANDING.copy()
+        x[3:7] = [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
+        x[19:25] = [0.5, 0.1, 0.0, 0.0, 0.0, 0.2]  # along the axes of the body
+        terms = [
+            Cost("moves", 1.0, Residual.heading_velocity(QUADRUPED, "root_joint", [0.4, 0.1, 0.0, 0.0, 0.0, 0.0])),
+            Cost("leans", 1.0, Residual.tilt(QUADRUPED, "root_joint")),
+        ]
+        problem = Problem(x, [FreeDynamics(QUADRUPED, 0.02, [])], [0], FreeDynamics(QUADRUPED, None, terms))
+        return problem.evaluate(np.tile(x, (2, 1)), np.zeros((1, 12))).cost
+
+    assert costs(0.0) == pytest.approx(0.5 * (0.1**2 + 0.2**2))
+    assert costs(2.0) == pytest.approx(costs(0.0))
+    with pytest.raises(ProblemError, match="its desired vertical has the length 2, expected 1"):
+        FreeDynamics(QUADRUPED, None, [Cost("leans", 1.0, Residual.tilt(QUADRUPED, "root_joint", [0.0, 0.0, 2.0]))])

@@ -110,7 +110,11 @@ def test_a_barrier_keeps_controls_inside_their_bounds() -> None:
     bound = 0.8 * np.abs(free.us).max()
     effort = Residual.control(np.zeros(7))
     barrier = Activation.relaxed_barrier(np.full(7, -bound), np.full(7, bound), 1e-3, 1e-2)
-    terms = [Cost("rest", 1e-1, Residual.state(xs[0])), Cost("effort", 1e-4, effort), Cost("most", 1.0, effort, barrier)]
+    terms = [
+        Cost("rest", 1e-1, Residual.state(xs[0])),
+        Cost("effort", 1e-4, effort),
+        Cost("most", 1.0, effort, barrier),
+    ]
     arm = condyle.robots.arm7()
     end = [terms[0], Cost("reach", 1e3, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))]
     knot = FreeDynamics(arm, 0.05, terms)

@@ -14,9 +14,9 @@ use std::sync::{Mutex, PoisonError};
 /// publishes a solution into memory that is not being read. `solver.publish(policy, start)` publishes the last solution
 /// of a solver.
 ///
-/// `policy(t, x)` returns the controls at the time t (s), on the clock of `start`, and at the state x: nu numbers, moved
-/// into the bounds of the knot. x̄ is the plan's state at the time t, interpolated between two knots; ū and K are the
-/// controls and gains of the knot. If x has a number that is not finite, u is ū without feedback. Before the first
+/// `policy(t, x)` returns the controls at the time t (s), on the clock of `start`, and at the state x: nu numbers,
+/// moved into the bounds of the knot. x̄ is the plan's state at the time t, interpolated between two knots; ū and K are
+/// the controls and gains of the knot. If x has a number that is not finite, u is ū without feedback. Before the first
 /// knot, x̄ is the first state; after the horizon, x̄ is the last state. A call raises `ProblemError` if no solution was
 /// published yet.
 ///

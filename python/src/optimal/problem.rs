@@ -10,6 +10,7 @@ use super::residuals::take_written;
 use super::robot_action::{Boxed, Described, WrittenAt, change, knot_of};
 use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
+use crate::constrained::{aim, gains};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;
 use crate::signals::{self, Interruptions, Signals};
@@ -292,6 +293,48 @@ impl Problem {
     fn set_entry_weights(&self, name: &str, weights: &Bound<'_, PyAny>) -> PyResult<()> {
         self.is_outdated.store(true, Ordering::Relaxed);
         references::set_entry_weights(&mut *lock("problem", &self.inner)?, name, weights)
+    }
+
+    /// Changes targets and gains of the contact with this name at all knots that have it, without making new models.
+    /// Call this method between solves.
+    ///
+    /// contact: the name of the contact.
+    /// placement, velocity, acceleration, kp, kd: as in `ContactConstraint`; None keeps the old value.
+    ///
+    /// Contacts belong to the dynamics, which the knots of a stance share. Knots with another target, such as the next
+    /// foothold, need a model of their own.
+    ///
+    /// Raises `KeyError` if no knot has this contact, and `ProblemError` for invalid numbers.
+    #[pyo3(signature = (contact, placement=None, velocity=None, acceleration=None, kp=None, kd=None))]
+    fn set_contact(
+        &self,
+        contact: &str,
+        placement: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        acceleration: Option<&Bound<'_, PyAny>>,
+        kp: Option<&Bound<'_, PyAny>>,
+        kd: Option<f64>,
+    ) -> PyResult<()> {
+        let mut read = condyle::constraints::Target::identity();
+        aim(&mut read, placement, velocity, acceleration)?;
+        let kp = kp.map(gains).transpose()?;
+        let change = |to: &mut condyle::ContactConstraint| {
+            to.target.placement = placement.map_or(to.target.placement, |_| read.placement);
+            to.target.velocity = velocity.map_or(to.target.velocity, |_| read.velocity);
+            to.target.acceleration = acceleration.map_or(to.target.acceleration, |_| read.acceleration);
+            (to.kp, to.kp_axes) = kp.unwrap_or((to.kp, to.kp_axes));
+            to.kd = kd.unwrap_or(to.kd);
+        };
+        if !lock("problem", &self.inner)?.change_contacts(contact, change).map_err(problem_error)? {
+            return Err(PyKeyError::new_err(format!("no knot has a contact '{contact}'")));
+        }
+        let mut described = lock("problem", &self.described)?;
+        for described in described.iter_mut().flatten().map(Arc::make_mut) {
+            if let Some(own) = described.knot.contact_mut(contact) {
+                change(&mut own.constraint);
+            }
+        }
+        Ok(())
     }
 
     /// Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs

@@ -1,9 +1,10 @@
 //! References of a whole horizon: targets and weights of one cost term at all knots, changed in place.
 
 use super::cost_access::{CostMut, terms_of};
+use super::dynamics::robot::robot_of;
 use super::residuals::target::Target;
 use crate::{Error, Problem};
-use condyle_dynamics::{Force, Mat3, Motion, Se3, Vec3};
+use condyle_dynamics::{ContactConstraint, Force, Mat3, Motion, Se3, Vec3};
 
 impl Target<'_> {
     /// Returns the number of entries in which [`Problem::set_references`] gives a target of this kind.
@@ -151,6 +152,47 @@ impl Problem {
         let n = weights.len() / rows;
         Error::check_length("weights", weights.len(), n.max(1) * rows)?;
         self.change_rows(name, |t, cost| cost.set_entry_weights(&weights[t * n..][..n]))
+    }
+
+    /// Changes targets and gains of the contact called `name` at all knots that have it. Returns whether a knot has it.
+    /// Allocates nothing.
+    ///
+    /// Contacts belong to the dynamics, which the knots of a stance share. Give knots with other targets, such as the
+    /// next foothold, a model of their own.
+    ///
+    /// ```
+    /// # use condyle_dynamics::{ContactConstraint, Vec3, robots};
+    /// # use condyle_optimal::Problem;
+    /// # use condyle_optimal::robot::{Contact, ContactDynamics, FreeDynamics};
+    /// # let model = std::sync::Arc::new(robots::quadruped());
+    /// # let x0 = [vec![0.0; 6], vec![1.0], vec![0.0; 30]].concat();
+    /// # let foot = Contact::new("LF_foot", ContactConstraint::point(model.frame("LF_foot")?));
+    /// # let knot = Box::new(ContactDynamics::running(model.clone(), &[foot], 0.02, vec![])?);
+    /// # let end = Box::new(FreeDynamics::terminal(model, vec![])?);
+    /// # let mut problem = Problem::new(x0, vec![knot], vec![0; 5], end)?;
+    /// problem.change_contacts("LF_foot", |contact| {
+    ///     contact.target.placement.translation = Vec3::new(0.3, 0.2, 0.0);
+    ///     contact.kp_axes = Some([0.0, 0.0, 100.0, 0.0, 0.0, 0.0]); // only the height is corrected
+    /// })?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Contact`] if a target or gain is invalid, or if anything else than target and gains changed. The
+    /// contact then stays as it was.
+    pub fn change_contacts(
+        &mut self,
+        name: &str,
+        mut change: impl FnMut(&mut ContactConstraint),
+    ) -> Result<bool, Error> {
+        let mut found = false;
+        self.each_action(&mut |action| {
+            if let Some(robot) = robot_of(action) {
+                found |= robot.change_contact(name, &mut change)?;
+            }
+            Ok(())
+        })?;
+        Ok(found)
     }
 
     /// Returns the targets of the cost called `name` at all knots, as [`set_references`](Self::set_references) takes

@@ -416,3 +416,51 @@ fn weights_of_all_knots_are_written_at_once() {
     let expected = values(&mut problem([cost(2.0, 5.0), cost(3.0, 6.0), cost(4.0, 7.0)]));
     assert_eq!(values(&mut changed), expected);
 }
+
+/// Checks that a problem whose contacts were changed equals a problem created with these contacts, also in groups.
+#[test]
+fn contacts_are_changed_in_place() {
+    let mut rng = StdRng::seed_from_u64(31);
+    let model = Arc::new(robots::quadruped());
+    let problem = |kp_axes: Option<[f64; 6]>, place: Vec3<f64>| {
+        let mut contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+        (contacts[0].constraint.kp_axes, contacts[0].constraint.target.placement.translation) = (kp_axes, place);
+        let knot = |effort: f64| {
+            let cost = Cost::new("u", effort, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic);
+            let knot = ContactDynamics::running(model.clone(), &contacts, DT, vec![cost]).unwrap();
+            Box::new(knot) as Box<dyn ActionModel>
+        };
+        let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
+        Problem::new(xs_of(&model), vec![knot(1.0), knot(2.0)], vec![0, 0, 1, 1, 0, 1], Box::new(end)).unwrap()
+    };
+    let xs: Vec<f64> = (0..7).flat_map(|_| random_state(&model, &mut rng)).collect();
+    let us = random(6 * 12, 5.0, &mut rng);
+    let run = |problem: &mut Problem| {
+        let (mut next, mut costs) = (vec![0.0; 6 * 37], vec![0.0; 7]);
+        problem.calc(&xs, &us, &mut next, &mut costs);
+        let mut knots = problem.lq_knots();
+        problem.calc_diff(&xs, &us, &mut knots);
+        let slopes: Vec<_> = knots[..6].iter().flat_map(|knot| [knot.A.clone(), knot.B.clone()]).collect();
+        (next, slopes)
+    };
+    let (gains, place) = ([0.0, 3.0, 90.0, 0.0, 0.0, 0.0], Vec3::new(0.3, 0.2, 0.1));
+    let mut changed = problem(None, Vec3::zero());
+    let before = run(&mut changed);
+    let name = feet(&model, ReferenceFrame::Local)[0].name.clone();
+    let found = changed.change_contacts(&name, |contact| {
+        (contact.kp_axes, contact.target.placement.translation) = (Some(gains), place);
+    });
+    assert!(found.unwrap() && !changed.change_contacts("hand", |_| {}).unwrap());
+    let after = run(&mut changed);
+    assert_eq!(after, run(&mut problem(Some(gains), place)));
+    assert_ne!(after.0, before.0);
+    let wrong = changed.change_contacts(&name, |contact| contact.kd = -1.0).unwrap_err().to_string();
+    assert!(wrong.contains("kd must be a number of at least 0, found -1"), "{wrong}");
+    let wrong = changed.change_contacts(&name, |contact| contact.frame = 0).unwrap_err().to_string();
+    assert!(wrong.contains("only its target and its gains may be changed"), "{wrong}");
+    assert_eq!(run(&mut changed), after);
+}
+
+fn xs_of(model: &Model) -> Vec<f64> {
+    [neutral(model), vec![0.0; model.nv()]].concat()
+}

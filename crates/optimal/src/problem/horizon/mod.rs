@@ -303,6 +303,19 @@ impl Problem {
         self.copies.each_of(action, own, visit)
     }
 
+    /// Calls `visit` for each action, the terminal one last, and for the copies that other threads use, until `visit`
+    /// returns an error.
+    pub(crate) fn each_action<E>(
+        &mut self,
+        visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for (k, action) in self.models.actions.iter_mut().enumerate() {
+            visit(&mut **action)?;
+            self.copies.each_of(k, 0, visit)?;
+        }
+        visit(&mut *self.terminal)
+    }
+
     /// Returns the number of models.
     pub(crate) fn model_count(&self) -> usize {
         self.models.len()

@@ -21,8 +21,8 @@ use crate::robot::state::{GroupHessian, groups};
 use crate::{ActionModel, Error};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics, gravity, integrate,
-    integrate_jacobian_groups, neutral,
+    ConstraintSet, ContactConstraint, Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics,
+    gravity, integrate, integrate_jacobian_groups, neutral,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, SimdToken};
@@ -255,6 +255,45 @@ impl RobotDynamics {
             | DynamicsKind::Impact { contacts, .. } => contacts,
             _ => &[],
         }
+    }
+
+    /// Changes target and gains of the contact called `name` by `change`, in the contacts and in the workspace. Returns
+    /// whether the contact exists. Allocates nothing.
+    pub(crate) fn change_contact(
+        &mut self,
+        name: &str,
+        change: &mut dyn FnMut(&mut ContactConstraint),
+    ) -> Result<bool, Error> {
+        let Self { model, kind, work, .. } = self;
+        let contacts = match kind {
+            DynamicsKind::Contact(contacts, _)
+            | DynamicsKind::ContactInverse(contacts, _)
+            | DynamicsKind::Impact { contacts, .. } => contacts,
+            _ => return Ok(false),
+        };
+        let Some(k) = contacts.iter().position(|contact| contact.name == name) else { return Ok(false) };
+        let wrong = |what| Err(Error::Contact { name: name.to_owned(), what });
+        let (old, mut new) = (contacts[k].constraint, contacts[k].constraint);
+        change(&mut new);
+        let ContactConstraint { kp, kp_axes, kd, target, .. } = new;
+        if new != (ContactConstraint { kp, kp_axes, kd, target, ..old }) {
+            return wrong("only its target and its gains may be changed".to_owned());
+        }
+        if let Err(error) = ConstraintSet::<f64>::check_all(model, &[new]) {
+            return match error {
+                condyle_dynamics::Error::Constraint { what, .. } => wrong(what),
+                other => wrong(other.to_string()),
+            };
+        }
+        contacts[k].constraint = new;
+        if let Some(Work { single, vectors, .. }) = work.made_mut() {
+            single.set_contact(k, &new);
+            if let Some(VectorBatches { short, long }) = vectors {
+                short.set_contact(k, &new);
+                long.iter_mut().for_each(|long| long.set_contact(k, &new));
+            }
+        }
+        Ok(true)
     }
 
     /// Returns whether the knots are impacts.
