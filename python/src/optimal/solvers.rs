@@ -303,7 +303,8 @@ Fddp, set_fddp, show_fddp {
     /// `Solution`.
     ///
     /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
-    /// iteration.
+    /// iteration. If the last solve ran out of time or iterations after a rejected step, the regularisation starts at
+    /// its last value, otherwise at `regularisation_start`.
     ///
     /// stop: "full_step" ends the solve when a step of length 1 is accepted, with the status "full_step". This is the
     ///     mode for model predictive control. After the state has moved, the warm start has a gap at x₀. Shorter steps

@@ -283,7 +283,8 @@ impl PolicyPublisher {
         us.clone_from(&solution.us);
         K.clear();
         solution.K.iter().for_each(|gains| K.extend_from_slice(gains.as_slice()));
-        (lower.clear(), upper.clear());
+        lower.clear();
+        upper.clear();
         for knot in 0..shape.horizon() {
             match problem.action(knot).bounds(knot) {
                 Some(bounds) => (lower.extend_from_slice(bounds.0), upper.extend_from_slice(bounds.1)),

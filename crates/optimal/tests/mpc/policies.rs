@@ -7,10 +7,16 @@ use condyle_optimal::robot::{
 };
 use condyle_optimal::{ActionModel, Error, Fddp, PolicyPublisher, Problem, Solution};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
 
 /// Tolerance of two results that are rounded differently.
 const ROUNDING: f64 = 1e-12;
+/// Number of threads that read plans, and number of changes of the plan that each of them must see.
+const READERS: usize = 3;
+const CHANGES: usize = 20;
+/// Time after which a reader that has not seen these changes is a fault. They take some milliseconds on free cores.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// Returns a problem of an arm with knots of 0.02 s and 0.05 s, and a solution of the problem.
 fn arm(effort: f64) -> (Problem, Solution) {
@@ -173,32 +179,36 @@ fn readers_find_whole_plans_while_others_are_published() {
         .collect();
     assert_ne!(expected[0], expected[1]);
     let ended = AtomicBool::new(false);
+    // readers that have found both plans many times; the scheduler decides how long that takes
+    let content = AtomicUsize::new(0);
     std::thread::scope(|scope| {
-        let readers: Vec<_> = (0..3)
-            .map(|_| {
-                let (mut policy, ended, expected, x) = (publisher.policy(), &ended, &expected, &x);
-                scope.spawn(move || {
-                    let (mut seen, mut u) = ([0_usize; 2], vec![0.0; 7]);
-                    while !ended.load(Ordering::Relaxed) {
-                        for (k, t) in times.iter().enumerate() {
-                            policy.control(*t, x, &mut u).unwrap();
-                            let which = (0..2).find(|&plan| expected[plan][k] == u);
-                            seen[which.expect("is one of the two plans")] += 1;
-                        }
+        for _ in 0..READERS {
+            let (mut policy, ended, content, expected, x) = (publisher.policy(), &ended, &content, &expected, &x);
+            scope.spawn(move || {
+                let (mut changes, mut before, mut is_content, mut u) = (0, 0, false, vec![0.0; 7]);
+                while !ended.load(Ordering::Relaxed) {
+                    for (k, t) in times.iter().enumerate() {
+                        policy.control(*t, x, &mut u).unwrap();
+                        let which = (0..2).find(|&plan| expected[plan][k] == u).expect("is one of the two plans");
+                        changes += usize::from(which != before);
+                        before = which;
                     }
-                    seen
-                })
-            })
-            .collect();
-        for k in 0..20_000 {
+                    if changes >= CHANGES && !is_content {
+                        is_content = true;
+                        content.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
+            });
+        }
+        let begin = Instant::now();
+        let mut k = 0;
+        while (content.load(Ordering::Relaxed) < READERS && begin.elapsed() < PATIENCE) || k % 2 == 1 {
             publisher.publish(problem, &plans[k % 2].1, 0.0).unwrap();
+            k += 1;
         }
         ended.store(true, Ordering::Relaxed);
-        for reader in readers {
-            let seen = reader.join().unwrap();
-            assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
-        }
     });
+    assert_eq!(content.load(Ordering::Relaxed), READERS, "a reader keeps an old plan");
     let (mut policy, mut u) = (publisher.policy(), vec![0.0; 7]);
     policy.control(times[0], &x, &mut u).unwrap();
     assert_eq!(u, expected[1][0]); // the last plan
