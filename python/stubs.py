@@ -83,10 +83,14 @@ ARGUMENTS = {
         Model.with_damping.damping Model.with_damping.polynomial Model.with_friction.friction
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
         lower pi placement point rest stiffness
-        q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
+        q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
-        InteriorPoint.set_multipliers.values""",
+        InteriorPoint.set_multipliers.values Problem.set_references.values
+        Problem.set_contact.kp Problem.set_entry_weights.weights""",
+    "float | ArrayLike": "Problem.set_weight.weight",
+    'Literal["full_step"]': "stop",
+    "int | None": "_casadi_hold_knot.t",
     "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
@@ -110,12 +114,12 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
-        facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps
+        facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
+        bias damping delta dt eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
         regularisation
-        restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
+        restitution s smoothing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings",
@@ -170,6 +174,7 @@ ARGUMENTS = {
     "Sequence[int] | None": "knot_models",
     "_Controls": "us",
     "Problem": "problem",
+    "Policy": "policy",
     # functions whose arguments are arrays of floats, or arrays of numbers that carry their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
     "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
@@ -201,7 +206,6 @@ ARGUMENTS = {
     "Any": """
         _borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model
         Model.from_mujoco.model""",
-    "int | None": "_casadi_hold_knot.t",
     "list[str]": "names _generate.frames inputs",
     "list[ContactConstraint]": "_generate.constraints",
 }
@@ -214,13 +218,16 @@ SETTABLE = {  # properties that can be assigned, with the type of the value
     "Fddp.settings": "Mapping[str, Any]",
 }
 
+SIGNATURES = {"Policy.__call__": "($self, t, x)"}  # of methods whose signatures the interpreter does not report
+
 RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
+        Policy.__call__ Problem._between Problem.references Problem.rollout Problem.x0
+        Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
@@ -243,7 +250,7 @@ RESULTS = {
         HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
         distance kinetic_energy mechanical_energy potential_energy
         FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Task.weight""",
-    "float | None": "FrictionContact.yaw_friction Joint.pitch",
+    "float | None": "FrictionContact.yaw_friction Joint.pitch Policy.end",
     "tuple[float, float]": "Plan.span",
     "Data": "_SpelledData._ours",
     "int": """
@@ -268,11 +275,13 @@ RESULTS = {
     "None": """
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
-        AugmentedLagrangian.set_multipliers AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target
-        Fddp.shift InteriorPoint.set_multipliers InteriorPoint.shift Ltdl.factorize
+        AugmentedLagrangian.publish AugmentedLagrangian.set_multipliers AugmentedLagrangian.shift
+        Cholesky.factorize ConstraintSet.set_target Fddp.publish Fddp.shift InteriorPoint.publish
+        InteriorPoint.set_multipliers InteriorPoint.shift Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
-        Problem.set_costs Problem.set_duration Problem.set_knot
+        Problem.set_contact Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot
+        Problem.set_references
         Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",
@@ -401,7 +410,8 @@ class Writer:
         """Writes a function, a method of the class `owner`, or the constructor of this class."""
         constructor = name == "__new__"
         full = owner if constructor else f"{owner}.{name}".lstrip(".")
-        arguments = ast.parse(f"def f{item.__text_signature__.replace('$self', 'self')}: ...").body[0].args
+        signature = SIGNATURES.get(full, item.__text_signature__)
+        arguments = ast.parse(f"def f{signature.replace('$self', 'self')}: ...").body[0].args
         positional = arguments.posonlyargs + arguments.args
         names = [argument.arg for argument in positional]
         static = owner != "" and not constructor and names[:1] != ["self"]

@@ -92,6 +92,7 @@ __all__ = [
     "NotPhysicalError",
     "ParseError",
     "Plan",
+    "Policy",
     "Problem",
     "ProblemError",
     "Residual",
@@ -2710,6 +2711,21 @@ class Activation:
         """Returns the quadratic cost ½ Σ rᵢ²."""
 
     @staticmethod
+    def relaxed_barrier(lower: ArrayLike, upper: ArrayLike, mu: float, delta: float) -> Activation:
+        """Returns the relaxed logarithmic barrier Σ β(d) of the distances d = rᵢ − lowerᵢ and d = upperᵢ − rᵢ to all
+        finite bounds. β(d) = −μ log(d/δ) for d ≥ δ, and ½ μ (((d − 2δ)/δ)² − 1) for d < δ, where a bound is near or
+        violated.
+
+        β is convex and twice continuously differentiable. It has curvature inside the bounds too, so a step towards a
+        bound that is not yet reached becomes more expensive; `barrier` has none there. β(δ) = 0, so the value does not
+        depend on the unit of r. Source: Feller and Ebenbauer, 2017.
+
+        lower, upper: the bounds, infinite for no bound; `cone.bounds()` for a cone.
+        mu: μ > 0, in the unit of the cost; at the distance d ≥ δ the slope is μ/d.
+        delta: δ > 0, in the unit of r.
+        """
+
+    @staticmethod
     def smooth1(epsilon: float = 1.0) -> Activation:
         """Returns the smooth cost Σ √(ε + rᵢ²), approximately Σ |rᵢ|."""
 
@@ -2821,14 +2837,25 @@ class AugmentedLagrangian:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> AugmentedLagrangian: ...
+    def publish(self, policy: Policy, start: float = 0.0) -> None:
+        """Publishes the last solution for the threads that call a policy.
+
+        policy: a `Policy` of the same problem.
+        start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            their present durations; an impact takes no time.
+
+        Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+        the solution was not.
+        """
+
     def resume(
         self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
     ) -> Solution:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-        least one iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes
+        at least one iteration.
 
         callback, verbose, progress: as for `solve`.
 
@@ -2853,9 +2880,10 @@ class AugmentedLagrangian:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from this control. At
-        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-        repeated controls would diverge.
+        model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+        before. If a robot's contacts change there, the last control holds the last state but one still, as
+        `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+        step in between, the last state is repeated, because a rollout with repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3129,15 +3157,39 @@ class Fddp:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
+    def publish(self, policy: Policy, start: float = 0.0) -> None:
+        """Publishes the last solution for the threads that call a policy.
+
+        policy: a `Policy` of the same problem.
+        start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            their present durations; an impact takes no time.
+
+        Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+        the solution was not.
+        """
+
     def resume(
-        self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
+        self,
+        callback: Callable[[Iteration], object] | None = None,
+        verbose: bool = False,
+        progress: bool = False,
+        *,
+        stop: Literal["full_step"] | None = None,
+        most: int | None = None,
     ) -> Solution:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-        least one iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
+        iteration. If the last solve ran out of time or iterations after a rejected step, the regularisation starts at
+        its last value, otherwise at `regularisation_start`.
 
+        stop: "full_step" ends the solve when a step of length 1 is accepted, with the status "full_step". This is the
+            mode for model predictive control. After the state has moved, the warm start has a gap at x₀. Shorter steps
+            of length α keep the fraction 1 − α of each gap, and gaps may grow from period to period. A step of length 1
+            closes all gaps. None (default) iterates until the solve has converged.
+        most: the maximum number of iterations, at least 1; None (default) takes `max_iterations` of the settings. Only
+            with `stop`.
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
@@ -3148,9 +3200,10 @@ class Fddp:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from this control. At
-        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-        repeated controls would diverge.
+        model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+        before. If a robot's contacts change there, the last control holds the last state but one still, as
+        `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+        step in between, the last state is repeated, because a rollout with repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3403,14 +3456,25 @@ class InteriorPoint:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> InteriorPoint: ...
+    def publish(self, policy: Policy, start: float = 0.0) -> None:
+        """Publishes the last solution for the threads that call a policy.
+
+        policy: a `Policy` of the same problem.
+        start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            their present durations; an impact takes no time.
+
+        Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+        the solution was not.
+        """
+
     def resume(
         self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
     ) -> Solution:
         """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
         `Solution`.
 
-        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-        least one iteration.
+        With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes
+        at least one iteration.
 
         callback, verbose, progress: as for `solve`.
 
@@ -3436,9 +3500,10 @@ class InteriorPoint:
 
         `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
         limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-        model has for all knots. The last control is repeated, and the last state follows from this control. At
-        a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-        repeated controls would diverge.
+        model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+        before. If a robot's contacts change there, the last control holds the last state but one still, as
+        `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+        step in between, the last state is repeated, because a rollout with repeated controls would diverge.
 
         last: the index of the new last knot's model.
 
@@ -3535,6 +3600,42 @@ class Lqr:
     ) -> Lqr: ...
 
 @final
+class Policy:
+    """The feedback u = ū + K (x ⊖ x̄) of the last published solution, as a function of time and state.
+
+    Another thread can call the policy at its own rate while a solve runs, without waiting for the solve: the solver
+    publishes a solution into memory that is not being read. `solver.publish(policy, start)` publishes the last solution
+    of a solver.
+
+    `policy(t, x)` returns the controls at the time t (s), on the clock of `start`, and at the state x: nu numbers,
+    moved into the bounds of the knot. x̄ is the plan's state at the time t, interpolated between two knots; ū and K are
+    the controls and gains of the knot. If x has a number that is not finite, u is ū without feedback. Before the first
+    knot, x̄ is the first state; after the horizon, x̄ is the last state. A call raises `ProblemError` if no solution was
+    published yet.
+
+    problem: the problem that the solver solves, of a robot.
+
+    Raises `ProblemError` if the terminal model does not belong to a robot.
+
+    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Policy, Problem, Residual
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> knot = FreeDynamics(arm, 0.02, [Cost("effort", 1.0, Residual.control(np.zeros(7)))])
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [Cost("rest", 1.0, Residual.state(x0))]))
+    >>> solver, policy = Fddp(problem), Policy(problem)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7)))
+    >>> solver.publish(policy, start=3.0)
+    >>> policy(3.01, x0 + 1e-3).shape
+    (7,)
+    """
+
+    def __new__(cls, problem: Problem) -> Policy: ...
+    @property
+    def end(self) -> float | None:
+        """The time of the end of the published plan (s); None before the first plan. A plan is too old after this time."""
+
+    def __call__(self, t: float, x: ArrayLike) -> _Array: ...
+
+@final
 class Problem:
     """An optimal control problem: a sequence of knots that begins at the state x0, and a terminal knot. Each knot has one
     of the models.
@@ -3572,6 +3673,9 @@ class Problem:
     def x0(self) -> _Array:
         """The initial state, nx numbers; `set_x0` sets it."""
 
+    def _between(self, x0: ArrayLike, x1: ArrayLike, s: float) -> _Array:
+        """Computes the state at a fraction of the way from x0 to x1. Locks nothing, so it can run during a solve."""
+
     def _evaluate(self, xs: ArrayLike, us: _Controls, moved: int) -> Evaluation:
         """Computes the evaluation of a solution; an error if the horizon was shifted after the solve."""
 
@@ -3608,6 +3712,13 @@ class Problem:
         xs: states, (N + 1, nx).
         """
 
+    def references(self, name: str) -> _Array:
+        """Returns the targets of the cost with this name at all knots: a copy of shape (N + 1, n) for a target of n
+        numbers, (N + 1, 3, 3) for rotations, and (N + 1, 4, 4) for placements. Rows of knots without this cost are NaN.
+
+        Raises `KeyError` if no knot has this cost, or if its residual has no target.
+        """
+
     def rollout(self, us: _Controls) -> _Array:
         """Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
@@ -3615,6 +3726,27 @@ class Problem:
 
         Other threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, stops the rollout
         between knots.
+        """
+
+    def set_contact(
+        self,
+        contact: str,
+        placement: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        kp: ArrayLike | None = None,
+        kd: float | None = None,
+    ) -> None:
+        """Changes targets and gains of the contact with this name at all knots that have it, without making new models.
+        Call this method between solves.
+
+        contact: the name of the contact.
+        placement, velocity, acceleration, kp, kd: as in `ContactConstraint`; None keeps the old value.
+
+        Contacts belong to the dynamics, which the knots of a stance share. Knots with another target, such as the next
+        foothold, need a model of their own.
+
+        Raises `KeyError` if no knot has this contact, and `ProblemError` for invalid numbers.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
@@ -3637,6 +3769,17 @@ class Problem:
         Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
         """
 
+    def set_entry_weights(self, name: str, weights: ArrayLike) -> None:
+        """Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or
+        `weighted_barrier`, at all knots. Call this method between solves.
+
+        name: the name of the cost.
+        weights: the weights, (N + 1, n); otherwise as for `set_references`.
+
+        Raises `KeyError` if no knot has this cost, and `ProblemError` if its activation has no weights, or a weight is
+        negative or not finite.
+        """
+
     def set_knot(self, knot: int, model: _Action) -> None:
         """Replaces the model of a knot, as an MPC does when a contact is made earlier than planned. Call this method
         between solves. The solver's next iterations do not allocate.
@@ -3648,9 +3791,28 @@ class Problem:
         Raises `ProblemError` if the model does not fit.
         """
 
-    def set_weight(self, name: str, weight: float) -> None:
+    def set_references(self, name: str, values: ArrayLike) -> None:
+        """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
+        each period, between solves.
+
+        name: the name of the cost.
+        values: the targets, in the shape that `references` returns. Row t belongs to knot t, and row N to the terminal
+            knot. Rows of knots without this cost are ignored.
+
+        A knot that shares its costs with other knots first gets separate costs with the same terms. They move with the
+        knot in a `shift`. Later calls write in place and allocate nothing; 25 knots of a quadruped take a few
+        microseconds.
+
+        Raises `KeyError` as `references` does, and `ProblemError` if a target is not finite or not a rotation. Then the
+        knots before the one in the message have their new targets.
+        """
+
+    def set_weight(self, name: str, weight: float | ArrayLike) -> None:
         """Changes the weight of all cost terms with this name, in all knots including the terminal knot. Call this method
         between solves.
+
+        weight: the weight of all knots, or N + 1 weights, one for each knot. Weights of knots without the term are
+            ignored. With one weight for each knot, each knot gets separate costs, as in `set_references`.
 
         Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
         """
@@ -3773,6 +3935,16 @@ class Residual:
         """Returns the rows r = A f of a friction cone, for a contact's force f."""
 
     @staticmethod
+    def heading_velocity(model: Model, frame: str | int, target: ArrayLike | None = None) -> Residual:
+        """Returns the deviation of a frame's velocity from a target in the frame's heading frame, r = Rz(ψ)ᵀ v − target, 6
+        numbers: forwards, to the left and up, then the rates about these axes. ψ is the heading of the frame's x axis,
+        and the z axis of the heading frame is vertical.
+
+        With `tilt`, and `frame_translation` with the weights (0, 0, w) for the height, this describes a walk that does
+        not depend on the place and the heading of the robot.
+        """
+
+    @staticmethod
     def impulse_center_of_mass() -> Residual:
         """Returns the jump of the centre of mass's velocity at an impact: r = J_c (v⁺ − v), 3 numbers (m/s), with the
         Jacobian J_c of the centre of mass and the velocity v⁺ after the impact.
@@ -3826,6 +3998,12 @@ class Residual:
     @staticmethod
     def state(reference: ArrayLike) -> Residual:
         """Returns the deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
+
+    @staticmethod
+    def tilt(model: Model, frame: str | int, up: ArrayLike | None = None) -> Residual:
+        """Returns the tilt of a frame, r = Rᵀ e_z − up, 3 numbers: the vertical of the world along the frame's axes, minus
+        its desired value, a unit vector. None is (0, 0, 1), an upright frame. r does not depend on the heading.
+        """
 
     @staticmethod
     def undriven_effort() -> Residual:

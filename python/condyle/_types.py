@@ -312,8 +312,10 @@ class ContactConstraint(NamedTuple):
     """The other frame of the constraint; None is the world."""
     reference: Literal["local", "local_world_aligned"] = "local"
     """The axes of rows and forces: the axes of the frame or of the world."""
-    kp: float = 0.0
-    """The gain of the position error (1/s²)."""
+    kp: ArrayLike = 0.0
+    """The gain of the position error (1/s²): a number, or 3 or 6 numbers for the axes of `reference` (linear, then
+    angular). For example, (0, 0, kp) in "local_world_aligned" corrects only the height of a foot.
+    """
     kd: float = 0.0
     """The gain of the velocity error (1/s)."""
     placement: ArrayLike | None = None
@@ -634,6 +636,7 @@ class _Solution(NamedTuple):
     """Whether the trajectory satisfies the dynamics."""
     status: Literal[
         "converged",
+        "full_step",
         "max_iterations",
         "time_limit",
         "interrupted",
@@ -644,17 +647,36 @@ class _Solution(NamedTuple):
     ]
     """The reason why the solve ended.
 
-    "regularisation_limit": no acceptable step was found, away from a minimum. "constraints_violated": the penalty
-    reached its maximum, and limits do not hold at a minimum; this does not prove that no solution exists.
-    "infeasible": the initial state violates a limit of knot 0 that no control can change. This proves that no solution
-    exists. `InteriorPoint` also ends with "infeasible" where no small change of the trajectory reduces the violation,
-    and with "constraints_violated" if its restoration did not reduce the violation enough. Another warm start may then
-    find a solution. `outcome.worst` contains the limit.
+    A controller may execute the solution, with u = ū + K (x ⊖ x̄), after "converged" and "full_step": the trajectory
+    then begins at x̂₀ and has no gaps. After "max_iterations", "time_limit", "interrupted" and "regularisation_limit",
+    all numbers are finite, but the trajectory may have gaps, and x̄₀ may differ from x̂₀. If `trace` is empty, the gains
+    are from the previous solve. After "not_finite", continue with the previous solution. After
+    "constraints_violated" and "infeasible", the violation in `outcome.worst` decides.
+
+    "full_step": `resume(stop="full_step")` accepted a step of length 1. "regularisation_limit": no acceptable step was
+    found, away from a minimum. "constraints_violated": the penalty reached its maximum, and limits do not hold at a
+    minimum; this does not prove that no solution exists. "infeasible": the initial state violates a limit of knot 0
+    that no control can change. This proves that no solution exists. `InteriorPoint` also ends with "infeasible" where
+    no small change of the trajectory reduces the violation, and with "constraints_violated" if its restoration did not
+    reduce the violation enough. Another warm start may then find a solution. `outcome.worst` contains the limit.
     """
     trace: list[Iteration]
     """The records of the iterations, one for each iteration."""
     timings: Timings
     """The durations of the phases of the solve."""
+
+
+class PlanPoint(NamedTuple):
+    """A plan at one time, as `Solution.at` returns it."""
+
+    knot: int
+    """The index of the knot."""
+    x: _Array
+    """The state x̄, interpolated between the states of this knot and of the next one, nx numbers."""
+    u: _Array
+    """The controls ū of the knot, nu numbers."""
+    K: _Array
+    """The feedback gains of the knot, (nu, ndx)."""
 
 
 @disjoint_base
@@ -666,6 +688,29 @@ class Solution(_Solution):
 
     _source: Any = None
     _evaluation: Evaluation | None = None
+    _times: _Array | None = None
+
+    def at(self, t: float) -> PlanPoint:
+        """Returns the plan at the time t (s) after the beginning of knot 0, as a `PlanPoint`.
+
+        The state is x̄ = xₖ ⊕ s (xₖ₊₁ ⊖ xₖ) at the fraction s of knot k. The controls and gains belong to knot k,
+        because they are constant during a knot. Times outside the horizon give its first or its last state. An impact
+        takes no time. Another thread can call this method while a solve runs.
+
+        Raises `ValueError` if a knot has no duration: a knot of an `Action`.
+        """
+        if self._source is None:
+            raise AttributeError("this solution was copied from its problem, which interpolates states")
+        if (times := self._times) is None:
+            raise ValueError("a knot has no duration: only knots of robots have durations")
+        last = len(times) - 2
+        knot = int(np.searchsorted(times[1 : last + 1], t, side="right"))
+        span = times[knot + 1] - times[knot]
+        s = min(max((t - times[knot]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+        while len(self.us[knot]) == 0 and knot > 0:
+            knot, s = knot - 1, 1.0
+        x = self._source[0]._between(self.xs[knot], self.xs[knot + 1], s)
+        return PlanPoint(knot, x, self.us[knot], self.K[knot])
 
     def _evaluated(self) -> Evaluation:
         if self._evaluation is None:
@@ -923,6 +968,7 @@ def _repr(self: Any) -> str:
 _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",
+    "PlanPoint": "optimal",
     "Solution": "optimal",
     "Evaluation": "optimal",
     "SweepResult": "optimal",

@@ -1,6 +1,6 @@
 //! Dynamics under constraints: one Python type or function for each type or function of the library.
 
-use crate::arrays::{Give, array, class, found_type, named_tuples, pose, rotation};
+use crate::arrays::{Give, array, class, found_type, named_tuples, numbers, pose, rotation};
 use crate::data::{Holds, Scratch};
 use crate::exceptions::{ModelError, exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
@@ -57,11 +57,24 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
     }
     constraint.other = optional("other")?.map(|other| frame_index(model, &other)).transpose()?;
     constraint.reference = Reference::read("reference", given.getattr("reference")?.extract()?, model)?;
-    constraint.kp = given.getattr("kp")?.extract()?;
+    (constraint.kp, constraint.kp_axes) = gains(&given.getattr("kp")?)?;
     constraint.kd = given.getattr("kd")?.extract()?;
     let (placement, velocity) = (optional("placement")?, optional("velocity")?);
     aim(&mut constraint.target, placement.as_ref(), velocity.as_ref(), optional("acceleration")?.as_ref())?;
     Ok(constraint)
+}
+
+/// Reads the gain of the position error: a number, three linear gains, or three linear and three angular gains.
+pub(crate) fn gains(kp: &Bound<'_, PyAny>) -> PyResult<(f64, Option<[f64; 6]>)> {
+    if let Ok(kp) = kp.extract() {
+        return Ok((kp, None));
+    }
+    let each = numbers("kp", kp)?;
+    match *each.as_slice() {
+        [x, y, z] => Ok((0.0, Some([x, y, z, 0.0, 0.0, 0.0]))),
+        [x, y, z, a, b, c] => Ok((0.0, Some([x, y, z, a, b, c]))),
+        _ => Err(PyValueError::new_err(format!("kp: expected a number, or 3 or 6 numbers, found {}", each.len()))),
+    }
 }
 
 /// Returns the constraints of a model by name: `ContactConstraint`s and `Coupling`s of `condyle._types`.
@@ -91,7 +104,7 @@ pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult
 }
 
 /// Changes those members of a target that are given.
-fn aim(
+pub(crate) fn aim(
     target: &mut Target<f64>,
     placement: Option<&Bound<'_, PyAny>>,
     velocity: Option<&Bound<'_, PyAny>>,

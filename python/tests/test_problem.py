@@ -484,7 +484,7 @@ KINDS: dict[str, Any] = {
     "Cost of a cone": lambda: Cost("a", 2.0, Residual.friction_cone("foot", FrictionCone(0.7))),
     "Limit": lambda: Limit("a", Residual.control([0.0]), lower=[-1.0]),
     "Limit, equality": lambda: Limit("a", Residual.control([0.0])),
-    "Activation": lambda: Activation.barrier([-np.inf], [1.0]),
+    "Activation": lambda: Activation.relaxed_barrier([-np.inf], [1.0], 0.1, 5.0),
     "Residual": lambda: Residual.frame_translation(ARM, "tool", [1.0, 2.0, 3.0]),
     "Problem": gait,
     "Problem of all kinds": lambda: reach()[0],
@@ -525,3 +525,120 @@ def test_a_problem_of_actions_of_ones_own_pickles() -> None:
 
 def falling(t: Any, x: Any, u: Any) -> Any:
     return u - x[7:], 0.5 * (u @ u)
+
+
+def test_references_are_written_into_all_knots_at_once() -> None:
+    arm = condyle.robots.arm7()
+    x0 = np.r_[np.full(7, 0.1), np.zeros(7)]
+    rest = Cost("rest", 0.1, Residual.state(x0), Activation.weighted(np.ones(14)))
+    pose = Cost("pose", 1.0, Residual.frame_placement(arm, "tool", np.eye(4)))
+    turn = Cost("turn", 1.0, Residual.frame_rotation(arm, "tool", np.eye(3)))
+
+    def problem(*at):
+        knots = [FreeDynamics(arm, 0.05, list(costs)) for costs in at[:-1]]
+        return Problem(x0, knots, None, FreeDynamics(arm, None, list(at[-1])))
+
+    changed = problem([rest, pose, turn], [rest, pose, turn], [rest])
+    rests = np.linspace(0.0, 1.0, 3 * 14).reshape(3, 14)
+    poses = np.stack([np.eye(4)] * 3)
+    poses[:, :3, 3] = [[0.1, 0.2, 0.3], [0.2, 0.3, 0.4], [np.nan] * 3]  # the terminal knot has no pose
+    poses[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    changed.set_references("rest", rests)
+    changed.set_references("pose", poses)
+    changed.set_references("turn", poses[:, :3, :3])
+    changed.set_weight("rest", [1.0, 2.0, 3.0])
+    weights = np.linspace(1.0, 2.0, 3 * 14).reshape(3, 14)
+    changed.set_entry_weights("rest", weights)
+    np.testing.assert_array_equal(changed.references("rest"), rests)
+    np.testing.assert_array_equal(changed.references("pose")[:2], poses[:2])
+    assert changed.references("turn").shape == (3, 3, 3) and np.isnan(changed.references("pose")[2]).all()
+    expected = problem(
+        *(
+            [
+                Cost("rest", 1.0 + t, Residual.state(rests[t]), Activation.weighted(weights[t])),
+                *(
+                    (
+                        Cost("pose", 1.0, Residual.frame_placement(arm, "tool", poses[t])),
+                        Cost("turn", 1.0, Residual.frame_rotation(arm, "tool", poses[t, :3, :3])),
+                    )
+                    if t < 2
+                    else ()
+                ),
+            ]
+            for t in range(3)
+        )
+    )
+    xs, us = np.full((3, 14), 0.2), np.full((2, 7), 0.3)
+    same = expected.evaluate(xs, us).costs
+    np.testing.assert_array_equal(changed.evaluate(xs, us).costs, same)
+    for copy in (Problem.from_json(changed.to_json()), pickle.loads(pickle.dumps(changed))):
+        np.testing.assert_array_equal(copy.evaluate(xs, us).costs, same)
+        np.testing.assert_array_equal(copy.references("rest"), rests)
+    changed.set_references("rest", rests + 1.0)  # another change after the text was written
+    again = Problem.from_json(changed.to_json())
+    np.testing.assert_array_equal(again.references("rest"), rests + 1.0)
+    with pytest.raises(KeyError, match="no knot has a cost 'reach'"):
+        changed.set_references("reach", rests)
+    with pytest.raises(ValueError, match=r"values: expected shape \(3, 14\), found \(2, 14\)"):
+        changed.set_references("rest", rests[:2])
+    rests[1, 2] = np.inf
+    with pytest.raises(ProblemError, match=r"cost `rest`: its reference holds an infinite number \(knot 1\)"):
+        changed.set_references("rest", rests)
+    with pytest.raises(ProblemError, match=r"cost `pose`: its activation has no weights \(knot 0\)"):
+        changed.set_entry_weights("pose", np.ones((3, 6)))
+    other = problem([Cost("own", 1.0, Residual.own(1, lambda t, x, u: x[:1]))], [])
+    with pytest.raises(KeyError, match="the residual of the cost 'own' has no target"):
+        other.references("own")
+
+
+def test_contacts_are_changed_in_place() -> None:
+    model = condyle.robots.quadruped()
+    x = np.r_[condyle.neutral(model), np.zeros(18)]
+    place = np.eye(4)
+    place[:3, 3] = [0.3, 0.2, 0.1]
+
+    def problem(**changes):
+        foot = condyle.ContactConstraint("LF_foot", "point", None, "local_world_aligned", **({"kd": 20.0} | changes))
+        other = condyle.ContactConstraint("RH_foot", "point")
+        effort = Cost("effort", 1.0, Residual.control(np.zeros(12)))
+        knots = [ContactDynamics(model, {"foot": foot, "other": other}, 0.02, [effort]), FreeDynamics(model, 0.02, [])]
+        return Problem(x, knots, [0, 1, 0], FreeDynamics(model, None, []))
+
+    us = np.full((3, 12), 0.3)
+    changed = problem()
+    before = changed.rollout(us)
+    changed.set_contact("foot", placement=place, kp=[0.0, 0.0, 50.0])
+    expected = problem(placement=place, kp=[0.0, 0.0, 50.0])
+    after = changed.rollout(us)
+    np.testing.assert_array_equal(after, expected.rollout(us))
+    assert (after != before).any()
+    text = changed.to_json()
+    assert '"kp":[0.0,0.0,50.0,0.0,0.0,0.0],"kd":20.0' in text and text == expected.to_json()
+    np.testing.assert_array_equal(Problem.from_json(text).rollout(us), after)
+    np.testing.assert_array_equal(Problem.from_json(text.replace("50.0,0.0,0.0,0.0]", "50.0]")).rollout(us), after)
+    changed.set_contact("foot", kp=3.0, kd=1.0)  # the placement stays
+    np.testing.assert_array_equal(changed.rollout(us), problem(placement=place, kp=3.0, kd=1.0).rollout(us))
+    with pytest.raises(KeyError, match="no knot has a contact 'hand'"):
+        changed.set_contact("hand", kd=1.0)
+    with pytest.raises(ProblemError, match="contact `foot`: kd must be a number of at least 0, found -1"):
+        changed.set_contact("foot", kd=-1.0)
+    with pytest.raises(ValueError, match="kp: expected a number, or 3 or 6 numbers, found 2"):
+        changed.set_contact("foot", kp=[1.0, 2.0])
+
+
+def test_velocity_and_tilt_do_not_depend_on_the_heading() -> None:
+    def costs(yaw):
+        x = STANDING.copy()
+        x[3:7] = [0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)]
+        x[19:25] = [0.5, 0.1, 0.0, 0.0, 0.0, 0.2]  # along the axes of the body
+        terms = [
+            Cost("moves", 1.0, Residual.heading_velocity(QUADRUPED, "root_joint", [0.4, 0.1, 0.0, 0.0, 0.0, 0.0])),
+            Cost("leans", 1.0, Residual.tilt(QUADRUPED, "root_joint")),
+        ]
+        problem = Problem(x, [FreeDynamics(QUADRUPED, 0.02, [])], [0], FreeDynamics(QUADRUPED, None, terms))
+        return problem.evaluate(np.tile(x, (2, 1)), np.zeros((1, 12))).cost
+
+    assert costs(0.0) == pytest.approx(0.5 * (0.1**2 + 0.2**2))
+    assert costs(2.0) == pytest.approx(costs(0.0))
+    with pytest.raises(ProblemError, match="its desired vertical has the length 2, expected 1"):
+        FreeDynamics(QUADRUPED, None, [Cost("leans", 1.0, Residual.tilt(QUADRUPED, "root_joint", [0.0, 0.0, 2.0]))])

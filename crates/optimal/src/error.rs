@@ -228,10 +228,13 @@ fn model_name(model: Option<usize>) -> String {
 impl Error {
     /// Returns `Ok` if `found` has `expected` entries, all of them finite.
     pub(crate) fn check(name: &'static str, found: &[f64], expected: usize) -> Result<(), Self> {
-        if found.len() != expected {
-            return Err(Self::Length { name, expected, found: found.len() });
-        }
+        Self::check_length(name, found.len(), expected)?;
         Self::check_finite(name, found)
+    }
+
+    /// Returns `Ok` if the length of an argument is the expected one.
+    pub(crate) fn check_length(name: &'static str, found: usize, expected: usize) -> Result<(), Self> {
+        if found == expected { Ok(()) } else { Err(Self::Length { name, expected, found }) }
     }
 
     /// Returns `Ok` if `found` is at most `most`.

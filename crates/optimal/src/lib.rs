@@ -98,7 +98,8 @@ pub use problem::{
 };
 pub use solvers::{
     AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, InteriorPoint, InteriorPointSettings, Iteration,
-    LimitRows, Observer, Outcome, Settings, Solution, Status, Timings, Verdict, Violation, ViolationKind,
+    LimitRows, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution, StateSpace,
+    Status, Timings, Verdict, Violation, ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

@@ -11,7 +11,9 @@ use condyle_optimal::robot::{
     FreeDynamics, FrictionCone, GenericResidual, Geometry, GeometryPair, ImpulseDynamics, Integrator, Limit,
     OwnResidual, Residual, RobotState, Shape,
 };
-use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, Problem, Status, Sweep};
+use condyle_optimal::{
+    AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, PolicyPublisher, Problem, Status, Sweep,
+};
 use condyle_spatial::Scalar;
 use counting::{allocated, allocations};
 
@@ -172,7 +174,10 @@ fn a_gait_allocates_nothing() {
     let force = Residual::ContactForce { contact: contact(), target: Force::zero() };
     let pushing = [
         driven(),
-        vec![Cost::new("grip", 1e-2, grip, Activation::Barrier { lower, upper }), quadratic("force", 1e-6, force)],
+        vec![
+            Cost::new("grip", 1e-2, grip, Activation::RelaxedBarrier { lower, upper, mu: 0.1, delta: 5.0 }),
+            quadratic("force", 1e-6, force),
+        ],
     ]
     .concat();
     let landing = [standing(), vec![quadratic("jump", 1e-2, Residual::ImpulseCenterOfMass)]].concat();
@@ -211,6 +216,87 @@ fn a_gait_allocates_nothing() {
         })
     });
     assert_eq!(count, 0);
+}
+
+/// Checks that shifts do not allocate where the contacts of the last knot change, which then gets a quasi-static
+/// control. Policies allocate nothing, either.
+#[test]
+fn a_shift_to_other_contacts_allocates_nothing() {
+    let model = std::sync::Arc::new(robots::quadruped());
+    let x0 = [neutral(&model), vec![0.0; model.nv()]].concat();
+    let knots = [&["LF_foot", "RH_foot"][..], &["RF_foot", "LH_foot"], &[]].map(|feet| {
+        let contact = |foot: &&str| Contact::new(foot, ContactConstraint::point(model.frame(foot).unwrap()));
+        let contacts: Vec<_> = feet.iter().map(contact).collect();
+        let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic);
+        let knot = ContactDynamics::running(model.clone(), &contacts, 0.01, vec![effort]).unwrap();
+        Box::new(knot) as Box<dyn condyle_optimal::ActionModel>
+    });
+    let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
+    let mut problem = Problem::new(x0.clone(), knots.into(), vec![0; 4], Box::new(end)).unwrap();
+    let us = problem.quasi_static(&x0.repeat(5)).unwrap();
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 1;
+    solver.solve(&mut problem, &x0.repeat(5), &us).unwrap();
+    let mut publisher = PolicyPublisher::new(&problem).unwrap();
+    let (mut policy, mut u) = (publisher.policy(), [0.0; 12]);
+    publisher.publish(&problem, solver.solution(), 0.0).unwrap();
+    policy.control(0.0, &x0, &mut u).unwrap();
+    for last in [0, 1, 2, 0, 2, 1] {
+        let count = allocations(|| {
+            problem.shift(last).unwrap();
+            solver.shift(&mut problem).unwrap();
+            solver.resume(&mut problem).unwrap();
+            publisher.publish(&problem, solver.solution(), 0.0).unwrap();
+            policy.control(0.015, &x0, &mut u).unwrap();
+        });
+        assert_eq!(count, 0, "model {last}");
+    }
+}
+
+/// Checks that new references of all knots allocate nothing in a loop that shifts the horizon, also with copies of
+/// actions for a second thread, which get the same references.
+#[test]
+fn references_of_a_moving_horizon_allocate_nothing() {
+    let arm = std::sync::Arc::new(robots::arm7());
+    let x0 = vec![0.1; 14];
+    let knot = |weight: f64| {
+        let follow = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.3, 0.0, 0.5) };
+        let costs = vec![
+            Cost::new("follow", weight, follow, Activation::Quadratic),
+            Cost::new("rest", 0.1, Residual::State { reference: x0.clone() }, Activation::Weighted(vec![1.0; 14])),
+            Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic),
+        ];
+        let knot = FreeDynamics::running(arm.clone(), 0.02, costs).unwrap();
+        Box::new(knot) as Box<dyn condyle_optimal::ActionModel>
+    };
+    let end = FreeDynamics::terminal(arm.clone(), vec![]).unwrap();
+    let mut problem = Problem::new(x0.clone(), vec![knot(1.0), knot(2.0)], vec![0; 8], Box::new(end)).unwrap();
+    let (mut solver, us) = (Fddp::new(&problem), vec![0.0; 56]);
+    let mut same = problem.try_clone().unwrap();
+    let mut other = Fddp::new(&same);
+    (solver.settings.max_iterations, other.settings.max_iterations) = (2, 2);
+    solver.settings.threads = 2;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    pool.install(|| solver.solve(&mut problem, &x0.repeat(9), &us).map(drop)).unwrap();
+    other.solve(&mut same, &x0.repeat(9), &us).unwrap();
+    let mut counts = Vec::new();
+    for tick in 0..24 {
+        let numbers: Vec<f64> =
+            (0..9).flat_map(|t| [0.3 + 0.1 * (0.2 * f64::from(tick + t)).sin(), 0.0, 0.5]).collect();
+        let weights: Vec<f64> = (0..9).map(|t| 1.0 + f64::from((tick + t) % 3)).collect();
+        let last = usize::from(tick % 3 == 0);
+        let run = |problem: &mut Problem, solver: &mut Fddp| {
+            problem.shift(last).unwrap();
+            solver.shift(problem).unwrap();
+            assert!(problem.set_references("follow", &numbers).unwrap());
+            assert!(problem.set_weights("rest", &weights).unwrap());
+            solver.resume(problem).unwrap();
+        };
+        counts.push(pool.install(|| allocations(|| run(&mut problem, &mut solver))));
+        run(&mut same, &mut other);
+        assert_eq!(solver.solution().xs, other.solution().xs, "tick {tick}");
+    }
+    assert_eq!(counts[12..], [0; 12], "{counts:?}");
 }
 
 /// Checks that changes of multipliers, bounds and penalties do not allocate.

@@ -3,8 +3,12 @@
 #[path = "mpc/budgets.rs"]
 mod budgets;
 mod common;
+#[path = "mpc/policies.rs"]
+mod policies;
 #[path = "mpc/recovery.rs"]
 mod recovery;
+#[path = "mpc/trot.rs"]
+mod trot;
 
 use common::{HANGING, Linear, cartpole, random, random_knot, random_matrix, straight};
 use condyle_dynamics::{Vec3, robots};
@@ -91,6 +95,36 @@ fn a_closed_loop_stands_up_to_pushes() {
         assert!(x[1].abs() < 0.6, "step {step}: {x:?}");
     }
     assert!(x[1].abs() < 0.05 && x[3].abs() < 0.1, "{x:?}");
+}
+
+/// Checks that a solve which ends with the first full step makes the same iterations as any other solve, to the bit.
+#[test]
+fn a_solve_to_the_first_full_step_makes_the_iterations_of_every_solve() {
+    let mut problem = cartpole(&HANGING, 50, 1);
+    let mut solver = Fddp::new(&problem);
+    solver.settings.max_iterations = 0;
+    solver.solve(&mut problem, &straight(&HANGING, &[0.0; 4], 50), &[0.0; 50]).unwrap();
+    let mut other = solver.clone();
+    let mut made = 0;
+    let solution = solver
+        .resume_to_full_step_with(&mut problem, 40, |iteration: &Iteration| made = iteration.iteration + 1)
+        .unwrap()
+        .clone();
+    assert_eq!((solution.status, solution.trace.len(), solution.gap), (Status::FullStep, made, 0.0));
+    assert_eq!(solution.x(0), HANGING);
+    let (last, short) = solution.trace.split_last().unwrap();
+    assert!(last.step == 1.0 && last.accepted && !short.is_empty());
+    assert!(short.iter().all(|iteration| iteration.step < 1.0 || !iteration.accepted));
+    // fewer iterations than the full step needs
+    let mut few = other.clone();
+    let early = few.resume_to_full_step(&mut problem, short.len()).unwrap();
+    assert_eq!((early.status, &early.trace[..]), (Status::MaxIterations, short));
+    assert!(early.gap > 0.0);
+    assert_eq!(few.resume_to_full_step(&mut problem, 0).unwrap().trace.len(), 1); // at least one iteration
+    other.settings.max_iterations = made;
+    let expected = other.resume(&mut problem).unwrap();
+    assert_eq!((expected.status, &expected.trace), (Status::MaxIterations, &solution.trace));
+    assert_eq!((&expected.xs, &expected.us, &expected.K), (&solution.xs, &solution.us, &solution.K));
 }
 
 #[test]

@@ -56,6 +56,12 @@ fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
         Cost::new("limits", 2.0, Residual::State { reference }, barrier(2 * nv)),
         Cost::new("effort", 0.1, Residual::Control { reference: random(nu, 1.0, rng) }, Activation::Quadratic),
         Cost::new("effort limits", 0.7, Residual::Control { reference: vec![0.0; nu] }, barrier(nu)),
+        Cost::new(
+            "effort barrier",
+            0.6,
+            Residual::Control { reference: vec![0.0; nu] },
+            Activation::RelaxedBarrier { lower: vec![-3.0; nu], upper: vec![4.0; nu], mu: 0.8, delta: 0.5 },
+        ),
         Cost::new("pose", 1.5, Residual::FramePlacement { frame: frame.clone(), target }, Activation::Quadratic),
         Cost::new(
             "place",

@@ -44,6 +44,23 @@ impl Activation {
         Ok(Self(robot::Activation::WeightedBarrier { lower, upper, weights }))
     }
 
+    /// Returns the relaxed logarithmic barrier Σ β(d) of the distances d = rᵢ − lowerᵢ and d = upperᵢ − rᵢ to all
+    /// finite bounds. β(d) = −μ log(d/δ) for d ≥ δ, and ½ μ (((d − 2δ)/δ)² − 1) for d < δ, where a bound is near or
+    /// violated.
+    ///
+    /// β is convex and twice continuously differentiable. It has curvature inside the bounds too, so a step towards a
+    /// bound that is not yet reached becomes more expensive; `barrier` has none there. β(δ) = 0, so the value does not
+    /// depend on the unit of r. Source: Feller and Ebenbauer, 2017.
+    ///
+    /// lower, upper: the bounds, infinite for no bound; `cone.bounds()` for a cone.
+    /// mu: μ > 0, in the unit of the cost; at the distance d ≥ δ the slope is μ/d.
+    /// delta: δ > 0, in the unit of r.
+    #[staticmethod]
+    fn relaxed_barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>, mu: f64, delta: f64) -> PyResult<Self> {
+        let (lower, upper) = (numbers("lower", lower)?, numbers("upper", upper)?);
+        Ok(Self(robot::Activation::RelaxedBarrier { lower, upper, mu, delta }))
+    }
+
     /// Returns the sum Σ rᵢ, for residuals that are costs themselves: see `Residual.own_cost`.
     #[staticmethod]
     fn sum() -> Self {

@@ -131,5 +131,14 @@ pub(super) fn solution<'py>(
     ))?;
     // the solution computes accelerations, efforts and forces on request, from this problem and this number of shifts
     solution.setattr("_source", (of.clone_ref(py), of.get().moved()))?;
+    // the times at which knots begin, if all knots have a duration
+    let mut time = 0.0;
+    let mut times = vec![0.0];
+    for knot in 0..horizon {
+        let Some(duration) = problem.duration(knot) else { return Ok(solution) };
+        time += duration;
+        times.push(time);
+    }
+    solution.setattr("_times", times.give(py, None)?)?;
     Ok(solution)
 }

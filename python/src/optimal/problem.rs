@@ -5,10 +5,12 @@ use super::costs::Cost;
 use super::evaluation::{by_knot, controls, evaluate, gaps};
 use super::models::{boxed, residuals};
 use super::own::{Fault, faults};
+use super::references;
 use super::residuals::take_written;
 use super::robot_action::{Boxed, Described, WrittenAt, change, knot_of};
 use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
+use crate::constrained::{aim, gains};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;
 use crate::signals::{self, Interruptions, Signals};
@@ -18,7 +20,7 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use rust::Observer;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Locks a value; returns an error if another call holds the lock.
@@ -57,6 +59,11 @@ pub(crate) struct Problem {
     faults: Mutex<Vec<Fault>>,
     /// Number of times that the horizon was shifted.
     moved: AtomicUsize,
+    /// States of a robot's problem, which need no lock. `None` for other problems, whose Python functions only
+    /// `objects` reports to the garbage collector.
+    pub(super) space: Option<rust::StateSpace>,
+    /// Whether costs were changed in place, so that the descriptions of the models contain old numbers.
+    is_outdated: AtomicBool,
 }
 
 #[pymethods]
@@ -111,6 +118,7 @@ impl Problem {
     /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
     /// different robots.
     fn to_json(&self) -> PyResult<String> {
+        self.describe()?;
         let problem = lock("problem", &self.inner)?;
         let described = lock("problem", &self.described)?;
         let models = described.len() - 1;
@@ -147,6 +155,7 @@ impl Problem {
     /// JSON, other knots as the objects that the user passed.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
+        this.describe()?;
         let described = lock("problem", &this.described)?;
         let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
         let mut parts = Vec::new();
@@ -227,9 +236,16 @@ impl Problem {
     /// Changes the weight of all cost terms with this name, in all knots including the terminal knot. Call this method
     /// between solves.
     ///
+    /// weight: the weight of all knots, or N + 1 weights, one for each knot. Weights of knots without the term are
+    ///     ignored. With one weight for each knot, each knot gets separate costs, as in `set_references`.
+    ///
     /// Raises `KeyError` if no term has this name, and `ProblemError` if the weight is negative or not finite.
-    fn set_weight(&self, name: &str, weight: f64) -> PyResult<()> {
+    fn set_weight(&self, name: &str, weight: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
+        let Ok(weight) = weight.extract::<f64>() else {
+            self.is_outdated.store(true, Ordering::Relaxed);
+            return references::set_weights(&mut problem, name, weight);
+        };
         let mut described = lock("problem", &self.described)?;
         let mut found = false;
         for k in (0..described.len() - 1).map(Some).chain([None]) {
@@ -238,6 +254,87 @@ impl Problem {
         }
         described.iter_mut().flatten().for_each(|described| Arc::make_mut(described).set_weight(name, weight));
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
+    }
+
+    /// Returns the targets of the cost with this name at all knots: a copy of shape (N + 1, n) for a target of n
+    /// numbers, (N + 1, 3, 3) for rotations, and (N + 1, 4, 4) for placements. Rows of knots without this cost are NaN.
+    ///
+    /// Raises `KeyError` if no knot has this cost, or if its residual has no target.
+    fn references<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        references::get(py, &mut *lock("problem", &self.inner)?, name)
+    }
+
+    /// Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
+    /// each period, between solves.
+    ///
+    /// name: the name of the cost.
+    /// values: the targets, in the shape that `references` returns. Row t belongs to knot t, and row N to the terminal
+    ///     knot. Rows of knots without this cost are ignored.
+    ///
+    /// A knot that shares its costs with other knots first gets separate costs with the same terms. They move with the
+    /// knot in a `shift`. Later calls write in place and allocate nothing; 25 knots of a quadruped take a few
+    /// microseconds.
+    ///
+    /// Raises `KeyError` as `references` does, and `ProblemError` if a target is not finite or not a rotation. Then the
+    /// knots before the one in the message have their new targets.
+    fn set_references(&self, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.is_outdated.store(true, Ordering::Relaxed);
+        references::set(&mut *lock("problem", &self.inner)?, name, values)
+    }
+
+    /// Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or
+    /// `weighted_barrier`, at all knots. Call this method between solves.
+    ///
+    /// name: the name of the cost.
+    /// weights: the weights, (N + 1, n); otherwise as for `set_references`.
+    ///
+    /// Raises `KeyError` if no knot has this cost, and `ProblemError` if its activation has no weights, or a weight is
+    /// negative or not finite.
+    fn set_entry_weights(&self, name: &str, weights: &Bound<'_, PyAny>) -> PyResult<()> {
+        self.is_outdated.store(true, Ordering::Relaxed);
+        references::set_entry_weights(&mut *lock("problem", &self.inner)?, name, weights)
+    }
+
+    /// Changes targets and gains of the contact with this name at all knots that have it, without making new models.
+    /// Call this method between solves.
+    ///
+    /// contact: the name of the contact.
+    /// placement, velocity, acceleration, kp, kd: as in `ContactConstraint`; None keeps the old value.
+    ///
+    /// Contacts belong to the dynamics, which the knots of a stance share. Knots with another target, such as the next
+    /// foothold, need a model of their own.
+    ///
+    /// Raises `KeyError` if no knot has this contact, and `ProblemError` for invalid numbers.
+    #[pyo3(signature = (contact, placement=None, velocity=None, acceleration=None, kp=None, kd=None))]
+    fn set_contact(
+        &self,
+        contact: &str,
+        placement: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        acceleration: Option<&Bound<'_, PyAny>>,
+        kp: Option<&Bound<'_, PyAny>>,
+        kd: Option<f64>,
+    ) -> PyResult<()> {
+        let mut read = condyle::constraints::Target::identity();
+        aim(&mut read, placement, velocity, acceleration)?;
+        let kp = kp.map(gains).transpose()?;
+        let change = |to: &mut condyle::ContactConstraint| {
+            to.target.placement = placement.map_or(to.target.placement, |_| read.placement);
+            to.target.velocity = velocity.map_or(to.target.velocity, |_| read.velocity);
+            to.target.acceleration = acceleration.map_or(to.target.acceleration, |_| read.acceleration);
+            (to.kp, to.kp_axes) = kp.unwrap_or((to.kp, to.kp_axes));
+            to.kd = kd.unwrap_or(to.kd);
+        };
+        if !lock("problem", &self.inner)?.change_contacts(contact, change).map_err(problem_error)? {
+            return Err(PyKeyError::new_err(format!("no knot has a contact '{contact}'")));
+        }
+        let mut described = lock("problem", &self.described)?;
+        for described in described.iter_mut().flatten().map(Arc::make_mut) {
+            if let Some(own) = described.knot.contact_mut(contact) {
+                change(&mut own.constraint);
+            }
+        }
+        Ok(())
     }
 
     /// Replaces the costs of a single knot, for example by costs with new targets of an MPC. In a `shift`, these costs
@@ -297,6 +394,7 @@ impl Problem {
     ///
     /// Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
     fn set_duration(&self, py: Python<'_>, knot: usize, dt: f64) -> PyResult<()> {
+        self.describe()?;
         let described = {
             let (problem, described) = (lock("problem", &self.inner)?, lock("problem", &self.described)?);
             problem.knot_models().get(knot).and_then(|&k| described[k].as_deref().cloned())
@@ -354,6 +452,19 @@ impl Problem {
             return Err(ProblemError::new_err(what));
         }
         self.evaluate(py, xs, us)
+    }
+
+    /// Computes the state at a fraction of the way from x0 to x1. Locks nothing, so it can run during a solve.
+    fn _between<'py>(&self, x0: &Bound<'py, PyAny>, x1: &Bound<'py, PyAny>, s: f64) -> PyResult<Bound<'py, PyAny>> {
+        let Some(space) = &self.space else {
+            return Err(ProblemError::new_err(
+                "terminal: expected an action of a robot, whose states are interpolated",
+            ));
+        };
+        let py = x0.py();
+        let (x0, x1) = (vector("x0", x0, space.nx())?, vector("x1", x1, space.nx())?);
+        let mut dx = vec![0.0; space.ndx()];
+        output(py, None, &[space.nx()], |x| space.between([&x0, &x1], s, &mut dx, x))
     }
 
     /// Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
@@ -426,10 +537,21 @@ impl Problem {
         let end = actions.pop().expect("the terminal one is there");
         let problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
         let described: Vec<Option<Arc<Described>>> = described;
+        let space = described.last().and_then(Option::as_ref).and_then(|_| rust::StateSpace::new(&problem).ok());
         let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
         let (inner, described) = (Mutex::new(problem), Mutex::new(described));
         let (objects, written, faults) = (Mutex::new(objects), Mutex::new(written), Mutex::new(faults));
-        Ok(Self { inner, described, objects, written, fault, faults, moved: AtomicUsize::new(0) })
+        Ok(Self {
+            inner,
+            described,
+            objects,
+            written,
+            fault,
+            faults,
+            moved: AtomicUsize::new(0),
+            space,
+            is_outdated: AtomicBool::new(false),
+        })
     }
 
     /// Replaces the model of a knot, and its description.
@@ -463,6 +585,15 @@ impl Problem {
             old.drop_ref(py); // the object's destructor may run Python code
         }
         lock("problem", &self.written)?.extend(written);
+        Ok(())
+    }
+
+    /// Copies costs that were changed in place to the descriptions of the models.
+    fn describe(&self) -> PyResult<()> {
+        if self.is_outdated.swap(false, Ordering::Relaxed) {
+            let mut problem = lock("problem", &self.inner)?;
+            references::describe(&mut problem, &mut lock("problem", &self.described)?);
+        }
         Ok(())
     }
 

@@ -148,6 +148,32 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameRotation { frame, target }))
     }
 
+    /// Returns the deviation of a frame's velocity from a target in the frame's heading frame, r = Rz(ψ)ᵀ v − target, 6
+    /// numbers: forwards, to the left and up, then the rates about these axes. ψ is the heading of the frame's x axis,
+    /// and the z axis of the heading frame is vertical.
+    ///
+    /// With `tilt`, and `frame_translation` with the weights (0, 0, w) for the height, this describes a walk that does
+    /// not depend on the place and the heading of the robot.
+    #[staticmethod]
+    #[pyo3(signature = (model, frame, target=None))]
+    fn heading_velocity(
+        model: &Bound<'_, Model>,
+        frame: &Bound<'_, PyAny>,
+        target: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let (frame, target) = (frame_name(model, frame)?, Motion::from(six(target)?));
+        Ok(Self::from(robot::Residual::HeadingVelocity { frame, target }))
+    }
+
+    /// Returns the tilt of a frame, r = Rᵀ e_z − up, 3 numbers: the vertical of the world along the frame's axes, minus
+    /// its desired value, a unit vector. None is (0, 0, 1), an upright frame. r does not depend on the heading.
+    #[staticmethod]
+    #[pyo3(signature = (model, frame, up=None))]
+    fn tilt(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, up: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let up = up.map_or(Ok([0.0, 0.0, 1.0].into()), |up| three("up", up))?;
+        Ok(Self::from(robot::Residual::Tilt { frame: frame_name(model, frame)?, up }))
+    }
+
     /// Returns the deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference:
     /// 'local', 'world' or 'local_world_aligned'.
     #[staticmethod]

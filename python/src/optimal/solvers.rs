@@ -1,14 +1,16 @@
 //! Solvers and their solutions.
 
 use super::evaluation::{controls, solution as give};
+use super::policy::Policy;
 use super::problem::{Problem, lock};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
 use crate::arrays::{Give, class, matrix};
-use crate::exceptions::problem_error;
+use crate::exceptions::{problem_error, wrong_word};
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
+use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyMapping, PyMappingProxy, PySlice};
@@ -124,29 +126,6 @@ macro_rules! solver {
                 })
             }
 
-            /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
-            /// `Solution`.
-            ///
-            /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at
-            /// least one iteration.
-            ///
-            /// callback, verbose, progress: as for `solve`.
-            ///
-            /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
-            #[pyo3(signature = (callback=None, verbose=false, progress=false))]
-            fn resume<'py>(
-                &self,
-                py: Python<'py>,
-                callback: Option<Bound<'py, PyAny>>,
-                verbose: bool,
-                progress: bool,
-            ) -> PyResult<Bound<'py, PyAny>> {
-                let observer = Observer { callback, verbose, progress };
-                run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| {
-                    solver.resume_with(problem, interruptions)
-                })
-            }
-
             /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended the solve
             /// ("interrupted"); None before the first solve.
             #[getter]
@@ -155,6 +134,22 @@ macro_rules! solver {
                 let solver = lock("solver", &self.solver)?;
                 let solution = solver.solution();
                 (!solution.timings.total.is_zero()).then(|| give(py, &self.problem, &problem, solution)).transpose()
+            }
+
+            /// Publishes the last solution for the threads that call a policy.
+            ///
+            /// policy: a `Policy` of the same problem.
+            /// start: the time (s) at which knot 0 begins, on the clock of the policy's callers. Knots follow with
+            ///     their present durations; an impact takes no time.
+            ///
+            /// Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
+            /// the solution was not.
+            #[pyo3(signature = (policy, start=0.0))]
+            fn publish(&self, policy: &Bound<'_, Policy>, start: f64) -> PyResult<()> {
+                let problem = lock("problem", &self.problem.get().inner)?;
+                let solver = lock("solver", &self.solver)?;
+                let mut publisher = lock("policy", &policy.get().publisher)?;
+                publisher.publish(&problem, solver.solution(), start).map_err(problem_error)
             }
 
             /// All settings by name, as a read-only mapping.
@@ -218,9 +213,10 @@ macro_rules! solver {
             ///
             /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, and keeps the costs and
             /// limits of this single knot. The new last knot has the model `last`, with the costs and limits that this
-            /// model has for all knots. The last control is repeated, and the last state follows from this control. At
-            /// a second shift without a solver step in between, the last state is repeated, too, because a rollout with
-            /// repeated controls would diverge.
+            /// model has for all knots. The last control is repeated, if the contacts are the same as at the knot
+            /// before. If a robot's contacts change there, the last control holds the last state but one still, as
+            /// `quasi_static` does. The last state follows from the last control. At a second shift without a solver
+            /// step in between, the last state is repeated, because a rollout with repeated controls would diverge.
             ///
             /// last: the index of the new last knot's model.
             ///
@@ -232,6 +228,41 @@ macro_rules! solver {
                 self.problem.get().describe_shift()?;
                 solver.shift(&mut problem).map_err(problem_error)?;
                 self.problem.get().raise()
+            }
+        }
+    };
+}
+
+/// Defines a solver class as `solver` does, with a `resume` that has no criterion to stop of its own.
+macro_rules! plain_solver {
+    ($(#[$doc:meta])* $class:ident, $set:ident, $show:ident { $($own:tt)* }) => {
+        solver! {
+            $(#[$doc])*
+            $class, $set, $show {
+                /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+                /// `Solution`.
+                ///
+                /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes
+                /// at least one iteration.
+                ///
+                /// callback, verbose, progress: as for `solve`.
+                ///
+                /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
+                #[pyo3(signature = (callback=None, verbose=false, progress=false))]
+                fn resume<'py>(
+                    &self,
+                    py: Python<'py>,
+                    callback: Option<Bound<'py, PyAny>>,
+                    verbose: bool,
+                    progress: bool,
+                ) -> PyResult<Bound<'py, PyAny>> {
+                    let observer = Observer { callback, verbose, progress };
+                    run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| {
+                        solver.resume_with(problem, interruptions)
+                    })
+                }
+
+                $($own)*
             }
         }
     };
@@ -267,6 +298,52 @@ Fddp, set_fddp, show_fddp {
     fn new(problem: Bound<'_, Problem>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         Self::with(problem, None, settings)
     }
+
+    /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+    /// `Solution`.
+    ///
+    /// With a `time_budget`, one or two delayed solves do not make later solves shorter; each solve makes at least one
+    /// iteration. If the last solve ran out of time or iterations after a rejected step, the regularisation starts at
+    /// its last value, otherwise at `regularisation_start`.
+    ///
+    /// stop: "full_step" ends the solve when a step of length 1 is accepted, with the status "full_step". This is the
+    ///     mode for model predictive control. After the state has moved, the warm start has a gap at x₀. Shorter steps
+    ///     of length α keep the fraction 1 − α of each gap, and gaps may grow from period to period. A step of length 1
+    ///     closes all gaps. None (default) iterates until the solve has converged.
+    /// most: the maximum number of iterations, at least 1; None (default) takes `max_iterations` of the settings. Only
+    ///     with `stop`.
+    /// callback, verbose, progress: as for `solve`.
+    ///
+    /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
+    #[pyo3(signature = (callback=None, verbose=false, progress=false, *, stop=None, most=None))]
+    fn resume<'py>(
+        &self,
+        py: Python<'py>,
+        callback: Option<Bound<'py, PyAny>>,
+        verbose: bool,
+        progress: bool,
+        stop: Option<&str>,
+        most: Option<usize>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let to_full_step = match stop {
+            None => false,
+            Some("full_step") => true,
+            Some(other) => return Err(wrong_word("stop", "'full_step' or None", other)),
+        };
+        match most {
+            Some(_) if !to_full_step => return Err(PyValueError::new_err("most: expected only with stop='full_step'")),
+            Some(0) => return Err(PyValueError::new_err("most: expected at least 1, found 0")),
+            _ => {}
+        }
+        let observer = Observer { callback, verbose, progress };
+        run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| match to_full_step {
+            true => {
+                let most = most.unwrap_or(solver.settings.max_iterations);
+                solver.resume_to_full_step_with(problem, most, interruptions)
+            }
+            false => solver.resume_with(problem, interruptions),
+        })
+    }
 }
 }
 
@@ -296,7 +373,7 @@ macro_rules! construct {
 }
 construct!(Fddp by set_fddp, InteriorPoint by set_interior_point);
 
-solver! {
+plain_solver! {
 /// The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 ///
 /// The method repeats two steps. First FDDP minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖² with z = g + μ y, where
@@ -416,7 +493,7 @@ impl AugmentedLagrangian {
     }
 }
 
-solver! {
+plain_solver! {
 /// The primal–dual interior point method with multiple shooting: for robots with `Limit`s, bounds on controls, and
 /// `ConstrainedAction`s.
 ///

@@ -1,7 +1,11 @@
 //! Definition of constraints: contacts between frames and the world, and loops that hold two frames together.
 
+#[cfg(feature = "serde")]
+use crate::constraints::written::Written;
 use crate::passes::frames::ReferenceFrame;
 use alloc::borrow::ToOwned;
+use alloc::format;
+use alloc::string::String;
 use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, same_layout};
 use core::any::Any;
@@ -94,6 +98,8 @@ impl<S: Scalar> Target<S> {
 /// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), p₁ − p₂ (point)
 /// ```
 ///
+/// If the gains kp differ along the axes, kp e is the product of gain and error along each axis of `reference`.
+///
 /// The equation above is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0.
 /// All quantities are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the
 /// world ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The force λ of the constraint is expressed in the
@@ -124,7 +130,7 @@ impl<S: Scalar> Target<S> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[cfg_attr(feature = "serde", serde(from = "Written", into = "Written"))]
 pub struct ContactConstraint {
     /// Index of the frame that is held.
     pub frame: usize,
@@ -134,12 +140,16 @@ pub struct ContactConstraint {
     pub kind: ConstraintKind,
     /// Axes e₁, e₂, e₃ of a line or plane constraint, as columns expressed in the axes of `reference`. For other kinds,
     /// this matrix is the identity.
-    #[cfg_attr(feature = "serde", serde(default = "Mat3::identity"))]
     pub axes: Mat3<f64>,
     /// Axes of the constraint's rows and of its force λ: `Local` or `LocalWorldAligned`.
     pub reference: ReferenceFrame,
-    /// Gain of the position error (1/s²).
+    /// Gain of the position error (1/s²), the same for all axes.
     pub kp: f64,
+    /// Gains of the position error (1/s²) along each axis of `reference`, linear, then angular, which replace `kp`;
+    /// `None` if all axes have the gain `kp`. For example, a foot with the gains (0, 0, kp, 0, 0, 0) in
+    /// `LocalWorldAligned` returns to its height and not to its place on the ground. All kinds except rigid use only
+    /// the linear gains. In JSON, `kp` is then a list of three or six numbers.
+    pub kp_axes: Option<[f64; 6]>,
     /// Gain of the velocity error (1/s).
     pub kd: f64,
     /// Desired placement, velocity and acceleration of the frame. The target can be changed later
@@ -153,7 +163,17 @@ impl ContactConstraint {
         let reference = ReferenceFrame::Local;
         let target = Target::identity();
         let axes = Mat3::identity();
-        Self { frame, other: None, kind: ConstraintKind::Point, axes, reference, kp: 0.0, kd: 0.0, target }
+        Self {
+            frame,
+            other: None,
+            kind: ConstraintKind::Point,
+            axes,
+            reference,
+            kp: 0.0,
+            kp_axes: None,
+            kd: 0.0,
+            target,
+        }
     }
 
     /// Returns a contact that holds a frame's origin to the world along the frame's z axis only, without stabilisation.
@@ -236,10 +256,8 @@ impl ContactConstraint {
         if self.reference == ReferenceFrame::World {
             return wrong("its reference must be `local` or `local_world_aligned`, found `world`".to_owned());
         }
-        for (name, gain) in [("kp", self.kp), ("kd", self.kd)] {
-            if !(gain.is_finite() && gain >= 0.0) {
-                return wrong(format!("{name} must be a number of at least 0, found {gain}"));
-            }
+        if let Some(what) = wrong_gains(self.kp, self.kp_axes.as_ref(), self.kd) {
+            return wrong(what);
         }
         if let Some(what) = self.target.wrong() {
             return wrong(what.to_owned());
@@ -257,4 +275,12 @@ impl ContactConstraint {
         }
         Ok(bodies)
     }
+}
+
+/// Returns an error message if a gain is negative or not finite.
+pub(crate) fn wrong_gains(kp: f64, kp_axes: Option<&[f64; 6]>, kd: f64) -> Option<String> {
+    let axes = kp_axes.into_iter().flatten().map(|gain| ("kp_axes", *gain));
+    let mut gains = [("kp", kp), ("kd", kd)].into_iter().chain(axes);
+    let (name, gain) = gains.find(|(_, gain)| !(gain.is_finite() && *gain >= 0.0))?;
+    Some(format!("{name} must be a number of at least 0, found {gain}"))
 }

@@ -10,6 +10,8 @@
 //! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)          u, α: velocity, acceleration of points
 //! ```
 //!
+//! If the gains kp differ along the axes, kp (…) is multiplied with them along the axes of the rows.
+//!
 //! p, u and α are the position, velocity and acceleration of a frame's origin, and R₁ is the rotation of frame 1. For a
 //! line or a plane, the rows are components of the point's row above: e₃ᵀ (…) for a line, [e₁ e₃]ᵀ (…) for a plane.
 //!
@@ -69,6 +71,14 @@ fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Mo
     }
 }
 
+/// Returns the product of gain and error along each axis.
+#[inline(always)]
+fn scaled<S: Scalar>(gains: &[f64; 6], error: Motion<S>) -> Motion<S> {
+    let error = error.to_array();
+    let product: [S; 6] = core::array::from_fn(|k| error[k] * S::splat(gains[k]));
+    product.into()
+}
+
 /// Returns the motion (ω × m_v, ω × m_ω), for the linear part m_v and the angular part m_ω of m.
 #[inline(always)]
 fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
@@ -108,6 +118,12 @@ impl<S: Scalar> FramePair<S> {
     #[inline(always)]
     fn along(&self, plan: &Plan, x: Vec3<S>) -> Vec3<S> {
         if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
+    }
+
+    /// Converts a vector from the world's axes to the axes of `reference`, times the gain of each axis.
+    #[inline(always)]
+    fn along_axes(&self, plan: &Plan, gains: &[f64; 6], x: Vec3<S>) -> Vec3<S> {
+        scaled(gains, Motion::new(self.along(plan, x), Vec3::zero())).linear
     }
 
     /// Returns the rows of a point, line or plane constraint from the vector x of all three rows of the point. For a
@@ -187,9 +203,20 @@ impl<S: Scalar> FramePair<S> {
                 let m = self.express(plan, self.rigid(plan, kd));
                 // If kp is 0, the logarithm is not needed. It is skipped because it is not smooth at half turns.
                 let m = if plan.kp > 0.0 { m + self.outward(plan, self.error().scale(kp)) } else { m };
+                let m = match &plan.kp_axes {
+                    Some(gains) => m + scaled(gains, self.outward(plan, self.error())),
+                    None => m,
+                };
                 m - wanted
             }
-            _ => Self::held(plan, self.along(plan, self.point(kp, kd)) - wanted.linear),
+            _ => {
+                let x = self.along(plan, self.point(kp, kd));
+                let x = match &plan.kp_axes {
+                    Some(gains) => x + self.along_axes(plan, gains, self.x1.translation - self.x2.translation),
+                    None => x,
+                };
+                Self::held(plan, x - wanted.linear)
+            }
         }
     }
 
@@ -253,9 +280,15 @@ impl<S: Scalar> FramePair<S> {
         let [v1, v2] = self.v;
         let [a1, a2] = self.a;
         let m = self.rigid(plan, kd);
-        let Jlog = if plan.kp > 0.0 { Some(jlog6(self.error())) } else { None };
+        let Jlog = if plan.kp > 0.0 || plan.kp_axes.is_some() { Some(jlog6(self.error())) } else { None };
         let error: [S; 6] = core::array::from_fn(|r| error[r]);
         let turned = Motion::from(error) + target.velocity.scale_add(kd, target.acceleration);
+        // the position error, whose axes have different gains, and the part of `turned` without it
+        let position = plan.kp_axes.as_ref().map(|gains| (gains, self.outward(plan, self.error())));
+        let turned = match position {
+            Some((gains, error)) => turned - scaled(gains, error),
+            None => turned,
+        };
         for touch in &plan.touches {
             let (first, second) = (touch.first, touch.second);
             let (s, Psid) = (w.S[touch.column], w.Psid[touch.column]);
@@ -279,10 +312,17 @@ impl<S: Scalar> FramePair<S> {
             }
             let mut by_q = self.express(plan, by_q);
             if let Some(Jlog) = Jlog.filter(|_| first != second) {
-                by_q += self.outward(plan, (Jlog * self.x1.act_inv(rate)).scale(kp)); // ∂ log X = Jlog ₀X₁⁻¹ S
+                let change = Jlog * self.x1.act_inv(rate); // ∂ log X = Jlog ₀X₁⁻¹ S
+                by_q += match &plan.kp_axes {
+                    Some(gains) => scaled(gains, self.outward(plan, change)),
+                    None => self.outward(plan, change.scale(kp)),
+                };
             }
             if plan.aligned() && first {
                 by_q += turn(s.angular, turned); // along the world's axes, it turns with frame 1
+                if let Some((gains, error)) = position {
+                    by_q += scaled(gains, turn(s.angular, error));
+                }
             }
             let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
             let (by_q, by_v) = (by_q.to_array(), self.express(plan, by_v).to_array());
@@ -297,7 +337,7 @@ impl<S: Scalar> FramePair<S> {
     fn point_derivatives(&self, plan: &Plan, w: Columns<'_, S>, dq: &mut Matrix<S>, dv: &mut Matrix<S>) {
         let (kp, kd, two) = (S::splat(plan.kp), S::splat(plan.kd), S::splat(2.0));
         let points = self.points();
-        let held = self.point(kp, kd);
+        let (held, apart) = (self.point(kp, kd), self.x1.translation - self.x2.translation);
         for touch in &plan.touches {
             let (s, Psid) = (w.S[touch.column], w.Psid[touch.column]);
             let (Psidd, PsidSd) = (w.Psidd[touch.column], w.PsidSd[touch.column]);
@@ -321,7 +361,16 @@ impl<S: Scalar> FramePair<S> {
                 by_q -= s.angular.cross(held);
             }
             let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
-            let by_q = Self::held(plan, self.along(plan, by_q)).to_array();
+            let mut by_q = self.along(plan, by_q);
+            if let Some(gains) = &plan.kp_axes {
+                // ∂(p₁ − p₂)/∂q_e, and the rotation of the axes with frame 1
+                let zero = Vec3::zero();
+                let mut moved = if touch.first { at(s, self.x1.translation) } else { zero };
+                moved -= if touch.second { at(s, self.x2.translation) } else { zero };
+                moved -= if touch.first && !plan.aligned() { s.angular.cross(apart) } else { zero };
+                by_q += self.along_axes(plan, gains, moved);
+            }
+            let by_q = Self::held(plan, by_q).to_array();
             let by_v = Self::held(plan, self.along(plan, by_v)).to_array();
             for r in 0..plan.rows() {
                 dq[(row + r, column)] += by_q[r] * ratio;

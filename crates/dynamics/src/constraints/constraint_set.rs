@@ -1,6 +1,6 @@
 //! Set of constraints of one model: the plans of the constraints, and all memory for computations with them.
 
-use crate::constraints::constraint::{ContactConstraint, Target};
+use crate::constraints::constraint::{ContactConstraint, Target, wrong_gains};
 use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
 use crate::constraints::islands::Island;
@@ -187,6 +187,24 @@ impl<S: Scalar> ConstraintSet<S> {
             return Err(Error::Constraint { constraint: k, what: what.to_owned() });
         }
         *to = target;
+        Ok(())
+    }
+
+    /// Changes the gains of constraint k between calls: kp of the position error, the gains of each axis that replace
+    /// it, and kd of the velocity error. Allocates nothing.
+    ///
+    /// # Errors
+    /// Returns [`Error::Constraint`] if a gain is negative or not finite. In this case, the old gains are kept.
+    ///
+    /// # Panics
+    /// Panics if constraint k does not exist.
+    #[track_caller]
+    pub fn set_gains(&mut self, k: usize, kp: f64, kp_axes: Option<[f64; 6]>, kd: f64) -> Result<(), Error> {
+        check_index("k", k, self.len(), "constraints");
+        if let Some(what) = wrong_gains(kp, kp_axes.as_ref(), kd) {
+            return Err(Error::Constraint { constraint: k, what });
+        }
+        self.plans[k].set_gains(kp, kp_axes, kd);
         Ok(())
     }
 

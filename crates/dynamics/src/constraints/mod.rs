@@ -11,3 +11,5 @@ pub(crate) mod impulse_dynamics;
 pub(crate) mod islands;
 pub(crate) mod kkt_derivatives;
 pub(crate) mod plan;
+#[cfg(feature = "serde")]
+mod written;

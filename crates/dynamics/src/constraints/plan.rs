@@ -63,7 +63,10 @@ pub(crate) struct Plan {
     /// Axes of a line or a plane, expressed in the axes of `reference`.
     pub axes: Mat3<f64>,
     pub reference: ReferenceFrame,
+    /// Gain of the position error along all axes; 0 if the gains differ.
     pub kp: f64,
+    /// Gains of the position error along each axis of `reference`, if the gains differ.
+    pub kp_axes: Option<[f64; 6]>,
     pub kd: f64,
     pub bodies: [usize; 2],
     /// Placements bXf of both frames: in the public frames of the bodies (`placements`), and in the internal frames,
@@ -137,8 +140,9 @@ impl Plan {
                 kind: constraint.kind,
                 axes: constraint.axes,
                 reference: constraint.reference,
-                kp: constraint.kp,
-                kd: constraint.kd,
+                kp: 0.0,
+                kp_axes: None,
+                kd: 0.0,
                 bodies,
                 placements,
                 turned: [turn(0), turn(1)],
@@ -151,11 +155,18 @@ impl Plan {
                 start,
                 common: Vec::new(),
             };
+            plan.set_gains(constraint.kp, constraint.kp_axes, constraint.kd);
             plan.common = plans.iter().chain([&plan]).map(|other| common(&plan.places, &other.places)).collect();
             (row, start) = (row + plan.rows(), plan.end());
             plans.push(plan);
         }
         Ok(plans)
+    }
+
+    /// Sets the gains, which must be valid.
+    pub(crate) fn set_gains(&mut self, kp: f64, kp_axes: Option<[f64; 6]>, kd: f64) {
+        self.kp = if kp_axes.is_some() { 0.0 } else { kp };
+        (self.kp_axes, self.kd) = (kp_axes, kd);
     }
 
     pub(crate) fn rows(&self) -> usize {

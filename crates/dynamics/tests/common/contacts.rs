@@ -25,16 +25,22 @@ pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConst
         ConstraintKind::Line | ConstraintKind::Plane => random_pose(rng).rotation,
         _ => Mat3::identity(),
     };
-    ContactConstraint {
+    let mut constraint = ContactConstraint {
         frame: rng.random_range(0..frames),
         other: rng.random::<bool>().then(|| rng.random_range(0..frames)),
         kind,
         axes,
         reference: if rng.random::<bool>() { ReferenceFrame::Local } else { ReferenceFrame::LocalWorldAligned },
         kp: gain(rng),
+        kp_axes: None,
         kd: gain(rng),
         target: Target { placement: random_pose(rng), velocity: motion(rng), acceleration: motion(rng) },
+    };
+    if constraint.kp > 3.0 {
+        // gains for each axis, which need no random numbers
+        constraint.kp_axes = Some(core::array::from_fn(|k| constraint.kp * (0.4 * k as f64)));
     }
+    constraint
 }
 
 /// Returns random constraints that the robot can satisfy at a state. The constraint forces are unique.

@@ -61,7 +61,9 @@ fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64])
         }
     };
     let Target { velocity: v_wanted, acceleration: a_wanted, .. } = c.target;
-    let value = rate - a_wanted + (velocity - v_wanted).scale(c.kd) + error.scale(c.kp);
+    let gains = c.kp_axes.unwrap_or([c.kp; 6]);
+    let pull: [f64; 6] = core::array::from_fn(|k| gains[k] * error.to_array()[k]);
+    let value = rate - a_wanted + (velocity - v_wanted).scale(c.kd) + Motion::from(pull);
     match c.kind {
         ConstraintKind::Line => vec![c.axes.z.dot(value.linear)],
         ConstraintKind::Plane => vec![c.axes.x.dot(value.linear), c.axes.z.dot(value.linear)],
@@ -137,7 +139,8 @@ fn references_turn_forces_only() {
         let mut rng = rng(seed as u64);
         let (s, mut data) = (State::random(&model, &mut rng), Data::new(&model));
         let contact = |rng: &mut _| {
-            let c = ContactConstraint { other: None, kd: 3.0, kp: 2.0, ..random_constraint(&model, rng) };
+            let c =
+                ContactConstraint { other: None, kd: 3.0, kp: 2.0, kp_axes: None, ..random_constraint(&model, rng) };
             let target = Target { placement: c.target.placement, ..Target::identity() };
             ContactConstraint { target, ..c }
         };
@@ -361,6 +364,10 @@ fn what_cannot_be_is_refused() {
             "constraint 0: kd must be a number of at least 0, found -1".to_owned(),
         ),
         (
+            refused(&[ContactConstraint { kp_axes: Some([0.0, 0.0, -2.0, 0.0, 0.0, 0.0]), ..point }]),
+            "constraint 0: kp_axes must be a number of at least 0, found -2".to_owned(),
+        ),
+        (
             refused(&[ContactConstraint { kp: f64::NAN, ..point }]),
             "constraint 0: kp must be a number of at least 0, found NaN".to_owned(),
         ),
@@ -372,6 +379,62 @@ fn what_cannot_be_is_refused() {
     for (found, expected) in cases {
         assert_eq!(found, expected);
     }
+}
+
+/// A point whose axes have different gains is held like three lines, each with its own gain.
+#[test]
+fn a_point_with_gains_for_each_axis_is_three_lines() {
+    let mut worst = Worst::new("a point as three lines", CONDITIONED);
+    let model = robots::quadruped();
+    let foot = model.frame("RF_foot").unwrap();
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3::from);
+    for seed in 0..20 {
+        let mut rng = rng(seed);
+        let (s, mut data) = (State::random(&model, &mut rng), Data::new(&model));
+        for reference in [ReferenceFrame::Local, ReferenceFrame::LocalWorldAligned] {
+            let gains = [0.0, 40.0, 300.0, 7.0, 7.0, 7.0]; // a point has no angular rows
+            let point = ContactConstraint { kd: 5.0, reference, ..ContactConstraint::point(foot) };
+            let whole = ContactConstraint { kp_axes: Some(gains), kp: 1e3, ..point };
+            let line = |k: usize| {
+                let [a, b, c] = [[y, z, x], [z, x, y], [x, y, z]][k];
+                let axes = condyle_dynamics::Mat3 { x: a, y: b, z: c };
+                ContactConstraint { kind: ConstraintKind::Line, axes, kp: gains[k], ..point }
+            };
+            let mut run = |constraints: &[ContactConstraint]| {
+                let mut set = ConstraintSet::new(&model, constraints).unwrap();
+                constrained_dynamics(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]).a.to_vec()
+            };
+            let (ours, lines) = (run(&[whole]), run(&[line(0), line(1), line(2)]));
+            worst.see(&model, &ours, &lines);
+            let uniform = ContactConstraint { kp: 300.0, ..point };
+            let mut changed = ConstraintSet::new(&model, &[point]).unwrap();
+            changed.set_gains(0, 1e3, Some(gains), 5.0).unwrap();
+            assert!(changed.set_gains(0, 0.0, None, f64::NAN).is_err()); // the old gains are kept
+            let again =
+                constrained_dynamics(&model, &mut Data::new(&model), &mut changed, &s.q, &s.v, &s.tau, &[]).a.to_vec();
+            assert_eq!(again, ours);
+            worst.see(&model, &run(&[ContactConstraint { kp_axes: Some([300.0; 6]), ..point }]), &run(&[uniform]));
+            assert_ne!(run(&[uniform]), ours);
+        }
+    }
+}
+
+#[test]
+fn gains_are_one_number_or_several_in_json() {
+    let point = ContactConstraint::point(3);
+    let text = |c: &ContactConstraint| serde_json::to_string(c).unwrap();
+    let read = |text: &str| serde_json::from_str::<ContactConstraint>(text);
+    let uniform = ContactConstraint { kp: 20.0, ..point };
+    assert!(text(&uniform).contains(r#""kp":20.0,"kd":0.0"#));
+    assert_eq!(read(&text(&uniform)).unwrap(), uniform);
+    assert_eq!(read(&text(&uniform).replace("20.0", "20")).unwrap(), uniform);
+    let each = ContactConstraint { kp_axes: Some([0.0, 0.0, 20.0, 1.0, 2.0, 3.0]), ..point };
+    assert!(text(&each).contains(r#""kp":[0.0,0.0,20.0,1.0,2.0,3.0],"kd":0.0"#));
+    assert_eq!(read(&text(&each)).unwrap(), each);
+    let linear = read(&text(&each).replace(",1.0,2.0,3.0]", "]")).unwrap();
+    assert_eq!(linear.kp_axes, Some([0.0, 0.0, 20.0, 0.0, 0.0, 0.0]));
+    let wrong = read(&text(&each).replace(",2.0,3.0]", "]")).unwrap_err().to_string();
+    assert!(wrong.contains("invalid length 4, expected a number, or a list of 3 or 6 numbers"), "{wrong}");
 }
 
 #[test]

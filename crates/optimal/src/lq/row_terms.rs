@@ -194,7 +194,8 @@ fn add_group(
         }
     }
     if group.forms().all(|(_, entries)| entries.len() <= 1) {
-        let coordinate = |(first, entries): (usize, &[f64])| entries.first().map(|entry| (columns.place(first), *entry));
+        let coordinate =
+            |(first, entries): (usize, &[f64])| entries.first().map(|entry| (columns.place(first), *entry));
         for ((form, slope), curvature) in group.forms().zip(slope).zip(&curvature) {
             let Some((j, entry)) = coordinate(form) else { continue };
             H[j * ld + all] += slope * entry;

@@ -156,7 +156,12 @@ impl ConstraintRows {
         let forms = self.groups.last().map_or(0, |group| group.forms.end)..self.forms.len();
         assert!(forms.len() <= MOST_FORMS, "a group has {} forms", forms.len());
         self.numbers.extend_from_slice(W);
-        self.rows.extend(rows.map(|[c, lower, upper]| Row { run: Run { first: 0, start: 0, end: 0 }, c, lower, upper }));
+        self.rows.extend(rows.map(|[c, lower, upper]| Row {
+            run: Run { first: 0, start: 0, end: 0 },
+            c,
+            lower,
+            upper,
+        }));
         self.groups.push(Group { rows: first..self.rows.len(), forms, weights: at..self.numbers.len() });
     }
 

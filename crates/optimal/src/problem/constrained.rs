@@ -230,6 +230,22 @@ impl KnotGroup for Constrained {
         }
     }
 
+    fn hold_still(&mut self, x: &[f64], u: &mut [f64]) -> bool {
+        self.action.knot_group_mut().is_some_and(|group| group.hold_still(x, u))
+    }
+
+    fn has_controls_of(&self, other: &dyn KnotGroup) -> bool {
+        self.action.knot_group().is_none_or(|group| group.has_controls_of(other))
+    }
+
+    fn duration(&self, t: usize) -> Option<f64> {
+        self.action.knot_group()?.duration(t)
+    }
+
+    fn dynamics_ref(&self) -> Option<&dyn Any> {
+        self.action.knot_group()?.dynamics_ref()
+    }
+
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         if let Some(group) = self.action.knot_group_mut() {
             group.constraints(t, visit);

@@ -173,6 +173,31 @@ pub trait KnotGroup {
         false
     }
 
+    /// Computes the controls that hold the state x still into `u`, as [`ActionModel::quasi_static`] does, but without
+    /// allocation. Returns whether this action has such controls.
+    fn hold_still(&mut self, x: &[f64], u: &mut [f64]) -> bool {
+        let _ = (x, u);
+        false
+    }
+
+    /// Returns whether the controls of this action have the same meaning as the controls of `other`. They do not if the
+    /// actions have other contacts.
+    fn has_controls_of(&self, other: &dyn KnotGroup) -> bool {
+        let _ = other;
+        true
+    }
+
+    /// Returns the dynamics of the knots as `Any`. The module that implements the group knows the type.
+    fn dynamics_ref(&self) -> Option<&dyn Any> {
+        None
+    }
+
+    /// Returns the duration (s) of knot t, 0 for an impact; `None` for an action without a duration.
+    fn duration(&self, t: usize) -> Option<f64> {
+        let _ = t;
+        None
+    }
+
     /// Calls `show` for each vector that the dynamics of knot t compute in addition to the next state, with its name.
     fn show_outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         let _ = (t, x, u, show);

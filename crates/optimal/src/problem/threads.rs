@@ -50,6 +50,22 @@ impl Copies {
         }
     }
 
+    /// Calls `visit` for each copy of an action, in which model `own` is chosen, until `visit` returns an error.
+    pub(crate) fn each_of<E>(
+        &mut self,
+        action: usize,
+        own: usize,
+        visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for copy in self.of.iter_mut().filter_map(|copies| copies.get_mut(action)?.as_mut()) {
+            if let Some(group) = copy.knot_group_mut() {
+                group.choose(own);
+            }
+            visit(&mut **copy)?;
+        }
+        Ok(())
+    }
+
     /// Notifies the copies that the horizon has moved by one knot.
     pub(crate) fn shift(&mut self) {
         self.of.iter_mut().flatten().flatten().for_each(|copy| copy.shift());

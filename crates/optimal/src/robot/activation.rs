@@ -42,6 +42,32 @@ pub enum Activation {
         /// Weights w, one for each entry of the residual, at least 0.
         weights: Vec<f64>,
     },
+    /// Relaxed logarithmic barrier, Σ β(rᵢ − lowerᵢ) + Σ β(upperᵢ − rᵢ), of the distances d to all finite bounds.
+    ///
+    /// ```text
+    /// β(d) = −μ log(d/δ)  for d ≥ δ,      β(d) = ½ μ (((d − 2δ)/δ)² − 1)  for d < δ
+    /// ```
+    ///
+    /// β is convex and twice continuously differentiable, also at d = δ, and finite where a bound is violated. Unlike
+    /// [`Barrier`](Self::Barrier), it has curvature inside the bounds too: a step towards a bound that is not yet
+    /// reached becomes more expensive. β(δ) = 0, so the value does not depend on the unit of r; it is negative far
+    /// inside. Without this normalisation, which changes no derivative, β of the source is larger by −μ log δ. As δ and
+    /// μ tend to 0, the minimum tends to the minimum with the bounds as constraints. Source: Feller and Ebenbauer,
+    /// Relaxed logarithmic barrier function based model predictive control of linear systems, 2017.
+    RelaxedBarrier {
+        /// Lower bounds; −∞ for an entry without a lower bound.
+        #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
+        lower: Vec<f64>,
+        /// Upper bounds; ∞ for an entry without an upper bound.
+        #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
+        upper: Vec<f64>,
+        /// Barrier parameter μ, above 0, in the unit of the cost. At the distance d ≥ δ, a bound pushes the residual
+        /// away with the slope μ/d.
+        mu: f64,
+        /// Distance δ to a bound, above 0, in the unit of the residual. The logarithm ends at this distance, and the
+        /// quadratic function with curvature μ/δ² begins.
+        delta: f64,
+    },
     /// Sum Σ rᵢ, for a residual that is itself a cost. The Gauss–Newton Hessian of this activation is zero. Only the
     /// residual contributes second derivatives
     /// ([`ResidualFunction::calc_hessian`](crate::robot::ResidualFunction::calc_hessian)).
@@ -81,7 +107,7 @@ impl Activation {
     fn assert_fits(&self, n: usize) {
         let found = match self {
             Self::Weighted(weights) => weights.len(),
-            Self::Barrier { lower, upper } => lower.len().min(upper.len()),
+            Self::Barrier { lower, upper } | Self::RelaxedBarrier { lower, upper, .. } => lower.len().min(upper.len()),
             Self::WeightedBarrier { lower, upper, weights } => lower.len().min(upper.len()).min(weights.len()),
             Self::Quadratic | Self::Sum | Self::Smooth1 { .. } | Self::Smooth2 { .. } => n,
         };
@@ -120,12 +146,35 @@ impl Activation {
             Self::WeightedBarrier { lower, upper, weights: w } => {
                 entries.for_each(|i| visit(i, beyond(i, lower, upper).map(|x| w[i] * x)));
             }
+            Self::RelaxedBarrier { lower, upper, mu, delta } => entries.for_each(|i| {
+                let below = relaxed_log(r[i] - lower[i], *mu, *delta);
+                let above = relaxed_log(upper[i] - r[i], *mu, *delta);
+                visit(i, [below[0] + above[0], below[1] - above[1], below[2] + above[2]]); // ∂d/∂r is 1 and −1
+            }),
             Self::Sum => entries.for_each(|i| visit(i, [r[i], 1.0, 0.0])),
             Self::Smooth1 { epsilon } => entries.for_each(|i| {
                 let a = (epsilon + r[i] * r[i]).sqrt();
                 visit(i, [a, r[i] / a, epsilon / (a * a * a)]);
             }),
             Self::Smooth2 { .. } => {} // `Smooth2` is not a sum over entries
+        }
+    }
+
+    /// Copies another activation. Allocates nothing if both are equal or have weights of the same length.
+    pub(super) fn assign(&mut self, from: &Self) {
+        match (&mut *self, from) {
+            (Self::Weighted(own), Self::Weighted(others)) if own.len() == others.len() => own.copy_from_slice(others),
+            (own, others) if own == others => {}
+            (own, others) => own.clone_from(others),
+        }
+    }
+
+    /// Returns the weights of the entries of the residual, which may be changed in place; `None` for an activation
+    /// without weights.
+    pub(super) fn weights_mut(&mut self) -> Option<&mut [f64]> {
+        match self {
+            Self::Weighted(weights) | Self::WeightedBarrier { weights, .. } => Some(weights),
+            _ => None,
         }
     }
 
@@ -136,13 +185,7 @@ impl Activation {
             true => None,
             false => Some(format!("its {name} has {} numbers, expected {n}", numbers.len())),
         };
-        let weighting = |w: &[f64]| {
-            let bad = |i: usize| format!("its weight {i} is {}, expected a finite number of at least 0", w[i]);
-            if w.len() != n {
-                return length("weighting", w);
-            }
-            w.iter().position(|x| !(*x >= 0.0 && x.is_finite())).map(bad)
-        };
+        let weighting = |w: &[f64]| wrong_weights(w, n);
         let ordered = |lower: &[f64], upper: &[f64]| {
             let i = lower.iter().zip(upper).position(|(&lower, &upper)| !leave_a_value(lower, upper))?;
             Some(format!("its bounds of entry {i} exclude each other: {} and {}", lower[i], upper[i]))
@@ -151,17 +194,45 @@ impl Activation {
             let lengths = length("lower bound", lower).or_else(|| length("upper bound", upper));
             lengths.or_else(|| ordered(lower, upper))
         };
+        let positive = |name: &str, x: f64| {
+            let wrong = !(x > 0.0 && x.is_finite());
+            wrong.then(|| format!("its {name} is {x}, but it must be above 0"))
+        };
         match self {
             Self::Quadratic | Self::Sum => None,
             Self::Weighted(w) => weighting(w),
             Self::Barrier { lower, upper } => bounds(lower, upper),
             Self::WeightedBarrier { lower, upper, weights } => bounds(lower, upper).or_else(|| weighting(weights)),
-            Self::Smooth1 { epsilon } | Self::Smooth2 { epsilon } => {
-                let wrong = !(*epsilon > 0.0 && epsilon.is_finite());
-                wrong.then(|| format!("its ε is {epsilon}, but it must be above 0"))
+            Self::RelaxedBarrier { lower, upper, mu, delta } => {
+                bounds(lower, upper).or_else(|| positive("μ", *mu)).or_else(|| positive("δ", *delta))
             }
+            Self::Smooth1 { epsilon } | Self::Smooth2 { epsilon } => positive("ε", *epsilon),
         }
     }
+}
+
+/// Returns an error message if the weights of a residual with n entries are invalid.
+pub(super) fn wrong_weights(w: &[f64], n: usize) -> Option<String> {
+    if w.len() != n {
+        return Some(format!("its weighting has {} numbers, expected {n}", w.len()));
+    }
+    let bad = |i: usize| format!("its weight {i} is {}, expected a finite number of at least 0", w[i]);
+    w.iter().position(|x| !(*x >= 0.0 && x.is_finite())).map(bad)
+}
+
+/// Returns the relaxed logarithmic barrier β(d) of the distance d to a bound, and its first and second derivatives. All
+/// are 0 for an infinite bound.
+#[inline(always)]
+fn relaxed_log(d: f64, mu: f64, delta: f64) -> [f64; 3] {
+    if d == f64::INFINITY {
+        return [0.0; 3];
+    }
+    if d >= delta {
+        let slope = -mu / d;
+        return [-mu * (d / delta).ln(), slope, -slope / d];
+    }
+    let s = (d - 2.0 * delta) / delta; // β = ½ μ (s² − 1), ∂s/∂d = 1/δ
+    [0.5 * mu * (s * s - 1.0), mu * s / delta, mu / (delta * delta)]
 }
 
 fn square(r: &[f64]) -> f64 {

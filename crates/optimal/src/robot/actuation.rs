@@ -194,16 +194,20 @@ impl Actuation {
         }
     }
 
+    /// Writes S to the first columns of a matrix of zeros with nv rows, which is stored column after column.
+    pub(super) fn write_columns(&self, to: &mut [f64]) {
+        let nv = self.nv;
+        match &self.map {
+            Map::After(passive) => (0..nv - passive).for_each(|j| to[j * nv + passive + j] = 1.0),
+            Map::Matrix(S) => to[..S.len()].copy_from_slice(S.as_slice()),
+        }
+    }
+
     /// Returns the least-squares solution (u, λ) of S u + Jᵀλ = τ that has the smallest norm.
     pub(super) fn quasi_static(&self, tau: &[f64], J: &DMatrix<f64>) -> Vec<f64> {
         let nu = self.nu();
         let mut map = DMatrix::zeros(self.nv, nu + J.nrows());
-        for j in 0..nu {
-            match &self.map {
-                Map::After(passive) => map[(passive + j, j)] = 1.0,
-                Map::Matrix(S) => map.column_mut(j).copy_from(&S.column(j)),
-            }
-        }
+        self.write_columns(map.as_mut_slice());
         if map.is_empty() {
             return vec![0.0; nu + J.nrows()];
         }

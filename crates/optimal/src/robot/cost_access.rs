@@ -1,6 +1,6 @@
 //! Access by name to the costs of the robots in a problem, which changes targets, weights and activations in place.
 
-use super::activation::Activation;
+use super::activation::{Activation, wrong_weights};
 use super::costs::{Cost, Costs, check_weight};
 use super::dynamics::robot::robot_of;
 use super::horizon::HorizonTerms;
@@ -53,6 +53,24 @@ impl CostMut<'_> {
         Ok(())
     }
 
+    /// Sets the weights wᵢ of the entries of the residual, in an activation that has weights. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] if the activation has no weights, if a weight is negative or not finite, or if the number of
+    /// weights differs from the number of entries of the residual.
+    pub fn set_entry_weights(&mut self, weights: &[f64]) -> Result<(), Error> {
+        let Self { cost, n, .. } = self;
+        let wrong = |name: &str, what| Err(Error::Cost { name: name.to_owned(), what });
+        if let Some(what) = wrong_weights(weights, *n) {
+            return wrong(&cost.name, what);
+        }
+        match cost.activation.weights_mut() {
+            Some(own) => own.copy_from_slice(weights),
+            None => return wrong(&cost.name, "its activation has no weights".to_owned()),
+        }
+        Ok(())
+    }
+
     /// Sets the activation of the cost term.
     ///
     /// # Errors
@@ -79,7 +97,7 @@ impl Costs {
 }
 
 /// Returns the costs and limits of an action's robot; `None` if the action has no robot.
-fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
+pub(super) fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
     Some(&mut robot_of(action)?.terms)
 }
 

@@ -54,6 +54,21 @@ impl Term for Cost {
 }
 
 impl Cost {
+    /// Returns whether the two terms differ only in target, weight and activation.
+    fn is_like(&self, other: &Self) -> bool {
+        self.name == other.name && self.residual.is_like(&other.residual)
+    }
+
+    /// Copies target, weight and activation of a term that [is like](Self::is_like) this one.
+    fn assign(&mut self, from: &Self) {
+        self.weight = from.weight;
+        self.activation.assign(&from.activation);
+        match from.residual.target() {
+            Some(target) => self.residual.write_target(target),
+            None => debug_assert!(self.residual == from.residual),
+        }
+    }
+
     /// Returns the plan of the term's residual, or an error if the term does not fit the robot.
     fn plan(&self, model: &Model, capabilities: &Capabilities) -> Result<Plan, Error> {
         let wrong = |what: String| Error::Cost { name: self.name.clone(), what };
@@ -102,6 +117,19 @@ impl Costs {
             terms.push(cost, plan);
         }
         Ok(Self { model, capabilities, terms })
+    }
+
+    /// Copies the terms of other costs of the same robot. Allocates nothing if both have the same terms, apart from
+    /// targets and weights.
+    pub(super) fn assign(&mut self, from: &Self) {
+        let (own, others) = (self.terms(), from.terms());
+        if own.len() == others.len() && own.iter().zip(others).all(|(own, other)| own.is_like(other)) {
+            for (k, other) in others.iter().enumerate() {
+                self.terms.term_mut(k).0.assign(other);
+            }
+        } else {
+            self.clone_from(from);
+        }
     }
 
     /// Returns all cost terms.

@@ -135,6 +135,33 @@ impl<T> PerKnot<T> {
         }
     }
 
+    /// Returns the separate value of knot t. If knot t has no separate value yet, it gets a copy of the common value. A
+    /// slot of a knot that has left the horizon is overwritten by `assign`, which need not allocate.
+    pub(crate) fn separate(&mut self, t: usize, assign: impl FnOnce(&mut T, &T)) -> &mut T
+    where
+        T: Clone,
+    {
+        if self.index(Some(t)) == 0 {
+            match self.free.pop() {
+                Some(slot) => {
+                    if t >= self.of.len() {
+                        self.of.resize(t + 1, 0);
+                    }
+                    self.of[t] = slot;
+                    let (common, others) = self.all.split_at_mut(1);
+                    assign(&mut others[slot - 1], &common[0]);
+                }
+                None => self.set(Some(t), self.all[0].clone()),
+            }
+        }
+        self.at_mut(Some(t))
+    }
+
+    /// Returns the knots that have separate values.
+    pub(crate) fn separated(&self) -> impl Iterator<Item = (usize, &T)> {
+        self.of.iter().enumerate().filter(|(_, k)| **k > 0).map(|(t, &k)| (t, &self.all[k]))
+    }
+
     /// Moves the horizon by one knot: knot t becomes knot t − 1.
     pub(crate) fn shift(&mut self) {
         if !self.of.is_empty() {
@@ -176,6 +203,17 @@ impl HorizonTerms {
     /// Returns the costs of knot t; for `None`, the common costs of all knots without separate costs.
     pub(crate) fn costs_mut(&mut self, t: Option<usize>) -> &mut Costs {
         self.costs.chosen_mut().at_mut(t)
+    }
+
+    /// Returns the separate costs of knot t. If knot t has none, it gets a copy of the common costs. Allocates nothing
+    /// if a knot with a copy of the same costs has left the horizon.
+    pub(crate) fn separate_costs_mut(&mut self, t: usize) -> &mut Costs {
+        self.costs.chosen_mut().separate(t, Costs::assign)
+    }
+
+    /// Returns the costs of the knots that have separate costs.
+    pub(crate) fn separate_costs(&mut self) -> impl Iterator<Item = (usize, &Costs)> {
+        self.costs.chosen_mut().separated()
     }
 
     /// Returns the common costs, then the separate costs of single knots.

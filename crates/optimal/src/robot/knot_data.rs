@@ -132,6 +132,11 @@ impl<T> OnDemand<T> {
         self.0.get_or_insert_with(|| Box::new(make()))
     }
 
+    /// Returns the workspace as a mutable reference, if it has been created.
+    pub(crate) fn made_mut(&mut self) -> Option<&mut T> {
+        self.0.as_deref_mut()
+    }
+
     /// Returns the workspace, if it has been created.
     pub(crate) fn made(&self) -> Option<&T> {
         self.0.as_deref()

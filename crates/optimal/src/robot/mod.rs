@@ -66,6 +66,7 @@ mod motion;
 mod outputs;
 mod own_constraint;
 mod problem;
+mod references;
 mod residuals;
 mod state;
 

@@ -212,6 +212,16 @@ impl Knot {
         Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None, controls }
     }
 
+    /// Returns the contact called `name` of the knot's dynamics, as a mutable reference; `None` if it does not exist.
+    pub fn contact_mut(&mut self, name: &str) -> Option<&mut Contact> {
+        match &mut self.dynamics {
+            Dynamics::Contact { contacts, .. }
+            | Dynamics::ContactInverse { contacts, .. }
+            | Dynamics::Impulse { contacts, .. } => contacts.iter_mut().find(|contact| contact.name == name),
+            _ => None,
+        }
+    }
+
     /// Returns the action of this knot. Allocates.
     ///
     /// The errors of the action's constructor; [`Error::Length`] for bounds with a length other than nu;

@@ -365,7 +365,7 @@ impl AugmentedLagrangian {
             let dual = omega.max(0.1 * tolerance_dual);
             let resumes = warm_start.is_none() && solve == 0;
             self.solver.clock.reserve = self.measuring.median();
-            let pass = Pass { tolerance: Some(dual * dual), trusts_start: true, resumes, continues };
+            let pass = Pass { tolerance: Some(dual * dual), trusts_start: true, resumes, continues, ..Pass::default() };
             let stopped = self.solver.pass(problem, settings, pass, watch);
             self.outcome.solves += 1;
             self.outcome.iterations += self.solver.iterate.solution.trace.len();

@@ -1,6 +1,8 @@
 //! Differential dynamic programming (DDP) and its feasibility-driven variant (FDDP).
 
 use super::settings::Settings;
+#[cfg(doc)]
+use super::solution::Status;
 use super::solution::{Iteration, Solution};
 use super::solver_loop::{Pass, SolverLoop};
 use super::watch::{Observer, Watch};
@@ -127,9 +129,43 @@ impl Fddp {
         self.run(problem, None, &mut observer)
     }
 
+    /// Iterates as [`resume`](Self::resume) does until a step of length α = 1 is accepted, and makes at most `most`
+    /// iterations (at least one). `most` replaces [`max_iterations`](Settings::max_iterations). The iterations are the
+    /// same as in [`resume`](Self::resume).
+    ///
+    /// This is the mode for model predictive control. After the state has moved, the warm start has a gap at x₀. A
+    /// shorter step keeps the fraction 1 − α of each gap, so x̄₀ ≠ x̂₀; if every period ends so, gaps accumulate. A step
+    /// of length 1 closes all gaps, and the status is then [`Status::FullStep`], or [`Status::Converged`].
+    ///
+    /// # Errors
+    /// The same errors as [`solve`](Self::solve).
+    pub fn resume_to_full_step(&mut self, problem: &mut Problem, most: usize) -> Result<&Solution, Error> {
+        self.resume_to_full_step_with(problem, most, |_: &Iteration| {})
+    }
+
+    /// Iterates as [`resume_to_full_step`](Self::resume_to_full_step) does, and passes each iteration to `observer`
+    /// when it ends. The observer may end the solve.
+    ///
+    /// # Errors
+    /// The same errors as [`solve`](Self::solve).
+    pub fn resume_to_full_step_with(
+        &mut self,
+        problem: &mut Problem,
+        most: usize,
+        mut observer: impl Observer,
+    ) -> Result<&Solution, Error> {
+        self.run_pass(problem, None, Pass { to_full_step: Some(most.max(1)), ..Pass::default() }, &mut observer)
+    }
+
     /// Turns the solution into a warm start for a problem that has since been [shifted](Problem::shift) by one knot.
-    /// States, controls and gains move one knot towards the beginning. The last control is repeated, or is zero if the
-    /// number of controls changes there. Allocates only if the number of controls differs along the horizon.
+    /// States, controls and gains move one knot towards the beginning. Allocates only if the number of controls differs
+    /// along the horizon.
+    ///
+    /// The last control is repeated, if the new last knot has the contacts of the knot before it. If a robot's
+    /// contacts, actuation or kind of dynamics change there, the last control holds the state x_{N−1} still, as
+    /// [`quasi_static`](crate::ActionModel::quasi_static) does. A repeated control would belong to other contacts: the
+    /// start of a trot then cost 1.74 instead of 0.13, where the optimum is 0.085. If the number of controls changes
+    /// and the knot has no such control, the last control is zero. The last gains are zero.
     ///
     /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory comes from a warm
     /// start or from a solve that took a step. If the trajectory is shifted again without such a solve, the last state
@@ -154,10 +190,20 @@ impl Fddp {
         warm_start: Option<[&[f64]; 2]>,
         observer: &mut dyn Observer,
     ) -> Result<&Solution, Error> {
+        self.run_pass(problem, warm_start, Pass::default(), observer)
+    }
+
+    fn run_pass(
+        &mut self,
+        problem: &mut Problem,
+        warm_start: Option<[&[f64]; 2]>,
+        pass: Pass,
+        observer: &mut dyn Observer,
+    ) -> Result<&Solution, Error> {
         let (Self { settings, solver }, mut watch) = (self, Watch::new(observer));
         solver.begin(problem, settings, warm_start)?;
         solver.start_clock(settings, &watch);
-        let pass = Pass { resumes: warm_start.is_none(), ..Pass::default() };
+        let pass = Pass { resumes: warm_start.is_none(), ..pass };
         solver.pass(problem, settings, pass, &mut watch);
         Ok(solver.end(settings, &watch))
     }

@@ -14,6 +14,18 @@ use std::time::Duration;
 /// found. Among the candidates, the iterate with the smallest gap is the best; for equal gaps, the iterate with the
 /// lowest cost. An iterate within the bounds on controls is better than a warm start outside the bounds. An iterate has
 /// diverged, and is not a candidate, if its cost exceeds the lowest cost of the solve by more than 1e8·(1 + |lowest|).
+///
+/// A controller with a period asks whether it may execute the solution, with u = ūₜ + Kₜ (x ⊖ x̄ₜ):
+/// - after [`Converged`](Self::Converged) and [`FullStep`](Self::FullStep), yes: x̄₀ = x̂₀, and the trajectory satisfies
+///   the dynamics,
+/// - after [`MaxIterations`](Self::MaxIterations), [`TimeLimit`](Self::TimeLimit),
+///   [`Interrupted`](Self::Interrupted) and [`RegularisationLimit`](Self::RegularisationLimit), yes with care: the
+///   numbers are finite, but the trajectory may have gaps ([`Solution::gap`]), with x̄₀ ≠ x̂₀. The feedback then acts
+///   on the deviation from x̄₀. If the trace is empty, no iteration was made, and the gains are the gains of the solve
+///   before it,
+/// - after [`NotFinite`](Self::NotFinite), no: continue with the previous solution,
+/// - after [`ConstraintsViolated`](Self::ConstraintsViolated) and [`Infeasible`](Self::Infeasible), only if the
+///   violation in [`Outcome::worst`](crate::Outcome::worst) is acceptable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -21,6 +33,9 @@ use std::time::Duration;
 pub enum Status {
     /// The iterate has no gaps, and the expected decrease of its cost is below the tolerance.
     Converged,
+    /// A step of length 1 was accepted, so the trajectory has no gaps. Only
+    /// [`Fddp::resume_to_full_step`](crate::Fddp::resume_to_full_step) ends so.
+    FullStep,
     /// The maximum number of iterations is reached.
     MaxIterations,
     /// The time limit is reached, or the remaining time is too short to continue.
@@ -54,6 +69,7 @@ impl Status {
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
+            Self::FullStep => "full_step",
             Self::MaxIterations => "max_iterations",
             Self::TimeLimit => "time_limit",
             Self::Interrupted => "interrupted",
@@ -70,6 +86,7 @@ impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.pad(match self {
             Self::Converged => "converged",
+            Self::FullStep => "took a full step",
             Self::MaxIterations => "reached the limit of iterations",
             Self::TimeLimit => "ran out of time",
             Self::Interrupted => "was interrupted",
@@ -265,6 +282,16 @@ impl Solution {
                 *u = u.max(*lower).min(*upper);
             }
         }
+    }
+
+    /// Replaces the controls of knot t of a robot by the controls that hold its state still, if these are finite.
+    pub(crate) fn hold_still(&mut self, problem: &mut Problem, t: usize) {
+        let Self { xs, us, k, shape, .. } = self;
+        let (x, still) = (&xs[shape.x(t)], k[t].as_mut_slice()); // k of the new knot has no meaning yet
+        if problem.hold_still(t, x, still) && still.iter().all(|u| u.is_finite()) {
+            us[shape.u(t)].copy_from_slice(still);
+        }
+        still.fill(0.0);
     }
 
     /// Returns whether a control lies on a bound.

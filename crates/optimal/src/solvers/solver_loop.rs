@@ -55,9 +55,19 @@ pub(super) struct Pass {
     /// Whether the pass continues the last solve. If not, the pass starts from a warm start or follows an earlier pass
     /// of the same solve.
     pub(super) resumes: bool,
+    /// Maximum number of iterations of a pass that ends when a step of length 1 is accepted; `None` for a pass that
+    /// makes up to [`Settings::max_iterations`].
+    pub(super) to_full_step: Option<usize>,
     /// Whether the pass continues the last pass of the same solve, on the same cost. The regularisation then continues
     /// if the last step was rejected.
     pub(super) continues: bool,
+}
+
+impl Pass {
+    /// Returns the maximum number of iterations.
+    fn most(self, settings: &Settings) -> usize {
+        self.to_full_step.unwrap_or(settings.max_iterations)
+    }
 }
 
 /// Variables that one iteration passes to the next.
@@ -148,7 +158,7 @@ impl SolverLoop {
         let kept = pass.resumes || pass.continues;
         let regularisation = if kept { solution.resumed_regularisation(start) } else { start };
         solution.trace.clear();
-        solution.trace.reserve(settings.max_iterations.min(FORESEEN));
+        solution.trace.reserve(pass.most(settings).min(FORESEEN));
         let motion_size = if self.inverse_dynamics { problem.motion_size() } else { 0 };
         self.iterate.motions.resize(problem.horizon() * motion_size, 0.0);
         self.line_search.start(problem, settings.step_lengths, motion_size, settings.threads);
@@ -166,8 +176,8 @@ impl SolverLoop {
         let merit = Merit { gap, cost, feasible, bounded, steps: 0, regularisation };
         let mut now = Progress { merit, was_feasible: false, swept: false, swept_best: false };
         let tolerance = if self.bounded { settings.tolerance_bounded } else { settings.tolerance };
-        let tolerance = pass.tolerance.unwrap_or(tolerance);
-        let status = self.make_iterations(problem, settings, tolerance, &mut now, watch);
+        let pass = Pass { tolerance: pass.tolerance.or(Some(tolerance)), ..pass };
+        let status = self.make_iterations(problem, settings, pass, &mut now, watch);
         self.clock.end_guarantee();
         self.finish(problem, settings, now, status);
         status
@@ -184,15 +194,16 @@ impl SolverLoop {
         &mut self,
         problem: &mut Problem,
         settings: &Settings,
-        tolerance: f64,
+        pass: Pass,
         now: &mut Progress,
         watch: &mut Watch<'_>,
     ) -> Status {
         if !(now.merit.cost.is_finite() && now.merit.gap.is_finite()) {
             return Status::NotFinite;
         }
+        let tolerance = pass.tolerance.unwrap_or(settings.tolerance);
         let mut search = Search::default();
-        for iteration in 0..settings.max_iterations {
+        for iteration in 0..pass.most(settings) {
             if search.accepted {
                 now.merit.gap = self.iterate.update_gaps(problem);
             }
@@ -236,6 +247,9 @@ impl SolverLoop {
             }
             if verdict.is_break() {
                 return Status::Interrupted;
+            }
+            if pass.to_full_step.is_some() && accepted && step == 1.0 {
+                return Status::FullStep;
             }
         }
         Status::MaxIterations

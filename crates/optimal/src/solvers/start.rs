@@ -82,19 +82,23 @@ impl SolverLoop {
         }
         self.line_search.reshape(problem);
         self.best.reshape(problem);
+        let last = horizon - 1;
+        if !problem.continues_controls(last) {
+            solution.hold_still(problem, last);
+        }
         if settings.project_warm_start {
-            solution.project(problem, horizon - 1..horizon);
+            solution.project(problem, last..horizon);
         }
         if !std::mem::take(&mut self.renewed) {
             return Ok(()); // the last state stays repeated: x_N = x_{N−1}
         }
         // the last state is x_N = φ(x_{N−1}, u_{N−1}), if this state is finite
         let new = problem.shape();
-        let (x, u, last) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
-        let next = &mut next[..last.len()];
-        problem.action_mut(horizon - 1).calc(horizon - 1, &solution.xs[x], &solution.us[u], next);
+        let (x, u, end) = (new.x(last), new.u(last), new.x(horizon));
+        let next = &mut next[..end.len()];
+        problem.action_mut(last).calc(last, &solution.xs[x], &solution.us[u], next);
         if next.iter().all(|x| x.is_finite()) {
-            solution.xs[last].copy_from_slice(next);
+            solution.xs[end].copy_from_slice(next);
         }
         Ok(())
     }

@@ -289,3 +289,178 @@ fn a_copy_of_a_quadrupeds_problem_has_the_same_derivatives() {
     copy.calc_diff(&xs, &us, &mut same);
     assert_eq!(lq_knots, same);
 }
+
+/// Checks that rows of references reach their knots, whether these share their costs with other knots or not, and also
+/// after the horizon has moved.
+#[test]
+fn references_of_all_knots_are_written_at_once() {
+    let mut problem = mixed();
+    let row = |x: f64| [x, 0.2, 0.5];
+    let numbers: Vec<f64> = (0..8).flat_map(|t| row(t as f64)).collect();
+    let before = costs_of(&mut problem);
+    assert!(problem.set_references("reach", &numbers).unwrap());
+    assert!(!problem.set_references("grasp", &numbers).unwrap());
+    assert_eq!(problem.references("reach").unwrap(), (numbers.clone(), 3));
+    assert!(problem.references("grasp").is_none());
+    // the shared costs of the models are unchanged, and each row acts at its own knot
+    assert_eq!(place(&problem.cost_mut(0, "reach").unwrap()), 0.1);
+    let after = costs_of(&mut problem);
+    for t in 0..8 {
+        let quarter = if t == 7 { 1.0 } else { DT };
+        let reach = |x: f64, tool: f64| 0.5 * quarter * (tool - x).powi(2);
+        let old = [0.1, 0.1, 0.2, 0.9, 0.3, 0.4, 0.4, 0.6][t];
+        let tool = {
+            let (arm, mut data) = (robots::arm7(), Data::new(&robots::arm7()));
+            let placements = forward_kinematics(&arm, &mut data, &[0.15; 7]);
+            placements.frame(arm.frame("tool").unwrap()).translation.x
+        };
+        let expected = before[t] - reach(old, tool) + reach(t as f64, tool);
+        assert!((after[t] - expected).abs() < 1e-12 * (1.0 + expected.abs()), "knot {t}: {} {expected}", after[t]);
+    }
+    // knots keep their references when the horizon moves; the new knot has the common costs of its model
+    problem.shift(0).unwrap();
+    let moved = problem.references("reach").unwrap().0;
+    let expected = [&numbers[3..21], &row(0.1), &numbers[21..]].concat();
+    assert_eq!(moved, expected);
+    problem.set_references("reach", &numbers).unwrap();
+    assert_eq!(problem.references("reach").unwrap().0, numbers);
+}
+
+#[test]
+fn references_of_every_kind_are_rows_of_numbers() {
+    let mut rng = StdRng::seed_from_u64(5);
+    let arm = Arc::new(robots::arm7());
+    let (turned, p) = (rotation(&mut rng), Vec3::new(0.1, 0.2, 0.3));
+    let frame = || FrameName::from("tool");
+    let velocity = Motion::from([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    let residuals = [
+        ("state", Residual::State { reference: vec![0.1; 14] }, Target::Numbers(&[0.3; 14])),
+        ("com", Residual::CenterOfMass { target: Vec3::zero() }, Target::Position(p)),
+        ("turn", Residual::FrameRotation { frame: frame(), target: Mat3::identity() }, Target::Rotation(turned)),
+        (
+            "pose",
+            Residual::FramePlacement { frame: frame(), target: Se3::identity() },
+            Target::Placement(Se3::new(turned, p)),
+        ),
+        (
+            "speed",
+            Residual::FrameVelocity { frame: frame(), target: Motion::zero(), reference: ReferenceFrame::Local },
+            Target::Velocity(velocity),
+        ),
+        (
+            "momentum",
+            Residual::CentroidalMomentum { target: Force::zero() },
+            Target::Force(Force::from(velocity.to_array())),
+        ),
+    ];
+    let costs: Vec<_> = residuals.iter().map(|(name, residual, _)| plain(name, residual.clone())).collect();
+    let knot = FreeDynamics::running(arm.clone(), DT, costs).unwrap();
+    let end = FreeDynamics::terminal(arm, vec![]).unwrap();
+    let mut problem = Problem::new(vec![0.1; 14], vec![Box::new(knot)], vec![0; 2], Box::new(end)).unwrap();
+    for (name, _, target) in &residuals {
+        let (mut rows, size) = problem.references(name).unwrap();
+        target.write(&mut rows[size..2 * size]);
+        assert!(problem.set_references(name, &rows).unwrap()); // the terminal knot has no such cost, its row is NaN
+        assert_eq!(problem.cost_at_mut(1, name).unwrap().target().unwrap(), *target, "{name}");
+        assert_eq!(problem.references(name).unwrap().0[..2 * size], rows[..2 * size], "{name}");
+    }
+    // the placement is the homogeneous matrix, row by row
+    let rows = problem.references("pose").unwrap().0;
+    let matrix = nalgebra::Matrix4::from_row_slice(&rows[16..32]);
+    let columns = turned.columns().map(Vec3::to_array);
+    assert!((0..3).all(|i| (0..3).all(|j| matrix[(i, j)] == columns[j][i]) && matrix[(i, 3)] == p.to_array()[i]));
+}
+
+#[test]
+fn wrong_references_are_refused_with_their_knot() {
+    let mut problem = mixed();
+    let said = |result: Result<bool, Error>| result.unwrap_err().to_string();
+    assert_eq!(said(problem.set_references("reach", &[0.0; 23])), "`references`: expected length 16, found 23");
+    assert_eq!(
+        said(problem.set_references("reach", &[0.0; 16])),
+        "cost `reach`: its target has 3 numbers, found 2 (knot 0)"
+    );
+    let mut numbers = [0.0; 24];
+    numbers[7] = f64::NAN;
+    assert_eq!(said(problem.set_references("reach", &numbers)), "cost `reach`: its target holds a NaN (knot 2)");
+    assert_eq!(said(problem.set_weights("rest", &[1.0; 7])), "`weights`: expected length 8, found 7");
+    let message = "cost `rest`: its weight is -1, expected a finite number of at least 0 (knot 1)";
+    assert_eq!(said(problem.set_weights("rest", &[1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])), message);
+    let message = "cost `rest`: its activation has no weights (knot 0)";
+    assert_eq!(said(problem.set_entry_weights("rest", &[1.0; 8 * 14])), message);
+    let message = "cost `rest`: its weighting has 13 numbers, expected 14 (knot 0)";
+    assert_eq!(said(problem.set_entry_weights("rest", &[1.0; 8 * 13])), message);
+}
+
+#[test]
+fn weights_of_all_knots_are_written_at_once() {
+    let arm = Arc::new(robots::arm7());
+    let rest = || Residual::State { reference: vec![0.3; 14] };
+    let cost = |w: f64, each: f64| Cost::new("rest", w, rest(), Activation::Weighted(vec![each; 14]));
+    let problem = |costs: [Cost; 3]| {
+        let [first, second, last] = costs;
+        let mut knot = FreeDynamics::running(arm.clone(), DT, vec![first]).unwrap();
+        knot.set_costs(1, vec![second]).unwrap();
+        let end = FreeDynamics::terminal(arm.clone(), vec![last]).unwrap();
+        Problem::new(vec![0.1; 14], vec![Box::new(knot)], vec![0; 2], Box::new(end)).unwrap()
+    };
+    let values = |problem: &mut Problem| {
+        let mut costs = vec![0.0; 3];
+        problem.calc(&[0.2; 42], &[0.1; 14], &mut [0.0; 28], &mut costs);
+        costs
+    };
+    let mut changed = problem([(); 3].map(|()| cost(1.0, 1.0)));
+    assert!(changed.set_weights("rest", &[2.0, 3.0, 4.0]).unwrap());
+    let each: Vec<f64> = [5.0, 6.0, 7.0].iter().flat_map(|w| [*w; 14]).collect();
+    assert!(changed.set_entry_weights("rest", &each).unwrap());
+    let expected = values(&mut problem([cost(2.0, 5.0), cost(3.0, 6.0), cost(4.0, 7.0)]));
+    assert_eq!(values(&mut changed), expected);
+}
+
+/// Checks that a problem whose contacts were changed equals a problem created with these contacts, also in groups.
+#[test]
+fn contacts_are_changed_in_place() {
+    let mut rng = StdRng::seed_from_u64(31);
+    let model = Arc::new(robots::quadruped());
+    let problem = |kp_axes: Option<[f64; 6]>, place: Vec3<f64>| {
+        let mut contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+        (contacts[0].constraint.kp_axes, contacts[0].constraint.target.placement.translation) = (kp_axes, place);
+        let knot = |effort: f64| {
+            let cost = Cost::new("u", effort, Residual::Control { reference: vec![0.0; 12] }, Activation::Quadratic);
+            let knot = ContactDynamics::running(model.clone(), &contacts, DT, vec![cost]).unwrap();
+            Box::new(knot) as Box<dyn ActionModel>
+        };
+        let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
+        Problem::new(xs_of(&model), vec![knot(1.0), knot(2.0)], vec![0, 0, 1, 1, 0, 1], Box::new(end)).unwrap()
+    };
+    let xs: Vec<f64> = (0..7).flat_map(|_| random_state(&model, &mut rng)).collect();
+    let us = random(6 * 12, 5.0, &mut rng);
+    let run = |problem: &mut Problem| {
+        let (mut next, mut costs) = (vec![0.0; 6 * 37], vec![0.0; 7]);
+        problem.calc(&xs, &us, &mut next, &mut costs);
+        let mut knots = problem.lq_knots();
+        problem.calc_diff(&xs, &us, &mut knots);
+        let slopes: Vec<_> = knots[..6].iter().flat_map(|knot| [knot.A.clone(), knot.B.clone()]).collect();
+        (next, slopes)
+    };
+    let (gains, place) = ([0.0, 3.0, 90.0, 0.0, 0.0, 0.0], Vec3::new(0.3, 0.2, 0.1));
+    let mut changed = problem(None, Vec3::zero());
+    let before = run(&mut changed);
+    let name = feet(&model, ReferenceFrame::Local)[0].name.clone();
+    let found = changed.change_contacts(&name, |contact| {
+        (contact.kp_axes, contact.target.placement.translation) = (Some(gains), place);
+    });
+    assert!(found.unwrap() && !changed.change_contacts("hand", |_| {}).unwrap());
+    let after = run(&mut changed);
+    assert_eq!(after, run(&mut problem(Some(gains), place)));
+    assert_ne!(after.0, before.0);
+    let wrong = changed.change_contacts(&name, |contact| contact.kd = -1.0).unwrap_err().to_string();
+    assert!(wrong.contains("kd must be a number of at least 0, found -1"), "{wrong}");
+    let wrong = changed.change_contacts(&name, |contact| contact.frame = 0).unwrap_err().to_string();
+    assert!(wrong.contains("only its target and its gains may be changed"), "{wrong}");
+    assert_eq!(run(&mut changed), after);
+}
+
+fn xs_of(model: &Model) -> Vec<f64> {
+    [neutral(model), vec![0.0; model.nv()]].concat()
+}

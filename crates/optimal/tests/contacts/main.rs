@@ -6,6 +6,7 @@ mod callers;
 mod distances;
 mod files;
 mod groups;
+mod heading;
 mod implicit;
 mod integrators;
 mod inverse;
@@ -181,7 +182,12 @@ fn derivatives_in_contact_are_those_of_the_action() {
     for model in [robots::quadruped(), robots::humanoid()].map(Arc::new) {
         for reference in [ReferenceFrame::Local, ReferenceFrame::LocalWorldAligned] {
             let (contacts, nu) = (feet(&model, reference), model.nv() - 6);
-            let costs = contact_costs(&model, &contacts, nu, &mut rng);
+            let mut costs = contact_costs(&model, &contacts, nu, &mut rng);
+            let cone = FrictionCone::new(0.5);
+            let (lower, upper) = cone.bounds();
+            let barrier = Activation::RelaxedBarrier { lower, upper, mu: 0.5, delta: 2.0 };
+            let grip = Residual::FrictionCone { contact: contacts[0].name.clone(), cone };
+            costs.push(Cost::new("relaxed cone", 1e-2, grip, barrier));
             let action = ContactDynamics::running(model.clone(), &contacts, DT, costs).unwrap();
             check_derivatives(&format!("{} {reference:?}", model.name()), action, &model, 5.0, &mut rng);
         }

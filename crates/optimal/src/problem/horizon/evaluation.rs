@@ -168,6 +168,19 @@ impl Problem {
         Ok(us)
     }
 
+    /// Returns whether the controls of knot t have the same meaning as the controls of knot t − 1. They do not if both
+    /// knots belong to robots with different contacts, actuation or kinds of dynamics.
+    pub(crate) fn continues_controls(&self, t: usize) -> bool {
+        let group = |t: usize| self.action(t).knot_group();
+        t == 0 || group(t).zip(group(t - 1)).is_none_or(|(own, before)| own.has_controls_of(before))
+    }
+
+    /// Computes the controls that hold the state x of a robot's knot t still, as nearly as possible, into `u`. Returns
+    /// whether the knot has such controls. Allocates nothing.
+    pub(crate) fn hold_still(&mut self, t: usize, x: &[f64], u: &mut [f64]) -> bool {
+        self.action_mut(t).knot_group_mut().is_some_and(|group| group.hold_still(x, u))
+    }
+
     /// Calls `show` for each vector that the dynamics of knot t compute at (x, u) in addition to the next state, with
     /// its name. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of
     /// each contact. The force of a contact is expressed in the axes of the contact's rows; at an impact it is an

@@ -204,6 +204,17 @@ impl Problem {
         }
     }
 
+    /// Returns the duration (s) of knot t of a robot, 0 for an impact. Returns `None` for an action without a duration,
+    /// such as a user-defined one.
+    ///
+    /// # Panics
+    /// If t ≥ N.
+    #[track_caller]
+    pub fn duration(&self, t: usize) -> Option<f64> {
+        self.assert_running(t);
+        self.action(t).knot_group()?.duration(t)
+    }
+
     /// Returns the index of the model of each knot. Models added by [`set_knot`](Self::set_knot) have the indices after
     /// the models with which the problem was created.
     pub fn knot_models(&self) -> &[usize] {
@@ -276,6 +287,33 @@ impl Problem {
             self.copies.forget(self.models.place(index)[0]);
         }
         self.models.chosen(index)
+    }
+
+    /// Calls `visit` for the action of knot t, then for the copies of this action that other threads use, if `visit`
+    /// returns no error. Later changes of these actions affect only the model of knot t. If `visit` changes all in the
+    /// same way, the copies stay equal to the action.
+    pub(crate) fn each_action_of<E>(
+        &mut self,
+        t: usize,
+        visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Some(&index) = self.knot_models.get(t) else { return visit(&mut *self.terminal) };
+        let [action, own] = self.models.place(index);
+        visit(self.models.chosen(index).expect("a knot has an existing model"))?;
+        self.copies.each_of(action, own, visit)
+    }
+
+    /// Calls `visit` for each action, the terminal one last, and for the copies that other threads use, until `visit`
+    /// returns an error.
+    pub(crate) fn each_action<E>(
+        &mut self,
+        visit: &mut dyn FnMut(&mut dyn ActionModel) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for (k, action) in self.models.actions.iter_mut().enumerate() {
+            visit(&mut **action)?;
+            self.copies.each_of(k, 0, visit)?;
+        }
+        visit(&mut *self.terminal)
     }
 
     /// Returns the number of models.

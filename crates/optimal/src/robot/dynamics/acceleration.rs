@@ -83,6 +83,11 @@ impl<K: RobotKind> Integrated<RobotAcceleration<K>> {
         self.terms_mut().costs_mut(Some(t))
     }
 
+    /// Returns the costs of each knot that has separate costs.
+    pub fn separate_costs(&mut self) -> impl Iterator<Item = (usize, &Costs)> {
+        self.terms_mut().separate_costs()
+    }
+
     /// Changes the weight of the term called `name` at all knots, between solves. Returns whether such a term exists.
     ///
     /// # Errors

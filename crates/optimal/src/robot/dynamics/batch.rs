@@ -18,9 +18,9 @@ use crate::robot::knot_data::{KnotData, WIDEST, unpack};
 use crate::robot::residuals::gravity_residual::GravityResidual;
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use condyle_dynamics::{
-    ConstraintSet, Data, Model, aba, aba_derivatives, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_equations_at, constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, rnea,
-    rnea_derivatives,
+    ConstraintSet, ContactConstraint, Data, Model, aba, aba_derivatives, constrained_dynamics,
+    constrained_dynamics_derivatives, constrained_equations_at, constrained_inverse_dynamics,
+    constrained_inverse_dynamics_derivatives, rnea, rnea_derivatives,
 };
 use condyle_spatial::block::{Block, gather_rows, scatter};
 use condyle_spatial::{Matrix, matrix};
@@ -127,6 +127,15 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         let lambda = zeros(rows);
         let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Vec::new());
         Self { data, pass, gravity_residual, residuals, q, v, tau, a, lambda, linear, visited: false }
+    }
+
+    /// Sets target and gains of contact k, which must be valid.
+    pub(crate) fn set_contact(&mut self, k: usize, contact: &ContactConstraint) {
+        if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &mut self.pass {
+            let ContactConstraint { target, kp, kp_axes, kd, .. } = *contact;
+            set.set_target(k, target.lift()).expect("was checked");
+            set.set_gains(k, kp, kp_axes, kd).expect("was checked");
+        }
     }
 
     /// Allocates the workspace for the equations of knots in inverse-dynamics form.

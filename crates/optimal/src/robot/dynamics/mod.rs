@@ -12,3 +12,4 @@ pub(super) mod kkt_elimination;
 mod limb_elimination;
 pub(crate) mod robot;
 mod sensitivities;
+mod still;

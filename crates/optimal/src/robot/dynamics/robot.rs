@@ -6,6 +6,7 @@ use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use super::sensitivities::DynamicsSensitivities;
+use super::still::Still;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
 use crate::problem::{Evaluation, innermost};
@@ -20,8 +21,8 @@ use crate::robot::state::{GroupHessian, groups};
 use crate::{ActionModel, Error};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics, gravity, integrate,
-    integrate_jacobian_groups, neutral,
+    ConstraintSet, ContactConstraint, Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics,
+    gravity, integrate, integrate_jacobian_groups, neutral,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, SimdToken};
@@ -85,6 +86,7 @@ struct Work {
     /// Data of each knot of a group.
     data: Vec<KnotData>,
     elimination: Option<KktElimination>,
+    still: Option<Still>,
     group_hessian: GroupHessian,
     /// Derivatives ∂q̈/∂u. Shape: nv × nu; empty if each control drives one coordinate.
     da_du: Vec<f64>,
@@ -178,6 +180,7 @@ impl Work {
             impact: Impact::new(model, kind),
             data: vec![data; lanes],
             elimination,
+            still: Still::new(model, actuation, kind),
             group_hessian: GroupHessian::new(nv, groups),
             da_du: actuation.scratch(),
         }
@@ -254,6 +257,45 @@ impl RobotDynamics {
         }
     }
 
+    /// Changes target and gains of the contact called `name` by `change`, in the contacts and in the workspace. Returns
+    /// whether the contact exists. Allocates nothing.
+    pub(crate) fn change_contact(
+        &mut self,
+        name: &str,
+        change: &mut dyn FnMut(&mut ContactConstraint),
+    ) -> Result<bool, Error> {
+        let Self { model, kind, work, .. } = self;
+        let contacts = match kind {
+            DynamicsKind::Contact(contacts, _)
+            | DynamicsKind::ContactInverse(contacts, _)
+            | DynamicsKind::Impact { contacts, .. } => contacts,
+            _ => return Ok(false),
+        };
+        let Some(k) = contacts.iter().position(|contact| contact.name == name) else { return Ok(false) };
+        let wrong = |what| Err(Error::Contact { name: name.to_owned(), what });
+        let (old, mut new) = (contacts[k].constraint, contacts[k].constraint);
+        change(&mut new);
+        let ContactConstraint { kp, kp_axes, kd, target, .. } = new;
+        if new != (ContactConstraint { kp, kp_axes, kd, target, ..old }) {
+            return wrong("only its target and its gains may be changed".to_owned());
+        }
+        if let Err(error) = ConstraintSet::<f64>::check_all(model, &[new]) {
+            return match error {
+                condyle_dynamics::Error::Constraint { what, .. } => wrong(what),
+                other => wrong(other.to_string()),
+            };
+        }
+        contacts[k].constraint = new;
+        if let Some(Work { single, vectors, .. }) = work.made_mut() {
+            single.set_contact(k, &new);
+            if let Some(VectorBatches { short, long }) = vectors {
+                short.set_contact(k, &new);
+                long.iter_mut().for_each(|long| long.set_contact(k, &new));
+            }
+        }
+        Ok(true)
+    }
+
     /// Returns whether the knots are impacts.
     pub(crate) fn is_impact(&self) -> bool {
         self.capabilities.impulse
@@ -288,6 +330,29 @@ impl RobotDynamics {
             self.terms.append(&mut other.terms, place);
         }
         same
+    }
+
+    /// Returns whether the controls of this robot have the same meaning as the controls of `other`: both robots have
+    /// the same kind of dynamics, the same actuation, and contacts of the same frames.
+    pub(crate) fn has_controls_of(&self, other: &Self) -> bool {
+        let place = |contact: &Contact| {
+            let constraint = &contact.constraint;
+            (constraint.frame, constraint.other, constraint.kind.rows())
+        };
+        let (contacts, others) = (self.contacts().iter().map(place), other.contacts().iter().map(place));
+        core::mem::discriminant(&self.kind) == core::mem::discriminant(&other.kind)
+            && self.actuation == other.actuation
+            && contacts.eq(others)
+    }
+
+    /// Computes the controls that hold the robot still at x, as nearly as possible, into `u`. Returns whether such
+    /// controls exist: not at an impact or a terminal knot. Allocates nothing if the workspace exists.
+    pub(crate) fn hold_still(&mut self, x: &[f64], u: &mut [f64]) -> bool {
+        self.reserve();
+        let Self { model, actuation, kind, work, .. } = self;
+        let Some(Work { single, still: Some(still), .. }) = work.made_mut() else { return false };
+        still.run(model, (actuation, kind), single, x, u);
+        true
     }
 
     /// Returns the number of knots that are computed in one batch.

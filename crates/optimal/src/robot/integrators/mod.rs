@@ -368,6 +368,33 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         self.outputs(t, x, u, show);
     }
 
+    fn hold_still(&mut self, x: &[f64], u: &mut [f64]) -> bool {
+        let nu = self.inner.nu();
+        let Some(robot) = robot_mut(&mut self.inner).filter(|_| nu > 0) else { return false };
+        let exists = robot.hold_still(x, &mut u[..nu]);
+        for node in 1..self.controls.nodes() {
+            u.copy_within(..nu, node * nu);
+        }
+        exists
+    }
+
+    fn has_controls_of(&self, other: &dyn KnotGroup) -> bool {
+        let others = other.dynamics_ref().and_then(|robot| robot.downcast_ref::<RobotDynamics>());
+        robot(&self.inner).zip(others).is_none_or(|(own, other)| own.has_controls_of(other))
+    }
+
+    fn duration(&self, t: usize) -> Option<f64> {
+        match self.method {
+            Method::Terminal => None,
+            Method::Impact => Some(0.0),
+            _ => Some(*self.durations.at(t).at(t)),
+        }
+    }
+
+    fn dynamics_ref(&self) -> Option<&dyn Any> {
+        self.inner.robot()
+    }
+
     fn dynamics(&mut self) -> Option<&mut dyn Any> {
         self.inner.robot_mut()
     }

@@ -139,6 +139,8 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
                 Residual::FrameVelocity { reference, .. } => {
                     frame_velocity(velocities(), frame, reference, t, r, slopes, J);
                 }
+                Residual::HeadingVelocity { .. } => heading_velocity(velocities(), frame, t, r, slopes, J),
+                Residual::Tilt { .. } => tilt(placements, frame, t, r, slopes, J),
                 _ => unreachable!("it does not look at kinematics"),
             }
             let at = plan.slot * STRIDE;
@@ -278,6 +280,74 @@ kernel! {
     }
 }
 
+/// Square of the horizontal part of a unit vector below which it counts as vertical, without a heading.
+const VERTICAL: f64 = 1e-24;
+
+kernel! {
+    /// Computes the error Rz(ψ)ᵀ v − v_ref of a frame's velocity in its heading frame, and its Jacobians with respect
+    /// to q̇ and q:
+    ///
+    /// ```text
+    /// ∂(Rzᵀ v)/∂q = Rzᵀ ∂v/∂q − e_z × (Rzᵀ v) ∂ψ/∂q,   ∂ψ/∂q = ω_z − a_z (a_x ω_x + a_y ω_y) / (a_x² + a_y²)
+    /// ```
+    ///
+    /// a is the frame's x axis, and ω the angular part of its Jacobian.
+    fn heading_velocity<S>(
+        velocities: Velocities<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
+        J: &mut [Matrix<S>; 2],
+    ) {
+        let reference = ReferenceFrame::LocalWorldAligned;
+        let a = velocities.frame(frame).rotation.x;
+        let square = a.x * a.x + a.y * a.y;
+        let vertical = square.lt(S::splat(VERTICAL));
+        let inverse = S::select(vertical, S::one(), square).sqrt().recip();
+        let c = S::select(vertical, S::one(), a.x * inverse);
+        let s = S::select(vertical, S::zero(), a.y * inverse);
+        let v = velocities.frame_velocity(frame, reference).to_array();
+        let ([x, y], [p, q]) = (turned(c, s, v[0], v[1]), turned(c, s, v[3], v[4]));
+        let v = [x, y, v[2], p, q, v[5]];
+        for k in 0..6 {
+            r[k] = v[k] - t[k];
+        }
+        if slopes {
+            let [by_v, by_q] = J;
+            velocities.frame_jacobian(frame, reference, by_v);
+            velocities.frame_velocity_derivative(frame, reference, by_q);
+            let (by_v, by_q) = (by_v.as_mut_slice(), by_q.as_mut_slice());
+            for (by_v, by_q) in by_v.chunks_exact_mut(6).zip(by_q.chunks_exact_mut(6)) {
+                let along = a.z * (a.x * by_v[3] + a.y * by_v[4]) * inverse * inverse;
+                let dpsi = S::select(vertical, S::zero(), by_v[5] - along);
+                for k in [0, 3] {
+                    [by_v[k], by_v[k + 1]] = turned(c, s, by_v[k], by_v[k + 1]);
+                    [by_q[k], by_q[k + 1]] = turned(c, s, by_q[k], by_q[k + 1]);
+                    by_q[k] += v[k + 1] * dpsi; // −e_z × (x, y, z) = (y, −x, 0)
+                    by_q[k + 1] -= v[k] * dpsi;
+                }
+            }
+        }
+    }
+}
+
+kernel! {
+    /// Computes the tilt Rᵀ e_z − up of a frame, and its Jacobian (Rᵀ e_z) × ω with the angular velocity ω along the
+    /// axes of the frame.
+    fn tilt<S>(
+        placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
+        J: &mut [Matrix<S>; 2],
+    ) {
+        let R = placements.frame(frame).rotation;
+        let vertical = Vec3::new(R.x.z, R.y.z, R.z.z);
+        r[..3].copy_from_slice(&(vertical - vector(t, 0)).to_array());
+        if slopes {
+            placements.frame_jacobian(frame, ReferenceFrame::Local, &mut J[1]);
+            for column in J[1].as_mut_slice().chunks_exact_mut(6) {
+                let turned = vertical.cross(Vec3::new(column[3], column[4], column[5]));
+                column[..3].copy_from_slice(&turned.to_array());
+            }
+        }
+    }
+}
+
 /// Square of the distance below which two centres coincide (m²). Above it, the square of a distance has full precision.
 const COINCIDENT: f64 = 1e-300;
 
@@ -305,6 +375,12 @@ kernel! {
             placements.add_body_efforts(second, -f, row);
         }
     }
+}
+
+/// Returns Rz(ψ)ᵀ (x, y) for c = cos ψ and s = sin ψ.
+#[inline(always)]
+fn turned<S: Scalar>(c: S, s: S, x: S, y: S) -> [S; 2] {
+    [c * x + s * y, c * y - s * x]
 }
 
 /// Returns three entries of a target, from index k on.

@@ -155,7 +155,7 @@ impl Requirements {
             Residual::ControlGravity => (all.gravity, all.inertia) = (true, in_contact),
             Residual::CenterOfMass { .. } => (all.com, all.placements) = (true, true),
             Residual::CentroidalMomentum { .. } => (all.momentum, all.velocities) = (true, true),
-            Residual::FrameVelocity { .. } => all.velocities = true,
+            Residual::FrameVelocity { .. } | Residual::HeadingVelocity { .. } => all.velocities = true,
             Residual::ImpulseCenterOfMass => all.impulse_com = true,
             Residual::Distances { .. } => all.placements = true,
             _ => all.placements = residual.frame().is_some(),

@@ -88,6 +88,28 @@ pub enum Residual {
         /// Frame in which the velocity and its target are expressed.
         reference: ReferenceFrame,
     },
+    /// Velocity error Rz(ψ)ᵀ v − v_ref of a frame in its heading frame, 6 entries, linear first. v is the velocity of
+    /// the frame's origin along the world's axes, and ψ = atan2(a_y, a_x) is the heading of the frame's x axis a. The
+    /// z axis of the heading frame is vertical, so the entries are forwards, to the left, up, and the rates about these
+    /// axes. If a is vertical, ψ is 0 and its derivative is left out.
+    ///
+    /// A [`FrameTranslation`](Self::FrameTranslation) with the weights (0, 0, w) is the height of a base, which with
+    /// [`Tilt`](Self::Tilt) and this velocity describes a walk that does not care about its place.
+    HeadingVelocity {
+        /// Frame whose velocity the residual reads.
+        frame: FrameName,
+        /// Desired velocity along the axes of the heading frame (m/s, rad/s).
+        target: Motion<f64>,
+    },
+    /// Tilt Rᵀ e_z − up of a frame, 3 entries: the vertical of the world along the axes of the frame, minus its desired
+    /// value. It does not depend on the heading. With up = e_z, the first two entries are the sines of the tilts, and
+    /// are 0 if the frame is upright.
+    Tilt {
+        /// Frame whose rotation the residual reads.
+        frame: FrameName,
+        /// Desired vertical along the axes of the frame, a unit vector.
+        up: Vec3<f64>,
+    },
     /// Signed distances between geometries on the robot and obstacles in the world, or other geometries of the same
     /// robot (m). Each pair of geometries has one entry. For two spheres with centres p₁ and p₂ the entry is r = ‖p₁ −
     /// p₂‖ − radius₁ − radius₂, which is negative while the spheres overlap.
@@ -208,6 +230,7 @@ impl Residual {
             | Self::FramePlacement { .. }
             | Self::FrameTranslation { .. }
             | Self::FrameRotation { .. }
+            | Self::Tilt { .. }
             | Self::Distances { .. } => Part::Positions,
             Self::Own(own) if own.inputs() == Inputs::POSITIONS => Part::Positions,
             _ => Part::All,
@@ -250,9 +273,11 @@ impl Residual {
         let mut to = [0.0; 12];
         let mut write = |from: usize, numbers: &[f64]| to[from..][..numbers.len()].copy_from_slice(numbers);
         match self {
-            Self::CenterOfMass { target } | Self::FrameTranslation { target, .. } => write(0, &target.to_array()),
+            Self::CenterOfMass { target } | Self::FrameTranslation { target, .. } | Self::Tilt { up: target, .. } => {
+                write(0, &target.to_array());
+            }
             Self::CentroidalMomentum { target } | Self::ContactForce { target, .. } => write(0, &target.to_array()),
-            Self::FrameVelocity { target, .. } => write(0, &target.to_array()),
+            Self::FrameVelocity { target, .. } | Self::HeadingVelocity { target, .. } => write(0, &target.to_array()),
             Self::FramePlacement { target, .. } => {
                 write(0, &target.translation.to_array());
                 write(3, target.rotation.columns().map(Vec3::to_array).as_flattened());
@@ -269,7 +294,9 @@ impl Residual {
             Self::FramePlacement { frame, .. }
             | Self::FrameTranslation { frame, .. }
             | Self::FrameRotation { frame, .. }
-            | Self::FrameVelocity { frame, .. } => Some(frame),
+            | Self::FrameVelocity { frame, .. }
+            | Self::HeadingVelocity { frame, .. }
+            | Self::Tilt { frame, .. } => Some(frame),
             _ => None,
         }
     }
@@ -310,8 +337,14 @@ impl Residual {
             Self::Control { .. } => nu,
             Self::JointEffort { .. } | Self::JointAcceleration { .. } => nv,
             Self::ControlGravity => nv,
-            Self::CenterOfMass { .. } | Self::FrameTranslation { .. } | Self::FrameRotation { .. } => 3,
-            Self::CentroidalMomentum { .. } | Self::FramePlacement { .. } | Self::FrameVelocity { .. } => 6,
+            Self::CenterOfMass { .. }
+            | Self::FrameTranslation { .. }
+            | Self::FrameRotation { .. }
+            | Self::Tilt { .. } => 3,
+            Self::CentroidalMomentum { .. }
+            | Self::FramePlacement { .. }
+            | Self::FrameVelocity { .. }
+            | Self::HeadingVelocity { .. } => 6,
             Self::UndrivenEffort if capabilities.effort => capabilities.undriven.len() / nv.max(1),
             Self::UndrivenEffort => 0,
             Self::ContactForce { .. } | Self::ContactAcceleration { .. } => rows,

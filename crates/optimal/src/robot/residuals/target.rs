@@ -16,13 +16,13 @@ use condyle_dynamics::{Force, Mat3, Model, Motion, Se3, Vec3};
 pub enum Target<'a> {
     /// Reference of a state (nq + nv entries), of controls (nu), or of efforts or accelerations of joints (nv).
     Numbers(&'a [f64]),
-    /// Position of a frame's origin or of the centre of mass in the world (m).
+    /// Position of a frame's origin or of the centre of mass in the world (m), or the desired vertical of a tilt.
     Position(Vec3<f64>),
     /// Rotation of a frame in the world.
     Rotation(Mat3<f64>),
     /// Pose of a frame in the world.
     Placement(Se3<f64>),
-    /// Velocity of a frame, in the reference frame of its residual (m/s, rad/s).
+    /// Velocity of a frame, in the reference frame or the heading frame of its residual (m/s, rad/s).
     Velocity(Motion<f64>),
     /// Force of a contact along the axes of its rows (N, N m; of an impact N s, N m s), or a centroidal momentum (kg
     /// m/s, kg m²/s).
@@ -84,6 +84,19 @@ pub(super) fn check_finite(name: &str, numbers: &[f64]) -> Result<(), String> {
     }
 }
 
+/// Maximum deviation of the square of a unit vector's length from 1; larger deviations are faults, not rounding errors.
+const UNIT: f64 = 1e-6;
+
+/// Returns an error if a vector does not have the length 1; the error contains `name`.
+fn check_unit(name: &str, x: Vec3<f64>) -> Result<(), String> {
+    check_finite(name, &x.to_array())?;
+    let length = x.norm_squared().sqrt();
+    match (x.norm_squared() - 1.0).abs() <= UNIT {
+        true => Ok(()),
+        false => Err(format!("its {name} has the length {length}, expected 1")),
+    }
+}
+
 /// Returns an error if the matrix R is not a rotation; the error contains `name`.
 pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
     match R.is_rotation() {
@@ -93,6 +106,19 @@ pub(super) fn check_rotation(name: &str, R: &Mat3<f64>) -> Result<(), String> {
 }
 
 impl Residual {
+    /// Returns whether the two residuals differ only in the numbers of their targets.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        match (self.target(), other.target()) {
+            (Some(Target::Numbers(own)), Some(Target::Numbers(others))) => {
+                own.len() == others.len() && core::mem::discriminant(self) == core::mem::discriminant(other)
+            }
+            (Some(_), Some(_)) => {
+                self.differs_in_target(other) && self.frame() == other.frame() && self.contact() == other.contact()
+            }
+            _ => self == other,
+        }
+    }
+
     /// Returns the target; `None` for a residual without a target and for a user-defined function.
     pub fn target(&self) -> Option<Target<'_>> {
         Some(match self {
@@ -103,7 +129,8 @@ impl Residual {
             Self::CenterOfMass { target } | Self::FrameTranslation { target, .. } => Target::Position(*target),
             Self::FrameRotation { target, .. } => Target::Rotation(*target),
             Self::FramePlacement { target, .. } => Target::Placement(*target),
-            Self::FrameVelocity { target, .. } => Target::Velocity(*target),
+            Self::Tilt { up, .. } => Target::Position(*up),
+            Self::FrameVelocity { target, .. } | Self::HeadingVelocity { target, .. } => Target::Velocity(*target),
             Self::CentroidalMomentum { target } | Self::ContactForce { target, .. } => Target::Force(*target),
             _ => return None,
         })
@@ -133,7 +160,10 @@ impl Residual {
                 check_finite("target", X.rotation.columns().map(Vec3::to_array).as_flattened())?;
                 check_rotation("target", &X.rotation)
             }
-            (Self::FrameVelocity { .. }, Target::Velocity(v)) => check_finite("target", &v.to_array()),
+            (Self::Tilt { .. }, Target::Position(up)) => check_unit("desired vertical", up),
+            (Self::FrameVelocity { .. } | Self::HeadingVelocity { .. }, Target::Velocity(v)) => {
+                check_finite("target", &v.to_array())
+            }
             (Self::CentroidalMomentum { .. } | Self::ContactForce { .. }, Target::Force(f)) => {
                 check_finite("target", &f.to_array())
             }
@@ -157,7 +187,10 @@ impl Residual {
             (Self::CenterOfMass { target } | Self::FrameTranslation { target, .. }, Target::Position(p)) => *target = p,
             (Self::FrameRotation { target, .. }, Target::Rotation(R)) => *target = R,
             (Self::FramePlacement { target, .. }, Target::Placement(X)) => *target = X,
-            (Self::FrameVelocity { target, .. }, Target::Velocity(v)) => *target = v,
+            (Self::Tilt { up, .. }, Target::Position(p)) => *up = p,
+            (Self::FrameVelocity { target, .. } | Self::HeadingVelocity { target, .. }, Target::Velocity(v)) => {
+                *target = v
+            }
             (Self::CentroidalMomentum { target } | Self::ContactForce { target, .. }, Target::Force(f)) => *target = f,
             _ => unreachable!("the target was checked"),
         }

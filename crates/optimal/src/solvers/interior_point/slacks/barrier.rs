@@ -254,7 +254,8 @@ struct Advance<'a> {
 impl Vectorized for Advance<'_> {
     #[inline(always)]
     fn run<V: Vector>(self) {
-        let Self { barrier: Barrier { bounds, s, z, ds, dz, inverse, products, .. }, lengths: [alpha, beta], mu } = self;
+        let Self { barrier: Barrier { bounds, s, z, ds, dz, inverse, products, .. }, lengths: [alpha, beta], mu } =
+            self;
         let (mut sum, mut multipliers, mut least, mut largest) =
             (Sum::default(), Sum::default(), Least::default(), Largest::default());
         for at in 0..s.len() / 8 {

@@ -88,7 +88,14 @@ impl Slacks {
         let (n, m) = (knot.ndx(), knot.nu());
         let change = |run: (usize, &[f64])| -> f64 {
             if let (first, [entry]) = run {
-                return entry * if first < n { dx[first] } else if first < n + m { w[first - n] } else { du[first - n - m] };
+                return entry
+                    * if first < n {
+                        dx[first]
+                    } else if first < n + m {
+                        w[first - n]
+                    } else {
+                        du[first - n - m]
+                    };
             }
             let parts = [dx, w, du].into_iter().zip(split(run, [n, m]));
             parts.map(|(d, (first, entries))| short_dot(entries, &d[first..])).sum()
