@@ -46,8 +46,8 @@ pub(super) struct Filter {
 impl Filter {
     /// Begins a solve at a trajectory with the infeasibility θ.
     pub(super) fn start(&mut self, theta: f64) {
-        self.entries.reserve(MOST);
         self.clear();
+        self.entries.reserve(MOST);
         self.penalty = 0.0;
         (self.limit, self.small) = (1e4 * theta.max(1.0), 1e-4 * theta.max(1.0));
     }
