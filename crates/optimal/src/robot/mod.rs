@@ -69,6 +69,7 @@ mod problem;
 mod residuals;
 mod state;
 
+pub use crate::problem::Soft;
 pub use activation::Activation;
 pub use actuation::Actuation;
 pub use contact::Contact;

@@ -32,6 +32,10 @@ use nalgebra::DVector;
 /// value. An effort limit of 87 N m and a joint limit of 2 rad then have similar weights. Tolerances, violations and
 /// multipliers are not scaled.
 ///
+/// A row of a soft limit has another term: the cost of the limit, rounded near the bounds by the penalty. Its multiplier
+/// becomes the derivative of this cost. The row counts as violated by the difference between its distance from the
+/// bounds and the distance that corresponds to its multiplier.
+///
 /// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
 /// receding horizon, call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the
 /// last solution, its multipliers and its penalty.
@@ -317,7 +321,8 @@ impl AugmentedLagrangian {
             problem.set_multipliers(&self.kept.multipliers);
         }
         let multipliers = std::mem::take(&mut self.outcome.multipliers);
-        self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
+        let gave_way = std::mem::take(&mut self.outcome.gave_way);
+        self.outcome = Outcome { multipliers, gave_way, penalty, ..Outcome::default() };
         self.lost = false;
         self.solver.begin(problem, settings, warm_start)?;
         // tolerances of one pass, both functions of μ: eta for the constraints, omega for the gradient
@@ -436,6 +441,9 @@ impl AugmentedLagrangian {
         let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
         let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);
         (outcome.primal, outcome.cost) = (larger(*gap, violation), cost - measured.terms);
+        outcome.soft_cost = problem.write_given_way(settings.tolerance, &mut outcome.gave_way, |bounded, t, _, i| {
+            bounded.multipliers.distance(t, i)
+        });
         outcome.worst = match iterate.largest_gap() {
             Some((knot, row, amount)) if amount > violation => {
                 Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })

@@ -10,6 +10,7 @@ mod outcome;
 mod rollout;
 mod search;
 mod settings;
+mod soft_limits;
 mod solution;
 mod solver_loop;
 mod start;
