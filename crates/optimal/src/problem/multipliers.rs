@@ -21,8 +21,8 @@ use std::sync::Arc;
 /// min over a ≥ 0:   cost(a) + (|e| − a)² / 2μ − ½ μ y²,      a = max(0, (|e| / μ − linear) / (quadratic + 1/μ))
 /// ```
 ///
-/// Its derivative with respect to g is ±(|e| − a) / μ. If a > 0, this is ±(linear + quadratic · a), and the curvature is
-/// quadratic / (1 + μ quadratic).
+/// Its derivative with respect to g is ±(|e| − a) / μ. If a > 0, this is ±(linear + quadratic · a), and the curvature
+/// is quadratic / (1 + μ quadratic).
 #[derive(Debug, PartialEq)]
 pub(crate) struct Multipliers {
     mu: f64,

@@ -32,9 +32,9 @@ use nalgebra::DVector;
 /// value. An effort limit of 87 N m and a joint limit of 2 rad then have similar weights. Tolerances, violations and
 /// multipliers are not scaled.
 ///
-/// A row of a soft limit has another term: the cost of the limit, rounded near the bounds by the penalty. Its multiplier
-/// becomes the derivative of this cost. The row counts as violated by the difference between its distance from the
-/// bounds and the distance that corresponds to its multiplier.
+/// A row of a soft limit has another term: the cost of the limit, rounded near the bounds by the penalty. Its
+/// multiplier becomes the derivative of this cost. The row counts as violated by the difference between its distance
+/// from the bounds and the distance that corresponds to its multiplier.
 ///
 /// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
 /// receding horizon, call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the

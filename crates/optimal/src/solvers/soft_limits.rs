@@ -9,9 +9,9 @@ const NOTICEABLE: f64 = 100.0;
 
 impl Problem {
     /// Writes the rows of soft limits to `out` that are outside their bounds by more than 100 times `tolerance`.
-    /// Returns the cost of all values outside the bounds of soft limits. `distance` receives the constraints of an action, the
-    /// knot, the number of constraints of the knot before them, and a row. It returns the distance of the row's value
-    /// from its bounds. Allocates only if `out` never had room for all rows of soft limits.
+    /// Returns the cost of all values outside the bounds of soft limits. `distance` receives the constraints of an
+    /// action, the knot, the number of constraints of the knot before them, and a row. It returns the distance of the
+    /// row's value from its bounds. Allocates only if `out` never had room for all rows of soft limits.
     pub(super) fn write_given_way(
         &mut self,
         tolerance: f64,

@@ -61,9 +61,9 @@ use step::{Step, Trial};
 /// [`Outcome::worst`] has the knot, the row and the amount.
 ///
 /// # Soft limits
-/// A bound of a soft limit ([`Limit::softened`](crate::robot::Limit::softened)) gives way by a distance e ≥ 0, whose cost
-/// is part of the problem. With d = upper + e − s and the multiplier w of e ≥ 0, the Newton equations of a bound have
-/// four unknowns:
+/// A bound of a soft limit ([`Limit::softened`](crate::robot::Limit::softened)) gives way by a distance e ≥ 0, whose
+/// cost is part of the problem. With d = upper + e − s and the multiplier w of e ≥ 0, the Newton equations of a bound
+/// have four unknowns:
 ///
 /// ```text
 /// z d = μ,     w e = μ,     linear + quadratic · e = z + w
