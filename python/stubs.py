@@ -150,7 +150,8 @@ ARGUMENTS = {
     "Inertia": "inertia part",
     "Sequence[Inertia]": "inertias",
     "tuple[float, float]": """
-        damping_polynomial position Unicycle.weights ModelBuilder.actuator.control ModelBuilder.actuator.force""",
+        damping_polynomial position Unicycle.weights ModelBuilder.actuator.control ModelBuilder.actuator.force
+        Limit.soft""",
     "float | tuple[float, float]": "ModelBuilder.body.effort",
     "_Integrator": "Simulation.integrator",
     "Callable[[Control], None]": "control",

@@ -3400,7 +3400,8 @@ class InteriorPoint:
     violation. "regularisation_limit", "max_iterations", "time_limit", "interrupted" and "not_finite" have the same
     meanings as for `Fddp`; the solution is then the best iterate. The status is also "regularisation_limit" if the
     residuals no longer decrease near a solution. The costs of the solution and of `outcome` are equal and do not
-    include terms of the limits.
+    include terms of the limits. A soft `Limit` gives way where it costs less than to hold it. Its cost is
+    `outcome.soft_cost`, and `outcome.gave_way` lists the rows that gave way.
 
     The gains K contain the limits. Near a bound, the feedback is stiff in the direction of this bound. With μ near
     zero, active rows are equations: K does not move a control that is at its bound, and keeps other active limits at
@@ -3411,9 +3412,11 @@ class InteriorPoint:
         complementarity are scaled as in IPOPT. `max_iterations`: default 300. `barrier_start`: μ of the first
         iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `second_order`:
         whether to use the curvature of the dynamics near the solution, if the models provide it. This saves iterations
-        if this curvature is large compared with the costs. `inverse_dynamics_form`, `time_budget` (s), `threads`: as
-        for `Fddp`; the results are bit-identical for any number of threads. `regularisation_min`, `regularisation_max`:
-        the smallest and the largest regularisation; a solve that reaches the largest one stops.
+        if this curvature is large compared with the costs. With soft limits, the curvature is used from the start, or,
+        without this setting, once the residuals have not decreased for eight iterations. `inverse_dynamics_form`,
+        `time_budget` (s), `threads`: as for `Fddp`; the results are bit-identical for any number of threads.
+        `regularisation_min`, `regularisation_max`: the smallest and the largest regularisation; a solve that reaches
+        the largest one stops.
 
     >>> from condyle.optimal import Cost, FreeDynamics, InteriorPoint, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -3563,14 +3566,24 @@ class Limit:
     lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone, a centre
         of pressure and distances have their own bounds, and every other r must be 0. An entry with equal lower and
         upper bounds is an equality.
+    soft: two weights, linear and quadratic, with which the limit gives way: a number that is outside its bounds by e
+        costs linear · e + ½ quadratic · e². The weights must be at least 0, and one of them must be above 0. None is a
+        hard limit. A soft limit never makes a problem infeasible. `outcome.gave_way` lists the rows that gave way.
 
     >>> from condyle.optimal import Limit, Residual
     >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
     <condyle.optimal.Limit 'effort'>
+    >>> Limit("effort", Residual.control([0.0] * 7), upper=[30.0] * 7, soft=(1.0, 0.0))
+    <condyle.optimal.Limit 'effort', soft (1.0, 0.0)>
     """
 
     def __new__(
-        cls, name: str, residual: Residual, lower: ArrayLike | None = None, upper: ArrayLike | None = None
+        cls,
+        name: str,
+        residual: Residual,
+        lower: ArrayLike | None = None,
+        upper: ArrayLike | None = None,
+        soft: tuple[float, float] | None = None,
     ) -> Limit: ...
 
 @final

@@ -824,7 +824,9 @@ class Outcome(NamedTuple):
     cost: float
     """The cost without the penalties of the limits."""
     primal: float
-    """The largest distance of a limited number from its bounds, or the largest gap of the dynamics."""
+    """The largest distance of a limited number from its bounds, or the largest gap of the dynamics. Soft limits have no
+    part in it.
+    """
     dual: float
     """The largest entry of the Lagrangian's gradient. For `AugmentedLagrangian` the gradient is with respect to
     controls and states, projected onto the bounds of the controls. For `InteriorPoint` it is with respect to the
@@ -844,6 +846,10 @@ class Outcome(NamedTuple):
     """The largest violation; None if all limits hold exactly."""
     barrier: float = 0.0
     """The barrier parameter μ at the end of the solve of `InteriorPoint`; 0 for `AugmentedLagrangian`."""
+    soft_cost: float = 0.0
+    """The cost of all numbers outside the bounds of soft limits. `cost` does not contain it; the sum is minimal."""
+    gave_way: tuple[Violation, ...] = ()
+    """The rows of soft limits outside their bounds by more than 100 times the tolerance, knot by knot."""
     limits: dict[str, list[slice]] = {}  # noqa: RUF012 - a named tuple has no mutable attributes of its own
     """The rows of each named limit: for each knot a slice of `multipliers[knot]`, empty at a knot without the limit."""
 

@@ -118,6 +118,8 @@ def conforms(value: Any, kind: Any) -> bool:
         return isinstance(value, np.ndarray) and value.dtype == typing.get_args(parts[1])[0]
     if origin is list:
         return isinstance(value, list) and all(conforms(item, parts[0]) for item in value)
+    if origin is tuple and parts[-1] is Ellipsis:
+        return isinstance(value, tuple) and all(conforms(item, parts[0]) for item in value)
     if origin is tuple:
         return len(value) == len(parts) and all(conforms(*pair) for pair in zip(value, parts, strict=True))
     if hasattr(kind, "_fields"):

@@ -302,6 +302,16 @@ fn references_of_a_moving_horizon_allocate_nothing() {
 /// Checks that changes of multipliers, bounds and penalties do not allocate.
 #[test]
 fn a_constrained_solve_of_a_robot_allocates_nothing() {
+    count_of_constrained_solves(|limit| limit);
+}
+
+#[test]
+fn a_solve_with_soft_limits_allocates_nothing() {
+    count_of_constrained_solves(|limit| limit.softened(1e-2, 1e-2));
+}
+
+/// Counts the allocations of solves with limits, some of which `change` changes.
+fn count_of_constrained_solves(change: fn(Limit) -> Limit) {
     let arm = std::sync::Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
     let control = || Residual::Control { reference: vec![0.0; 7] };
@@ -315,7 +325,7 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
     let clear = Limit::new("clear", Residual::Distances { pairs: vec![pair] }, vec![0.0], vec![f64::INFINITY]);
     let target = Vec3::new(0.35, 0.2, 0.6);
     let reach = Residual::FrameTranslation { frame: "tool".into(), target };
-    let reach = Limit::equality("reach", reach);
+    let (weak, reach) = (change(weak), change(Limit::equality("reach", reach)));
     let (none, zero) = ([f64::INFINITY; 7], [0.0; 7]);
     let (low, high) = ([none.map(|x| -x), zero].concat(), [none, zero].concat());
     let stop = Limit::new("stop", Residual::State { reference: vec![0.0; 14] }, low, high);

@@ -1,6 +1,8 @@
 //! Interior point: optima of robots under limits, steps at a rate, outcomes, and equal bits on several threads.
 
 mod common;
+#[path = "interior_point/soft.rs"]
+mod soft;
 
 use common::{Linear, Unicycle, random, random_knot};
 use condyle_dynamics::{ContactConstraint, Vec3, neutral, robots};
@@ -37,6 +39,11 @@ fn quadratic(name: &str, weight: f64, residual: Residual) -> Cost {
 
 /// Creates the reach of an arm whose efforts and speeds are limited, so tightly that the limits are active.
 fn reach(effort: f64) -> Case {
+    reach_with(effort, |limit| limit)
+}
+
+/// Creates the same reach with changed limits.
+fn reach_with(effort: f64, change: impl Fn(Limit) -> Limit) -> Case {
     let model = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
     let tool = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.4, 0.5) };
@@ -48,10 +55,11 @@ fn reach(effort: f64) -> Case {
         Limit::new("effort", control(), vec![-effort; 7], vec![effort; 7]),
         Limit::new("state", state(), low.clone(), high.clone()),
     ];
+    let limits = limits.into_iter().map(&change).collect();
     let mut knot = FreeDynamics::running(model.clone(), 0.03, costs).unwrap().with_limits(limits).unwrap();
     let us = knot.quasi_static(&x0).repeat(25);
     let end = FreeDynamics::terminal(model, vec![quadratic("tool", 50.0, tool)]).unwrap();
-    let end = end.with_limits(vec![Limit::new("state", state(), low, high)]).unwrap();
+    let end = end.with_limits(vec![change(Limit::new("state", state(), low, high))]).unwrap();
     let problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 25], Box::new(end)).unwrap();
     Case { name: "reach", problem, xs: x0.repeat(26), us }
 }
@@ -59,6 +67,11 @@ fn reach(effort: f64) -> Case {
 /// Creates a hop of a quadruped: stance under friction cones, an impact, flight by Euler and by Runge–Kutta. If
 /// `copies` is not set, an impact with finite differences cannot be copied for other threads.
 fn hop(copies: bool) -> Case {
+    hop_with(copies, |limit| limit)
+}
+
+/// Creates the same hop with changed limits.
+fn hop_with(copies: bool, change: impl Fn(Limit) -> Limit) -> Case {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // bends the knees
@@ -72,7 +85,7 @@ fn hop(copies: bool) -> Case {
     let (lower, upper) = cone.bounds();
     let grip = |foot: &str| {
         let residual = Residual::FrictionCone { contact: foot.into(), cone: cone.clone() };
-        Limit::new(foot, residual, lower.clone(), upper.clone())
+        change(Limit::new(foot, residual, lower.clone(), upper.clone()))
     };
     let com = || Residual::CenterOfMass { target: Vec3::new(0.05, 0.02, 0.45) };
     let control = || Residual::Control { reference: vec![0.0; 12] };
@@ -82,7 +95,7 @@ fn hop(copies: bool) -> Case {
         costs.extend(effort.then(|| quadratic("effort", 1e-3, control())));
         costs
     };
-    let weak = || Limit::new("weak", control(), vec![-38.0; 12], vec![38.0; 12]);
+    let weak = || change(Limit::new("weak", control(), vec![-38.0; 12], vec![38.0; 12]));
     let limits = [feet.map(grip).to_vec(), vec![weak()]].concat();
     let stance = ContactDynamics::running(model.clone(), &contacts, 0.02, costs(true)).unwrap();
     let mut stance = stance.with_limits(limits).unwrap();

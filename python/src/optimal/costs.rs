@@ -174,22 +174,34 @@ impl Cost {
 /// lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone, a centre
 ///     of pressure and distances have their own bounds, and every other r must be 0. An entry with equal lower and
 ///     upper bounds is an equality.
+/// soft: two weights, linear and quadratic, with which the limit gives way: a number that is outside its bounds by e
+///     costs linear · e + ½ quadratic · e². The weights must be at least 0, and one of them must be above 0. None is a
+///     hard limit. A soft limit never makes a problem infeasible. `outcome.gave_way` lists the rows that gave way.
 ///
 /// >>> from condyle.optimal import Limit, Residual
 /// >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
 /// <condyle.optimal.Limit 'effort'>
+/// >>> Limit("effort", Residual.control([0.0] * 7), upper=[30.0] * 7, soft=(1.0, 0.0))
+/// <condyle.optimal.Limit 'effort', soft (1.0, 0.0)>
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Limit {
     name: String,
     residual: Py<Residual>,
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// Linear and quadratic weight of a soft limit.
+    soft: Option<(f64, f64)>,
 }
 
 impl Limit {
     /// Converts the limit to the library's type, for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Limit {
-        robot::Limit::new(&self.name, self.residual.get().of(model), self.lower.clone(), self.upper.clone())
+        let residual = self.residual.get().of(model);
+        let limit = robot::Limit::new(&self.name, residual, self.lower.clone(), self.upper.clone());
+        match self.soft {
+            Some((linear, quadratic)) => limit.softened(linear, quadratic),
+            None => limit,
+        }
     }
 
     /// Returns the residual if it is written in Python.
@@ -201,12 +213,13 @@ impl Limit {
 #[pymethods]
 impl Limit {
     #[new]
-    #[pyo3(signature = (name, residual, lower=None, upper=None))]
+    #[pyo3(signature = (name, residual, lower=None, upper=None, soft=None))]
     fn new(
         name: String,
         residual: &Bound<'_, Residual>,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
+        soft: Option<(f64, f64)>,
     ) -> PyResult<Self> {
         let lower = lower.map(|lower| numbers("lower", lower)).transpose()?;
         let upper = upper.map(|upper| numbers("upper", upper)).transpose()?;
@@ -216,17 +229,23 @@ impl Limit {
             (None, Some(upper)) => (vec![f64::NEG_INFINITY; upper.len()], upper),
             (None, None) => residual.get().bounds().unwrap_or_default(), // a limit without bounds means r = 0
         };
-        Ok(Self { name, residual: residual.clone().unbind(), lower, upper })
+        Ok(Self { name, residual: residual.clone().unbind(), lower, upper, soft })
     }
 
     fn __repr__(&self) -> String {
-        format!("<condyle.optimal.Limit '{}'>", self.name)
+        match self.soft {
+            Some((linear, quadratic)) => {
+                format!("<condyle.optimal.Limit '{}', soft ({linear:?}, {quadratic:?})>", self.name)
+            }
+            None => format!("<condyle.optimal.Limit '{}'>", self.name),
+        }
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let (py, Self { name, residual, lower, upper }) = (slf.py(), slf.get());
+        let (py, Self { name, residual, lower, upper, soft }) = (slf.py(), slf.get());
         let (lower, upper) = (!lower.is_empty()).then(|| (lower.clone(), upper.clone())).unzip(); // None means r = 0
-        Ok((slf.get_type(), (name.clone(), residual.clone_ref(py), lower, upper)).into_pyobject(py)?.into_any())
+        let arguments = (name.clone(), residual.clone_ref(py), lower, upper, *soft);
+        Ok((slf.get_type(), arguments).into_pyobject(py)?.into_any())
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {

@@ -13,7 +13,7 @@ use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyMapping, PyMappingProxy, PySlice};
+use pyo3::types::{PyDict, PyList, PyMapping, PyMappingProxy, PySlice, PyTuple};
 use std::sync::Mutex;
 
 /// The output that a user wants after each iteration of a solve.
@@ -520,7 +520,8 @@ plain_solver! {
 /// violation. "regularisation_limit", "max_iterations", "time_limit", "interrupted" and "not_finite" have the same
 /// meanings as for `Fddp`; the solution is then the best iterate. The status is also "regularisation_limit" if the
 /// residuals no longer decrease near a solution. The costs of the solution and of `outcome` are equal and do not
-/// include terms of the limits.
+/// include terms of the limits. A soft `Limit` gives way where it costs less than to hold it. Its cost is
+/// `outcome.soft_cost`, and `outcome.gave_way` lists the rows that gave way.
 ///
 /// The gains K contain the limits. Near a bound, the feedback is stiff in the direction of this bound. With μ near
 /// zero, active rows are equations: K does not move a control that is at its bound, and keeps other active limits at
@@ -532,9 +533,11 @@ plain_solver! {
 ///     iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `tick_barrier`:
 ///     the largest μ of a `tick`, in the unit of the cost, default 0.1. `second_order`:
 ///     whether to use the curvature of the dynamics near the solution, if the models provide it. This saves iterations
-///     if this curvature is large compared with the costs. `inverse_dynamics_form`, `time_budget` (s), `threads`: as
-///     for `Fddp`; the results are bit-identical for any number of threads. `regularisation_min`, `regularisation_max`:
-///     the smallest and the largest regularisation; a solve that reaches the largest one stops.
+///     if this curvature is large compared with the costs. With soft limits, the curvature is used from the start, or,
+///     without this setting, once the residuals have not decreased for eight iterations. `inverse_dynamics_form`,
+///     `time_budget` (s), `threads`: as for `Fddp`; the results are bit-identical for any number of threads.
+///     `regularisation_min`, `regularisation_max`: the smallest and the largest regularisation; a solve that reaches
+///     the largest one stops.
 ///
 /// >>> from condyle.optimal import Cost, FreeDynamics, InteriorPoint, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()
@@ -609,19 +612,14 @@ InteriorPoint, set_interior_point, show_interior_point {
 /// Converts an outcome to a Python object.
 fn give_outcome<'py>(py: Python<'py>, o: &rust::Outcome) -> PyResult<Bound<'py, PyAny>> {
     let multipliers = o.multipliers.iter().map(|y| y.give(py, None)).collect::<PyResult<Vec<_>>>()?;
-    let worst = o.worst.as_ref().map(|worst| {
-        let kind = match worst.kind {
-            rust::ViolationKind::Gap => "gap",
-            rust::ViolationKind::ControlBound => "control_bound",
-            _ => "constraint",
-        };
-        let name = worst.name.as_deref();
-        class!(py, "Violation")?.call1((kind, worst.knot, worst.row, name, worst.entry, worst.amount))
-    });
-    let worst = worst.transpose()?;
-    let outcome = class!(py, "Outcome")?;
-    let limits = limits(py, o)?;
-    outcome.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst, o.barrier, limits))
+    let worst = o.worst.as_ref().map(|worst| give_violation(py, worst)).transpose()?;
+    let gave_way = o.gave_way.iter().map(|row| give_violation(py, row)).collect::<PyResult<Vec<_>>>()?;
+    let named = PyDict::new(py);
+    named.set_item("limits", limits(py, o)?)?;
+    named.set_item("soft_cost", o.soft_cost)?;
+    named.set_item("gave_way", PyTuple::new(py, gave_way)?)?;
+    let numbers = (o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst, o.barrier);
+    class!(py, "Outcome")?.call(numbers, Some(&named))
 }
 
 /// Returns the rows of each named limit: for each knot a slice, which is empty at a knot without the limit.
@@ -653,4 +651,14 @@ fn multipliers_by_knot(problem: &mut rust::Problem, name: &str, values: &Bound<'
     }
     let values = matrix(&format!("multipliers of `{name}`"), values, [counts.len(), most])?;
     Ok(counts.iter().zip(values.chunks(most)).map(|(&count, y)| y[..count].to_vec()).collect())
+}
+
+/// Converts a violated row to a Python object.
+fn give_violation<'py>(py: Python<'py>, row: &rust::Violation) -> PyResult<Bound<'py, PyAny>> {
+    let kind = match row.kind {
+        rust::ViolationKind::Gap => "gap",
+        rust::ViolationKind::ControlBound => "control_bound",
+        _ => "constraint",
+    };
+    class!(py, "Violation")?.call1((kind, row.knot, row.row, row.name.as_deref(), row.entry, row.amount))
 }

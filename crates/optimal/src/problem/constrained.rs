@@ -59,7 +59,7 @@ impl Constrained {
     fn term(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         self.constraint.calc(t, x, u, &mut self.g);
         let (lower, upper) = self.constraint.bounds(t);
-        self.multipliers.value(t, 0, &self.g, lower, upper)
+        self.multipliers.value(t, 0, &self.g, [lower, upper], None)
     }
 
     /// Computes g and its Jacobians ∂g/∂x and ∂g/∂u.
@@ -89,7 +89,7 @@ impl Constrained {
         self.differentiate(t, x, u);
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.begin(t);
-        self.multipliers.slopes(t, 0, &self.g, [lower, upper], &mut self.d, &mut self.dd);
+        self.multipliers.slopes(t, 0, &self.g, [lower, upper], None, [&mut self.d, &mut self.dd]);
         let (ndx, nu) = (self.gx.ncols(), self.gu.ncols());
         for i in 0..self.g.len() {
             let (w, d) = (self.d[i], self.dd[i]);

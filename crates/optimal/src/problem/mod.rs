@@ -12,6 +12,7 @@ mod multipliers;
 mod numdiff;
 mod path_constraint;
 mod shape;
+mod soft;
 mod threads;
 mod unicycle;
 
@@ -28,4 +29,5 @@ pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a
 pub use numdiff::NumDiff;
 pub use path_constraint::{AutoDiffConstraint, GenericConstraint, PathConstraint};
 pub(crate) use shape::{MOST_KNOTS, Shape};
+pub use soft::Soft;
 pub use unicycle::Unicycle;

@@ -1,5 +1,6 @@
 //! Multipliers of an action's constraints, and the terms that the constraints add to the action's cost.
 
+use super::soft::Soft;
 use crate::error::Error;
 use core::ops::Range;
 use std::sync::Arc;
@@ -13,6 +14,16 @@ use std::sync::Arc;
 ///
 /// whose derivative with respect to g is e / μ. Its Gauss–Newton curvature is 1/μ outside the bounds and at equalities,
 /// and 0 elsewhere. Each row may have its own [ratio](Self::scale) of μ; y and g are never scaled.
+///
+/// A row of a soft limit gives way by the distance a ≥ 0 at which its term is smallest. The term is then the Moreau
+/// envelope of the limit's cost:
+///
+/// ```text
+/// min over a ≥ 0:   cost(a) + (|e| − a)² / 2μ − ½ μ y²,      a = max(0, (|e| / μ − linear) / (quadratic + 1/μ))
+/// ```
+///
+/// Its derivative with respect to g is ±(|e| − a) / μ. If a > 0, this is ±(linear + quadratic · a), and the curvature
+/// is quadratic / (1 + μ quadratic).
 #[derive(Debug, PartialEq)]
 pub(crate) struct Multipliers {
     mu: f64,
@@ -25,9 +36,11 @@ pub(crate) struct Multipliers {
     /// Ratios μ of a row / μ of the action; a row without an entry has the ratio 1. Shape: knots × size. Written by:
     /// `start`, `scale`.
     ratio: Vec<f64>,
-    /// Violations g − Π g from each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by:
-    /// `slopes`.
+    /// Violations g − Π g from each knot's last derivatives, NaN where g is NaN. At a row that gives way it is the
+    /// difference between this distance and a. Shape: knots × size. Written by: `slopes`.
     excess: Vec<f64>,
+    /// Distances g − Π g of all rows, also of those that give way. Shape: knots × size. Written by: `slopes`.
+    beyond: Vec<f64>,
     /// Constraint term of the cost from each knot's last derivatives. Written by: `begin`, `slopes`.
     terms: Vec<f64>,
 }
@@ -35,9 +48,9 @@ pub(crate) struct Multipliers {
 impl Clone for Multipliers {
     fn clone(&self) -> Self {
         let Self { mu, size, .. } = *self;
-        let [y, next, ratio, excess, terms] =
-            [&self.y, &self.next, &self.ratio, &self.excess, &self.terms].map(Vec::clone);
-        Self { mu, size, y, next, ratio, excess, terms }
+        let [y, next, ratio, excess, beyond, terms] =
+            [&self.y, &self.next, &self.ratio, &self.excess, &self.beyond, &self.terms].map(Vec::clone);
+        Self { mu, size, y, next, ratio, excess, beyond, terms }
     }
 
     /// Copies the multipliers; does not allocate if the number of knots is the same.
@@ -47,6 +60,7 @@ impl Clone for Multipliers {
         self.next.clone_from(&other.next);
         self.ratio.clone_from(&other.ratio);
         self.excess.clone_from(&other.excess);
+        self.beyond.clone_from(&other.beyond);
         self.terms.clone_from(&other.terms);
     }
 }
@@ -70,6 +84,8 @@ pub(crate) struct Part {
     pub(crate) first: usize,
     /// Whether the rows are functions of only the state.
     pub(crate) of_state: bool,
+    /// Cost of values outside the bounds, if the group may give way.
+    pub(crate) soft: Option<Soft>,
 }
 
 /// Function that is called with the constraints of a knot.
@@ -85,6 +101,17 @@ impl Bounded<'_> {
     /// Returns the group with a name to which a row belongs.
     pub(crate) fn part(&self, row: usize) -> Option<&Part> {
         self.named_rows().find(|(_, rows)| rows.contains(&row)).map(|(part, _)| part)
+    }
+
+    /// Returns whether any constraint may give way.
+    pub(crate) fn is_any_soft(&self) -> bool {
+        self.parts.iter().any(|part| part.soft.is_some())
+    }
+
+    /// Returns the group to which a row belongs, if the group may give way, and its cost of values outside the bounds.
+    pub(crate) fn soft(&self, row: usize) -> Option<(&Part, Soft)> {
+        let part = self.part(row)?;
+        part.soft.map(|soft| (part, soft))
     }
 
     /// Checks that the bounds have the right lengths and that some value satisfies them.
@@ -134,10 +161,18 @@ pub(crate) fn outside(z: f64, lower: f64, upper: f64) -> f64 {
     }
 }
 
+/// Returns the distance a by which a row gives way whose value z is outside its bounds by e; NaN if e is.
+#[inline(always)]
+fn given(soft: Soft, e: f64, mu: f64) -> f64 {
+    let a = (e.abs() / mu - soft.linear) / (soft.quadratic + 1.0 / mu);
+    if a <= 0.0 { 0.0 } else { a }
+}
+
 impl Multipliers {
     /// Creates multipliers of zero, for at most `size` constraints per knot.
     pub(crate) fn new(size: usize) -> Self {
-        Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], ratio: vec![], excess: vec![], terms: vec![] }
+        let [y, next, ratio, excess, beyond, terms] = [(); 6].map(|()| Vec::new());
+        Self { mu: 1.0 / PENALTY, size, y, next, ratio, excess, beyond, terms }
     }
 
     /// Returns the maximum number of constraints of a knot.
@@ -149,7 +184,7 @@ impl Multipliers {
     /// Allocates at the first call.
     pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
         self.mu = mu;
-        for numbers in [&mut self.y, &mut self.next, &mut self.excess] {
+        for numbers in [&mut self.y, &mut self.next, &mut self.excess, &mut self.beyond] {
             numbers.resize(knots * self.size, 0.0);
             numbers[t * self.size..(t + 1) * self.size].fill(0.0);
         }
@@ -200,18 +235,37 @@ impl Multipliers {
         (&self.excess[first..][..count], &self.next[first..][..count], self.terms[t])
     }
 
+    /// Returns the distance of a row's value from its bounds, from the last derivatives of knot t.
+    pub(crate) fn distance(&self, t: usize, row: usize) -> f64 {
+        self.beyond[t * self.size + row].abs()
+    }
+
     fn y(&self, t: usize, row: usize) -> f64 {
         self.y.get(t * self.size + row).copied().unwrap_or(0.0)
     }
 
     /// Returns the term of the cost for the constraints from index `first` on. `g` contains the values of these
-    /// constraints.
-    pub(crate) fn value(&self, t: usize, first: usize, g: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+    /// constraints, which give way if `soft` is set.
+    pub(crate) fn value(
+        &self,
+        t: usize,
+        first: usize,
+        g: &[f64],
+        [lower, upper]: [&[f64]; 2],
+        soft: Option<Soft>,
+    ) -> f64 {
         let mut term = 0.0;
         for i in 0..g.len() {
             let (y, mu) = (self.y(t, first + i), self.mu(t, first + i));
             let e = outside(g[i] + mu * y, lower[i], upper[i]);
-            term += 0.5 * (e * e / mu - mu * y * y);
+            let (kept, cost) = match soft {
+                None => (e, 0.0),
+                Some(soft) => {
+                    let a = given(soft, e, mu);
+                    (e.abs() - a, soft.cost(a))
+                }
+            };
+            term += cost + 0.5 * (kept * kept / mu - mu * y * y);
         }
         term
     }
@@ -229,23 +283,78 @@ impl Multipliers {
         t: usize,
         first: usize,
         g: &[f64],
-        [lower, upper]: [&[f64]; 2],
-        d: &mut [f64],
-        dd: &mut [f64],
+        bounds: [&[f64]; 2],
+        soft: Option<Soft>,
+        [d, dd]: [&mut [f64]; 2],
     ) {
+        let [lower, upper] = bounds;
         for i in 0..g.len() {
             let mu = self.mu(t, first + i);
             let e = outside(g[i] + mu * self.y(t, first + i), lower[i], upper[i]);
             let active = e != 0.0 || lower[i] == upper[i];
             (d[i], dd[i]) = (e / mu, if active { 1.0 / mu } else { 0.0 });
+            if let Some(soft) = soft {
+                let a = given(soft, e, mu);
+                if a > 0.0 {
+                    (d[i], dd[i]) = (soft.slope(a).copysign(e), soft.quadratic / (1.0 + mu * soft.quadratic));
+                }
+            }
         }
-        let term = self.value(t, first, g, lower, upper);
+        let term = self.value(t, first, g, bounds, soft);
         if let Some(sum) = self.terms.get_mut(t) {
             *sum += term;
             let rows = t * self.size + first..t * self.size + first + g.len();
             self.next[rows.clone()].copy_from_slice(&d[..g.len()]);
-            for (i, excess) in self.excess[rows].iter_mut().enumerate() {
-                *excess = outside(g[i], lower[i], upper[i]);
+            for (i, row) in rows.enumerate() {
+                let beyond = outside(g[i], lower[i], upper[i]);
+                (self.beyond[row], self.excess[row]) = (beyond, beyond);
+                if let Some(soft) = soft {
+                    let mu = self.mu(t, row - t * self.size);
+                    let e = outside(g[i] + mu * self.y[row], lower[i], upper[i]);
+                    let a = given(soft, e, mu);
+                    if a > 0.0 {
+                        self.excess[row] = beyond - a.copysign(e);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Compares value, slope and curvature of the term of a soft row by differences, and the value with a direct
+    /// minimisation over the distance a by which the row gives way.
+    #[test]
+    fn the_term_of_a_soft_row_is_an_envelope() {
+        for (lower, upper) in [(-1.0, 0.5), (0.2, 0.2), (f64::NEG_INFINITY, 0.5)] {
+            for (linear, quadratic) in [(0.7, 0.0), (0.0, 3.0), (0.4, 2.0)] {
+                let soft = Soft { linear, quadratic };
+                let mut multipliers = Multipliers::new(1);
+                multipliers.start(0, 1, 0.3);
+                multipliers.scale(0, &[lower], &[upper]);
+                for y in [0.0, 0.6, -0.9] {
+                    multipliers.set(0, &[y]);
+                    for k in 0..60 {
+                        let g = -3.0 + 0.1037 * f64::from(k);
+                        let bounds: [&[f64]; 2] = [&[lower], &[upper]];
+                        let value = |g: f64| multipliers.value(0, 0, &[g], bounds, Some(soft));
+                        let e = outside(g + 0.3 * y, lower, upper).abs();
+                        let cost = |a: f64| soft.cost(a) + (e - a).powi(2) / 0.6 - 0.15 * y * y;
+                        let least = (0..4001).map(|i| cost(e * f64::from(i) / 4000.0)).fold(f64::INFINITY, f64::min);
+                        assert!((value(g) - least).abs() < 1e-5, "{} {least}", value(g));
+                        let h = 1e-4;
+                        let slope = (value(g + h) - value(g - h)) / (2.0 * h);
+                        let curvature = (value(g + h) - 2.0 * value(g) + value(g - h)) / (h * h);
+                        let (mut d, mut dd) = ([0.0], [0.0]);
+                        multipliers.clone().slopes(0, 0, &[g], bounds, Some(soft), [&mut d, &mut dd]);
+                        assert!((d[0] - slope).abs() < 1e-6, "{d:?} {slope}");
+                        // the envelope has kinks of its slope, which no point of this grid is near
+                        assert!((dd[0] - curvature).abs() < 1e-5, "{dd:?} {curvature} at {g}");
+                    }
+                }
             }
         }
     }

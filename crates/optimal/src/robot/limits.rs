@@ -9,7 +9,7 @@ use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
 use super::residuals::view::ResidualView;
 use crate::Error;
 use crate::lq::LqKnot;
-use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
+use crate::problem::{Bounded, Multipliers, Part, Soft, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
 /// Residual within bounds: lower ≤ r(x, u) ≤ upper. Equal bounds make an equality. If both lists of bounds are empty,
@@ -44,6 +44,39 @@ use condyle_dynamics::Model;
 /// assert!(solution.us.iter().all(|u| u.abs() < 30.0 + 1e-6));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// # Soft limits
+/// A [softened](Self::softened) limit gives way where it costs less than to hold it: each value outside its bounds has
+/// the cost of [`Soft`]. An equality gives way to both sides. A soft limit never makes a problem infeasible, and it has
+/// no part in the violation that the solvers report. [`Outcome::gave_way`](crate::Outcome::gave_way) lists the rows
+/// that gave way, and [`Outcome::soft_cost`](crate::Outcome::soft_cost) is the sum of their costs. For
+/// [`Fddp`](crate::Fddp) alone, the cost is rounded near the bounds, where a penalty of 10 per squared unit costs less.
+///
+/// ```
+/// # use condyle_dynamics::robots;
+/// # use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
+/// # use condyle_optimal::{InteriorPoint, Problem, Status};
+/// # use std::sync::Arc;
+/// # let (arm, x0) = (Arc::new(robots::arm7()), [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat());
+/// // 10 N m cannot hold this arm, so the efforts exceed them, but no more than necessary
+/// let effort = Residual::Control { reference: vec![0.0; 7] };
+/// let limit = Limit::new("effort", effort.clone(), vec![-10.0; 7], vec![10.0; 7]).softened(0.1, 0.0);
+/// let rest = Residual::State { reference: x0.clone() };
+/// let rest = Limit::new("rest", rest, vec![-0.1; 14], vec![0.1; 14]);
+/// let costs = vec![Cost::new("effort", 1e-3, effort, Activation::Quadratic)];
+/// let mut knot = FreeDynamics::running(arm.clone(), 0.05, costs)?.with_limits(vec![limit, rest])?;
+/// let us = knot.quasi_static(&x0).repeat(10);
+/// let end = FreeDynamics::terminal(arm.clone(), vec![])?;
+/// let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 10], Box::new(end))?;
+/// let mut solver = InteriorPoint::new(&problem);
+/// assert_eq!(solver.solve(&mut problem, &x0.repeat(11), &us)?.status, Status::Converged);
+/// let outcome = solver.outcome();
+/// assert!(outcome.primal < 1e-6); // the hard limit holds
+/// let total: f64 = outcome.gave_way.iter().map(|row| row.amount).sum();
+/// assert!(outcome.gave_way.iter().all(|row| row.name.as_deref() == Some("effort")));
+/// assert!(total > 1.0 && (outcome.soft_cost - 0.1 * total).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -58,17 +91,26 @@ pub struct Limit {
     /// Upper bounds; ∞ for an entry without an upper bound.
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub upper: Vec<f64>,
+    /// Cost of values outside the bounds, if the limit may give way; `None` for a hard limit.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub soft: Option<Soft>,
 }
 
 impl Limit {
-    /// Returns the limit lower ≤ residual ≤ upper, with the name `name`.
+    /// Returns the hard limit lower ≤ residual ≤ upper, with the name `name`.
     pub fn new(name: &str, residual: Residual, lower: Vec<f64>, upper: Vec<f64>) -> Self {
-        Self { name: name.to_owned(), residual, lower, upper }
+        Self { name: name.to_owned(), residual, lower, upper, soft: None }
     }
 
-    /// Returns the limit residual = 0, with the name `name`.
+    /// Returns the hard limit residual = 0, with the name `name`.
     pub fn equality(name: &str, residual: Residual) -> Self {
         Self::new(name, residual, vec![], vec![])
+    }
+
+    /// Returns the limit as a soft limit: each value that is outside its bounds by e costs
+    /// linear · e + ½ quadratic · e².
+    pub fn softened(self, linear: f64, quadratic: f64) -> Self {
+        Self { soft: Some(Soft { linear, quadratic }), ..self }
     }
 
     /// Returns the plan of the limit's residual, or a text that describes why the limit does not fit the robot. Sets
@@ -82,6 +124,11 @@ impl Limit {
             if bounds.len() != plan.n {
                 return Err(format!("its {which} bound has {} numbers, expected {}", bounds.len(), plan.n));
             }
+        }
+        if let Some(Soft { linear, quadratic }) = self.soft.filter(|soft| !soft.is_valid()) {
+            return Err(format!(
+                "its soft weights must be finite, at least 0, and not both 0; found {linear} and {quadratic}"
+            ));
         }
         let bad = (0..plan.n).find(|&i| !leave_a_value(self.lower[i], self.upper[i]));
         let what = |i| format!("entry {i} must be at least {} and at most {}", self.lower[i], self.upper[i]);
@@ -119,7 +166,8 @@ impl LimitSet {
             }
             let plan = limit.plan(model, capabilities).map_err(wrong)?;
             let of_state = matches!(limit.residual, Residual::State { .. }) || limit.residual.is_kinematic();
-            set.parts.push(Part { name: limit.name.as_str().into(), first: set.lower.len(), of_state });
+            let (name, first, soft) = (limit.name.as_str().into(), set.lower.len(), limit.soft);
+            set.parts.push(Part { name, first, of_state, soft });
             set.lower.extend(&limit.lower);
             set.upper.extend(&limit.upper);
             set.terms.push(limit, plan);
@@ -250,10 +298,10 @@ pub(super) struct LimitObjective<'a> {
 
 impl Objective<Limit> for LimitObjective<'_> {
     fn value(&self, limit: &Limit, plan: &Plan, r: &[f64]) -> f64 {
-        self.multipliers.value(self.t, plan.first, r, &limit.lower, &limit.upper)
+        self.multipliers.value(self.t, plan.first, r, [&limit.lower, &limit.upper], limit.soft)
     }
 
     fn slopes(&mut self, limit: &Limit, plan: &Plan, r: &[f64], d: &mut [f64], dd: &mut [f64]) {
-        self.multipliers.slopes(self.t, plan.first, r, [&limit.lower, &limit.upper], d, dd);
+        self.multipliers.slopes(self.t, plan.first, r, [&limit.lower, &limit.upper], limit.soft, [d, dd]);
     }
 }

@@ -70,6 +70,7 @@ mod references;
 mod residuals;
 mod state;
 
+pub use crate::problem::Soft;
 pub use activation::Activation;
 pub use actuation::Actuation;
 pub use contact::Contact;

@@ -33,6 +33,10 @@ use nalgebra::DVector;
 /// value. An effort limit of 87 N m and a joint limit of 2 rad then have similar weights. Tolerances, violations and
 /// multipliers are not scaled.
 ///
+/// A row of a soft limit has another term: the cost of the limit, rounded near the bounds by the penalty. Its
+/// multiplier becomes the derivative of this cost. The row counts as violated by the difference between its distance
+/// from the bounds and the distance that corresponds to its multiplier.
+///
 /// Bounds on the actions' controls are enforced as in [`Fddp`](crate::Fddp), in addition to the constraints. For a
 /// receding horizon, call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the
 /// last solution, its multipliers and its penalty.
@@ -350,8 +354,8 @@ impl AugmentedLagrangian {
         if self.kept.penalty.is_some() {
             problem.set_multipliers(&self.kept.multipliers);
         }
-        let Outcome { multipliers, limits, .. } = std::mem::take(&mut self.outcome);
-        self.outcome = Outcome { multipliers, limits, penalty, ..Outcome::default() };
+        let Outcome { multipliers, limits, gave_way, .. } = std::mem::take(&mut self.outcome);
+        self.outcome = Outcome { multipliers, limits, gave_way, penalty, ..Outcome::default() };
         self.lost = false;
         self.solver.begin(problem, settings, warm_start)?;
         // tolerances of one pass, both functions of μ: eta for the constraints, omega for the gradient
@@ -470,6 +474,9 @@ impl AugmentedLagrangian {
         let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
         let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);
         (outcome.primal, outcome.cost) = (larger(*gap, violation), cost - measured.terms);
+        outcome.soft_cost = problem.write_given_way(settings.tolerance, &mut outcome.gave_way, |bounded, t, _, i| {
+            bounded.multipliers.distance(t, i)
+        });
         outcome.worst = match iterate.largest_gap() {
             Some((knot, row, amount)) if amount > violation => {
                 Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })

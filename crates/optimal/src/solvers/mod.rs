@@ -12,6 +12,7 @@ mod policy;
 mod rollout;
 mod search;
 mod settings;
+mod soft_limits;
 mod solution;
 mod solver_loop;
 mod start;

@@ -117,6 +117,9 @@ impl Problem {
                     let part = || bounded.part(i);
                     let fixed =
                         t == 0 && starts_at_x0 && (without_controls || part().is_some_and(|part| part.of_state));
+                    if fixed && part().is_some_and(|part| part.soft.is_some()) {
+                        continue;
+                    }
                     if !fixed {
                         all.multiplier = all.multiplier.max(y.abs());
                     }

@@ -7,9 +7,16 @@ use std::sync::Arc;
 /// Result of a solve for its constraints; the trajectory is in the [`Solution`](crate::Solution).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
-    /// Sum Σ ℓ of the knots' costs, without the penalty terms of the constraints.
+    /// Sum Σ ℓ of the knots' costs, without the penalty terms of the constraints and without `soft_cost`.
     pub cost: f64,
-    /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
+    /// Sum of the costs of all values outside the bounds of soft [`Limit`](crate::robot::Limit)s. The sum of this
+    /// number and of `cost` is minimal at a solution.
+    pub soft_cost: f64,
+    /// Rows of soft limits that are outside their bounds by more than 100 times the tolerance, knot by knot.
+    pub gave_way: Vec<Violation>,
+    /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger. Soft
+    /// limits have no part in it, except in an [`AugmentedLagrangian`](crate::AugmentedLagrangian): there it includes
+    /// the difference between a row's distance from its bounds and the distance for which its multiplier pays.
     pub primal: f64,
     /// Constraint or dynamics row with the violation in `primal`: the evidence of [`Status::ConstraintsViolated`].
     /// `None` if all constraints hold exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the

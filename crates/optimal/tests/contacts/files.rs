@@ -42,7 +42,7 @@ fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let cone = FrictionCone::new(0.7);
     let (lower, upper) = cone.bounds();
     let grip = Residual::FrictionCone { contact: stance_foot, cone };
-    stance.limits_at.insert(1, vec![Limit::new("grip", grip, lower, upper)]);
+    stance.limits_at.insert(1, vec![Limit::new("grip", grip, lower, upper).softened(2.0, 0.5)]);
     let mut end = Knot::new(
         Dynamics::Terminal,
         vec![

@@ -17,6 +17,7 @@ const MOST: usize = 256;
 pub(super) struct Measure {
     /// Infeasibility θ: the sum of all gaps, of |g − s| and of |h|.
     pub(super) theta: f64,
+    /// Cost of the trajectory and of soft limits.
     pub(super) cost: f64,
     /// Sum −Σ log of all distances of slack variables from their bounds.
     pub(super) logarithms: f64,

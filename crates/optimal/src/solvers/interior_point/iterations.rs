@@ -27,8 +27,12 @@ const LENGTHS: usize = 12;
 const SLOWEST: f64 = 0.02;
 /// Largest ratio of a step length to the minimum of a parabola through the merit for which the step is kept.
 const OVERSHOOT: f64 = 0.75;
-/// Largest KKT error at which the curvature of the dynamics is included.
+/// Largest KKT error at which the curvature of the dynamics is included. With soft limits it is included at any error:
+/// where they give way, multipliers are as large as their weights, and Gauss–Newton steps may not converge.
 const CURVED_BELOW: f64 = 1e-1;
+/// Number of iterations without a decrease of the KKT error by a tenth, after which the curvature of the dynamics is
+/// included in a problem with soft limits, whatever the settings are.
+const SLOW: usize = 8;
 /// Regularisation after a first failure.
 pub(super) const FIRST_REGULARISATION: f64 = 1e-6;
 /// Infeasibility below which a step that the filter rejects is accepted nevertheless, and no restoration is needed.
@@ -65,6 +69,10 @@ pub(super) struct Progress {
     /// Smallest KKT error so far, and the number of iterations since it fell by a tenth.
     error: f64,
     idle: usize,
+    /// Smallest KKT error so far at any distance from the solution, and the number of iterations since it fell by a
+    /// tenth.
+    smallest: f64,
+    slow: usize,
     /// Number of restarts.
     restarts: usize,
     /// Number of consecutive steps that were accepted although the filter rejected them.
@@ -74,7 +82,8 @@ pub(super) struct Progress {
 impl Progress {
     fn start(settings: &Settings) -> Self {
         let (regularisation, worst) = (settings.regularisation_min, f64::INFINITY);
-        Self { regularisation, violation: worst, error: worst, alpha: 1.0, control_scale: 1.0, ..Self::default() }
+        let [violation, error, smallest] = [worst; 3];
+        Self { regularisation, violation, error, smallest, alpha: 1.0, control_scale: 1.0, ..Self::default() }
     }
 
     /// Returns whether steps must not lead away from the constraints: after a restart, until they hold nearly.
@@ -87,6 +96,11 @@ impl Progress {
         self.stalled += if self.alpha < SHORT { SHORT_WEIGHT } else { 1 };
         if kkt.violation < 0.9 * self.violation || kkt.violation <= NEARLY_FEASIBLE {
             (self.violation, self.stalled) = (kkt.violation, 0);
+        }
+        self.slow += usize::from(self.slow < SLOW); // once slow, always slow
+        if kkt.error() < 0.9 * self.smallest {
+            self.smallest = kkt.error();
+            self.slow = if self.slow < SLOW { 0 } else { SLOW };
         }
         self.idle += 1;
         if kkt.error() < 0.9 * self.error || kkt.error() > NEARLY_FEASIBLE {
@@ -141,7 +155,10 @@ impl InteriorPoint {
             if now.idle == MOST_IDLE {
                 return Status::RegularisationLimit;
             }
-            curved = self.settings.second_order && kkt.error() < CURVED_BELOW;
+            curved = match self.slacks.has_soft_rows() {
+                true => self.settings.second_order || now.slow == SLOW,
+                false => self.settings.second_order && kkt.error() < CURVED_BELOW,
+            };
             if curved && self.equations(false) {
                 self.differentiate(problem, settings, false);
             }
@@ -169,7 +186,7 @@ impl InteriorPoint {
     /// Sets the slack variables and multipliers, μ and the filter at the start of a solve.
     pub(super) fn start_slacks(&mut self) {
         let bounds = self.slacks.bound_count().max(1) as f64;
-        let mean_cost = self.solver.iterate.solution.cost.abs() / bounds;
+        let mean_cost = (self.solver.iterate.solution.cost + self.slacks.soft_cost()).abs() / bounds;
         let mu = self.settings.barrier_start.unwrap_or(mean_cost.clamp(1e-6, 1e2));
         if self.is_warm {
             self.mu = self.mu.clamp(WARM_BARRIER * mu, mu);
@@ -284,7 +301,7 @@ impl InteriorPoint {
         let lambda = &self.adjoint.lambda;
         let penalty = if now.is_careful(kkt) { CAREFUL * sum_abs(lambda) / lambda.len() as f64 } else { 0.0 };
         self.filter.set_penalty(penalty);
-        let slope = self.step.slope() + self.mu * self.slacks.barrier_slope();
+        let slope = self.step.slope() + self.slacks.soft_slope() + self.mu * self.slacks.barrier_slope();
         let [longest, beta] = self.slacks.step_lengths(TAU);
         let mut alpha = longest;
         for _ in 0..LENGTHS {
@@ -345,14 +362,16 @@ impl InteriorPoint {
 
     /// Returns θ and φ of the iterate.
     fn measure_merit(&self) -> Measure {
-        let [infeasibility, logarithms] = self.slacks.merit_here();
+        let [infeasibility, logarithms, of_soft] = self.slacks.merit_here();
         let iterate = &self.solver.iterate;
-        Measure { theta: infeasibility + sum_abs(&iterate.gaps), cost: iterate.solution.cost, logarithms }
+        let theta = infeasibility + sum_abs(&iterate.gaps);
+        Measure { theta, cost: iterate.solution.cost + of_soft, logarithms }
     }
 
     /// Returns the merit by which the best iterate is chosen: infeasibility, then cost.
     pub(super) fn best_merit(&self, kkt: &Kkt, steps: usize) -> Merit {
-        let (gap, cost) = (kkt.gap.max(kkt.violation), self.solver.iterate.solution.cost);
+        let cost = self.solver.iterate.solution.cost + self.slacks.soft_cost();
+        let gap = kkt.gap.max(kkt.violation);
         let gap = if gap <= self.settings.tolerance { 0.0 } else { gap };
         Merit { gap, cost, feasible: true, bounded: true, steps, regularisation: self.settings.regularisation_min }
     }

@@ -15,6 +15,8 @@ pub(super) struct Kkt {
     pub(super) dual: f64,
     /// Largest product of a multiplier and its distance, divided by IPOPT's scale.
     pub(super) complementarity: f64,
+    /// Largest gradient with respect to a distance by which a soft limit gives way, divided by IPOPT's scale.
+    pub(super) soft: f64,
     /// Largest gap of the dynamics.
     pub(super) gap: f64,
     /// Largest distance of a constraint from its bounds.
@@ -24,12 +26,13 @@ pub(super) struct Kkt {
 impl Kkt {
     /// Returns the largest residual.
     pub(super) fn error(&self) -> f64 {
-        self.dual.max(self.complementarity).max(self.gap).max(self.violation)
+        self.dual.max(self.soft).max(self.complementarity).max(self.gap).max(self.violation)
     }
 
     /// Returns whether the iterate is optimal up to a tolerance, a tenth of it for violations.
     pub(super) fn is_converged(&self, tolerance: f64) -> bool {
-        self.dual.max(self.complementarity).max(self.gap) <= tolerance && self.violation <= 0.1 * tolerance
+        self.dual.max(self.soft).max(self.complementarity).max(self.gap) <= tolerance
+            && self.violation <= 0.1 * tolerance
     }
 }
 
@@ -118,9 +121,11 @@ impl Adjoint {
         }
         let rows = slacks.residuals();
         let scale = |sum: f64, count: usize| (sum / count.max(1) as f64).max(100.0) / 100.0;
+        let scale_of_dual = scale(sum + rows.sum, self.lambda.len() + rows.count);
         Kkt {
             gradient: dual,
-            dual: dual / scale(sum + rows.sum, self.lambda.len() + rows.count),
+            dual: dual / scale_of_dual,
+            soft: rows.stationarity / scale_of_dual,
             complementarity: rows.complementarity / scale(rows.sum, rows.count),
             gap: max_abs(gaps),
             violation: rows.violation,

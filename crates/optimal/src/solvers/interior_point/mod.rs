@@ -60,6 +60,19 @@ use step::{Step, Trial};
 /// to the iterations, or ends at a stationary point of the violation. The status is then [`Status::Infeasible`], and
 /// [`Outcome::worst`] has the knot, the row and the amount.
 ///
+/// # Soft limits
+/// A bound of a soft limit ([`Limit::softened`](crate::robot::Limit::softened)) gives way by a distance e ≥ 0, whose
+/// cost is part of the problem. With d = upper + e − s and the multiplier w of e ≥ 0, the Newton equations of a bound
+/// have four unknowns:
+///
+/// ```text
+/// z d = μ,     w e = μ,     linear + quadratic · e = z + w
+/// ```
+///
+/// They are eliminated as for other rows: the curvature is z / (d + c z) with c = 1 / (quadratic + w / e). If a limit
+/// gives way, its curvature therefore falls to quadratic, while z / d would rise without bound. A soft equality has two
+/// such bounds.
+///
 /// # The feedback
 /// The gains K contain the rows: a row near its bound is stiff, so that the feedback keeps its distance. At the
 /// solution, with μ near zero, active rows are equations. K does not move a control that is pressed against its bound,
@@ -436,6 +449,7 @@ impl InteriorPoint {
             (solution.status, self.outcome.worst) = (Status::Infeasible, fixed);
         }
         self.outcome.cost = solution.cost;
+        self.outcome.soft_cost = self.slacks.write_given_way(problem, tolerance, &mut self.outcome.gave_way);
         self.outcome.primal = infinite_if_nan(rows.violation).max(solution.gap);
         self.outcome.dual = infinite_if_nan(self.kkt.gradient);
         (self.outcome.iterations, self.outcome.solves) = (solution.trace.len(), 1);

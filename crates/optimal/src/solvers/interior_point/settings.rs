@@ -22,7 +22,8 @@ pub struct InteriorPointSettings {
     pub tick_barrier: f64,
     /// Whether the curvature λᵀ∂²φ of the dynamics is included near the solution, where an action computes it. Knots
     /// are then not given as equations of inverse dynamics. This saves iterations where the curvature of the dynamics
-    /// exceeds the neglected curvature of the costs.
+    /// exceeds the neglected curvature of the costs. With soft limits, the curvature is included from the start. If
+    /// this setting is off, it is then included once the KKT error has not decreased for eight iterations.
     pub second_order: bool,
     /// Whether the sweep receives a robot's knots as equations of inverse dynamics: see
     /// [`Settings::inverse_dynamics_form`](crate::Settings::inverse_dynamics_form).

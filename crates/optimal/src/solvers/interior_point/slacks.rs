@@ -1,14 +1,16 @@
 //! Constraint rows of a horizon, with their slack variables and multipliers.
 
 mod barrier;
+mod soft;
 mod steps;
 
 use crate::error::Error;
 use crate::lq::{ConstraintRow, LqKnot, RowTerms};
 use crate::problem::{Problem, Shape, outside};
 use crate::solvers::outcome::{Violation, ViolationKind};
-use barrier::{Barrier, StepLimits, padded};
+use barrier::{Barrier, Products, StepLimits, padded};
 use core::ops::Range;
+use soft::SoftRows;
 
 /// Smallest distance of an initial slack variable from a bound, relative to the bound and to the distance of the
 /// bounds.
@@ -27,6 +29,8 @@ enum RowKind {
     Equation,
     /// Row with a finite bound.
     Inequality,
+    /// Row of a soft limit.
+    Soft,
 }
 
 /// Constraint rows lower ≤ g(x, u) ≤ upper of all knots: the constraints of a knot, followed by the bounds on its
@@ -35,6 +39,9 @@ enum RowKind {
 /// ```text
 /// z_l (s − lower) = μ,     z_u (upper − s) = μ,     y = z_u − z_l
 /// ```
+///
+/// A row of a soft limit is an inequality, also if its bounds are equal. Each of its bounds gives way by a distance e,
+/// whose cost is part of the problem. Such rows have no part in the violation.
 ///
 /// The multiplier y of a row follows from the sweep, y⁺ = d + Σ ∂g δ. At the solution y = z_u − z_l, but y is more
 /// accurate: near a bound, z contains the rounding error of g times Σ.
@@ -54,6 +61,7 @@ pub(super) struct Slacks {
     trial: Vec<f64>,
     /// Slack variables and multipliers of the inequalities.
     barrier: Barrier,
+    soft: SoftRows,
     /// Multipliers of the rows, and their steps.
     y: Vec<f64>,
     dy: Vec<f64>,
@@ -73,6 +81,8 @@ pub(super) struct RowResiduals {
     pub(super) violation: f64,
     /// Largest difference between μ and the product of a multiplier and its distance.
     pub(super) complementarity: f64,
+    /// Largest gradient with respect to a distance by which a soft limit gives way.
+    pub(super) stationarity: f64,
     /// Sum of the absolute values of all multipliers, and their number.
     pub(super) sum: f64,
     pub(super) count: usize,
@@ -82,7 +92,8 @@ impl Slacks {
     /// Reads the number of rows and the bounds of each knot. Allocates only if there were never as many rows.
     pub(super) fn arrange(&mut self, problem: &mut Problem) -> Result<(), Error> {
         let (horizon, controls) = (problem.horizon(), problem.shape().offsets[problem.horizon()]);
-        let Self { offsets, counts, lower, upper, kinds, .. } = self;
+        let Self { offsets, counts, lower, upper, kinds, soft, .. } = self;
+        soft.clear();
         offsets.clear();
         counts.clear();
         lower.clear();
@@ -101,9 +112,13 @@ impl Slacks {
                     let fixed = t == 0 && (!has_controls || part.is_some_and(|part| part.of_state));
                     lower.push(low);
                     upper.push(high);
-                    kinds.push(match fixed {
-                        true => RowKind::Fixed,
-                        false => RowKind::of(low, high),
+                    kinds.push(match (part.and_then(|part| part.soft), fixed) {
+                        (Some(cost), _) => {
+                            soft.push(lower.len() - 1, cost, [low, high], !fixed);
+                            RowKind::Soft
+                        }
+                        (None, true) => RowKind::Fixed,
+                        (None, false) => RowKind::of(low, high),
                     });
                 }
             });
@@ -188,9 +203,10 @@ impl Slacks {
         self.offsets[t]..self.offsets[t + 1]
     }
 
-    /// Returns the number of finite bounds of inequalities.
+    /// Returns the number of products of multipliers and distances: one for each finite bound of an inequality, and up
+    /// to two for each finite bound of a soft limit.
     pub(super) fn bound_count(&self) -> usize {
-        self.barrier.count
+        self.barrier.count + self.soft.count
     }
 
     /// Takes the values of a trial from `values` (N + 1 equal parts) and from the controls.
@@ -244,6 +260,11 @@ impl Slacks {
             if !fixed || matches!(self.kinds[i], RowKind::Free | RowKind::Fixed) {
                 continue;
             }
+            if self.kinds[i] == RowKind::Soft {
+                self.soft.fix(i);
+                self.y[i] = 0.0;
+                continue;
+            }
             self.kinds[i] = RowKind::Fixed;
             self.equations.retain(|&equation| equation != i);
             self.barrier.free(i);
@@ -262,6 +283,7 @@ impl Slacks {
             }
         }
         self.barrier.renew();
+        self.soft.start(&self.g, mu, &mut self.y);
     }
 
     /// Sets s to the values g where they are inside, and moves z to the neighbourhood of the central path. Keeps y of
@@ -279,6 +301,7 @@ impl Slacks {
             self.y[i] = self.barrier.z[1][i] - self.barrier.z[0][i];
         }
         self.barrier.renew();
+        self.soft.resume(&self.g, mu, &mut self.y, OFF_PATH_RESUMED);
     }
 
     /// Sets y of consecutive rows of knot t, from row `first` on. The sign of y chooses the bound whose multiplier is
@@ -313,28 +336,35 @@ impl Slacks {
 
     /// Returns the multiplier of row i in the gradient of the Lagrangian.
     fn multiplier(&self, i: usize) -> f64 {
-        if self.kinds[i].is_imposed() { self.y[i] } else { 0.0 }
+        if self.kinds[i].is_imposed() || self.kinds[i] == RowKind::Soft { self.y[i] } else { 0.0 }
     }
 
     /// Returns the mean and the smallest product of a multiplier and its distance; `None` without inequalities.
     pub(super) fn products(&self) -> Option<[f64; 2]> {
-        let Barrier { products, count, .. } = &self.barrier;
-        (*count > 0).then(|| [products.sum / *count as f64, products.least])
+        let (products, count) = (self.all_products(), self.bound_count());
+        (count > 0).then(|| [products.sum / count as f64, products.least])
+    }
+
+    fn all_products(&self) -> Products {
+        self.barrier.products.and(self.soft.products)
     }
 
     /// Returns the residuals of all rows at the iterate.
     pub(super) fn residuals(&self) -> RowResiduals {
-        let Self { barrier: Barrier { products, count, .. }, equations, g, lower, upper, .. } = self;
+        let Self { equations, g, lower, upper, .. } = self;
+        let products = self.all_products();
         let mut violation = 0.0;
         for ((kind, g), (lower, upper)) in self.kinds.iter().zip(g).zip(lower.iter().zip(upper)) {
-            let e = if kind.is_imposed() { outside(*g, *lower, *upper).abs() } else { 0.0 };
+            let counts = kind.is_imposed() || *kind == RowKind::Soft && g.is_nan();
+            let e = if counts { outside(*g, *lower, *upper).abs() } else { 0.0 };
             violation = if e > violation || e.is_nan() { e } else { violation };
         }
         RowResiduals {
             violation,
             complementarity: products.largest,
+            stationarity: self.soft.stationarity(),
             sum: products.multipliers + equations.iter().map(|&i| self.y[i].abs()).sum::<f64>(),
-            count: count + equations.len(),
+            count: self.barrier.count + self.soft.bounds + equations.len(),
         }
     }
 
@@ -347,7 +377,8 @@ impl Slacks {
                 let amount = outside(self.g[i], self.lower[i], self.upper[i]).abs();
                 let amount = if amount.is_nan() { f64::INFINITY } else { amount };
                 let least = worst.as_ref().map_or(0.0, |worst| worst.amount);
-                if amount > least && imposed == (self.kinds[i] != RowKind::Fixed) {
+                let is_counted = self.kinds[i] != RowKind::Soft && imposed == (self.kinds[i] != RowKind::Fixed);
+                if amount > least && is_counted {
                     let kind =
                         if row < self.counts[t] { ViolationKind::Constraint } else { ViolationKind::ControlBound };
                     let row = if row < self.counts[t] { row } else { row - self.counts[t] };
@@ -371,6 +402,23 @@ impl Slacks {
         worst
     }
 
+    /// Returns whether controls change a row of a soft limit.
+    pub(super) fn has_soft_rows(&self) -> bool {
+        self.soft.count > 0
+    }
+
+    /// Returns the cost of the values g of soft limits that controls change.
+    pub(super) fn soft_cost(&self) -> f64 {
+        self.soft.cost(&self.g)
+    }
+
+    /// Writes the rows of soft limits that gave way by more than `tolerance`. Returns the cost of soft limits.
+    pub(super) fn write_given_way(&self, problem: &mut Problem, tolerance: f64, out: &mut Vec<Violation>) -> f64 {
+        problem.write_given_way(tolerance, out, |bounded, t, before, i| {
+            outside(self.g[self.offsets[t] + before + i], bounded.lower[i], bounded.upper[i]).abs()
+        })
+    }
+
     /// Copies the multipliers y of the constraints of each knot, followed by the multipliers of the bounds on its
     /// controls.
     pub(super) fn write_multipliers(&self, out: &mut Vec<Vec<f64>>) {
@@ -392,7 +440,7 @@ impl RowKind {
         }
     }
 
-    /// Returns whether the row takes part in the problem.
+    /// Returns whether the row must hold.
     fn is_imposed(self) -> bool {
         matches!(self, Self::Equation | Self::Inequality)
     }

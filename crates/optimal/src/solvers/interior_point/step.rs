@@ -206,8 +206,9 @@ impl InteriorPoint {
         move_by(problem, &iterate.solution, alpha, [&step.dx, &step.du], trial);
         let cost = self.evaluate_trial(problem);
         self.solver.iterate.solution.timings.rollout += self.solver.clock.ran(Phase::Rollout, begin);
-        let [infeasibility, logarithms] = self.slacks.trial_merit(alpha);
-        (cost, Measure { theta: infeasibility + sum_abs(&self.trial.gaps), cost, logarithms })
+        let [infeasibility, logarithms, of_soft] = self.slacks.trial_merit(alpha);
+        let theta = infeasibility + sum_abs(&self.trial.gaps);
+        (cost, Measure { theta, cost: cost + of_soft, logarithms })
     }
 
     /// Moves the trajectory by the whole step, without evaluating it.

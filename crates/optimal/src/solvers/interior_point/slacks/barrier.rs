@@ -4,7 +4,7 @@ use condyle_linalg::{Vector, Vectorized, at_level};
 use core::array;
 
 /// Largest factor between a multiplier and its value μ / distance on the central path.
-const OFF_PATH: f64 = 1e10;
+pub(super) const OFF_PATH: f64 = 1e10;
 
 /// Eight numbers of consecutive rows.
 type Eight = [f64; 8];
@@ -38,15 +38,37 @@ pub(super) struct Products {
     pub(super) multipliers: f64,
 }
 
+impl Products {
+    /// Returns the sums for these and other rows together.
+    pub(super) fn and(self, other: Self) -> Self {
+        let is_above = |a: f64, b: f64| a > b || a.is_nan();
+        Self {
+            sum: self.sum + other.sum,
+            least: if is_above(self.least, other.least) { other.least } else { self.least },
+            largest: if is_above(self.largest, other.largest) { self.largest } else { other.largest },
+            multipliers: self.multipliers + other.multipliers,
+        }
+    }
+}
+
 /// Largest step lengths of s and z, and the derivative of −Σ log of all distances along the step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct StepLimits {
     /// Largest relative decrease of a distance, and of a multiplier, in a step of length 1.
-    decreases: [f64; 2],
+    pub(super) decreases: [f64; 2],
     pub(super) slope: f64,
 }
 
 impl StepLimits {
+    /// Returns the limits for these and other rows together.
+    pub(super) fn and(self, other: Self) -> Self {
+        let larger = |k: usize| {
+            let (a, b) = (self.decreases[k], other.decreases[k]);
+            if a <= b || b.is_nan() { b } else { a }
+        };
+        Self { decreases: [larger(0), larger(1)], slope: self.slope + other.slope }
+    }
+
     /// Returns the largest step lengths of s and of z, at most 1, with which each distance and each multiplier keeps at
     /// least the fraction 1 − τ of its value.
     pub(super) fn lengths(&self, tau: f64) -> [f64; 2] {
@@ -143,7 +165,7 @@ pub(super) fn padded(rows: usize) -> usize {
 
 /// Returns z, moved to the interval [path / factor, path · factor].
 #[inline(always)]
-fn clamp(z: f64, path: f64, factor: f64) -> f64 {
+pub(super) fn clamp(z: f64, path: f64, factor: f64) -> f64 {
     let (low, high) = (path / factor, path * factor);
     match z {
         z if z < low => low,

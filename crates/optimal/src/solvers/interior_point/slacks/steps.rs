@@ -32,6 +32,7 @@ impl Slacks {
         mu: f64,
     ) {
         self.barrier.write_terms(&self.g, mu, &mut self.terms);
+        self.soft.write_terms(&self.g, mu, &mut self.terms);
         for &i in &self.equations {
             self.terms[i] = [self.y[i] + EQUATION_CURVATURE * (self.g[i] - self.lower[i]), EQUATION_CURVATURE];
         }
@@ -115,11 +116,12 @@ impl Slacks {
 
     /// Computes the steps of s, z and y from the changes of g at all knots.
     pub(in crate::solvers::interior_point) fn find_steps(&mut self, mu: f64) {
-        let Self { barrier, g, y, dy, equations, lower, .. } = self;
+        let Self { barrier, soft, g, y, dy, equations, lower, .. } = self;
         for &i in &*equations {
             dy[i] = EQUATION_CURVATURE * (g[i] - lower[i] + barrier.ds[i]);
         }
-        self.limits = barrier.find_step(g, mu, y, dy);
+        let of_soft = soft.find_step([g, &barrier.ds, y], mu, dy);
+        self.limits = barrier.find_step(g, mu, y, dy).and(of_soft);
     }
 
     /// Returns the largest step lengths of s and of z, at most 1, with which each distance and each multiplier keeps at
@@ -128,20 +130,22 @@ impl Slacks {
         self.limits.lengths(tau)
     }
 
-    /// Returns Σ |g − s| + Σ |h| and −Σ log of all distances, for a step of length α to the trial.
-    pub(in crate::solvers::interior_point) fn trial_merit(&self, alpha: f64) -> [f64; 2] {
+    /// Returns Σ |g − s| + Σ |h|, −Σ log of all distances, and the cost of soft limits, for a step of length α to the
+    /// trial.
+    pub(in crate::solvers::interior_point) fn trial_merit(&self, alpha: f64) -> [f64; 3] {
         self.merit(alpha, &self.trial)
     }
 
-    /// Returns Σ |g − s| + Σ |h| and −Σ log of all distances at the iterate.
-    pub(in crate::solvers::interior_point) fn merit_here(&self) -> [f64; 2] {
+    /// Returns Σ |g − s| + Σ |h|, −Σ log of all distances, and the cost of soft limits at the iterate.
+    pub(in crate::solvers::interior_point) fn merit_here(&self) -> [f64; 3] {
         self.merit(0.0, &self.g)
     }
 
-    fn merit(&self, alpha: f64, g: &[f64]) -> [f64; 2] {
+    fn merit(&self, alpha: f64, g: &[f64]) -> [f64; 3] {
         let [infeasibility, logarithms] = self.barrier.merit(g, alpha);
+        let [of_soft, more, cost] = self.soft.merit(g, alpha);
         let of_equations: f64 = self.equations.iter().map(|&i| (g[i] - self.lower[i]).abs()).sum();
-        [infeasibility + of_equations, logarithms]
+        [infeasibility + of_equations + of_soft, logarithms + more, cost]
     }
 
     /// Returns the weight of row i in a sum of squared violations. A bound far from zero tells the size of the row: an
@@ -165,9 +169,15 @@ impl Slacks {
         self.limits.slope
     }
 
+    /// Returns the derivative of the cost of soft limits along the step.
+    pub(in crate::solvers::interior_point) fn soft_slope(&self) -> f64 {
+        self.soft.cost_slope
+    }
+
     /// Moves s and y by the step length α, and z by β. Then moves z to the neighbourhood of the central path.
     pub(in crate::solvers::interior_point) fn advance(&mut self, alpha: f64, beta: f64, mu: f64) {
         self.barrier.advance([alpha, beta], Some(mu));
+        self.soft.advance([alpha, beta], Some(mu));
         self.barrier.ds.fill(0.0);
         self.y.iter_mut().zip(&self.dy).for_each(|(y, dy)| *y += alpha * dy);
     }
