@@ -80,7 +80,7 @@ impl ScaledRows {
     }
 }
 
-/// Order of the columns of [C D] in H: first those of δu, then those of δx, rotated by `turn`.
+/// Order of the columns of [C D] in H: first the columns of δu, then the columns of δx, rotated by `turn`.
 #[derive(Clone, Copy)]
 struct Columns {
     n: usize,
@@ -115,9 +115,9 @@ impl Columns {
 
     /// Appends a run of [C D] to `rows`.
     fn push_run(self, first: usize, entries: &[f64], rows: &mut ScaledRows) {
-        let mut range = usize::MAX..0;
-        self.each_run(first, entries, |to, run| range = range.start.min(to)..range.end.max(to + run.len()));
-        let row = rows.push(range);
+        let [mut start, mut end] = [usize::MAX, 0];
+        self.each_run(first, entries, |to, run| (start, end) = (start.min(to), end.max(to + run.len())));
+        let row = rows.push(start..end);
         self.each_run(first, entries, |to, run| row[to..to + run.len()].copy_from_slice(run));
     }
 }

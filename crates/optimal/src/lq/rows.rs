@@ -149,8 +149,8 @@ impl ConstraintRows {
         self.forms.push(run);
     }
 
-    /// Appends the rows W φ, where φ are the forms that were pushed since the last group. W is stored row after row. The
-    /// numbers of a row are c, its lower and its upper bound.
+    /// Appends the rows W φ, where φ are the forms that were pushed since the last group. W is stored row after row.
+    /// The numbers of a row are c, its lower and its upper bound.
     pub(crate) fn push_group(&mut self, W: &[f64], rows: impl Iterator<Item = [f64; 3]>) {
         let (first, at) = (self.rows.len(), self.numbers.len());
         let forms = self.groups.last().map_or(0, |group| group.forms.end)..self.forms.len();

@@ -21,6 +21,8 @@ pub(super) struct Step {
     /// Changes δx and δu, flat.
     pub(super) dx: Vec<f64>,
     du: Vec<f64>,
+    /// Combined changes of several steps from one linearisation.
+    sum: [Vec<f64>; 2],
     forward: Forward,
 }
 
@@ -41,15 +43,15 @@ impl Step {
     pub(super) fn new(problem: &Problem) -> Self {
         let shape = problem.shape();
         let (states, controls) = ((shape.horizon() + 1) * shape.ndx, shape.offsets[shape.horizon()]);
-        let [q, dx] = [(); 2].map(|()| vec![0.0; states]);
-        let [r, du] = [(); 2].map(|()| vec![0.0; controls]);
-        Self { q, r, dx, du, forward: Forward::default() }
+        let [q, dx, sum_x] = [(); 3].map(|()| vec![0.0; states]);
+        let [r, du, sum_u] = [(); 3].map(|()| vec![0.0; controls]);
+        Self { q, r, dx, du, sum: [sum_x, sum_u], forward: Forward::default() }
     }
 
     /// Adapts the step to a problem whose numbers of controls have changed.
     pub(super) fn reshape(&mut self, problem: &Problem) {
         let controls = problem.shape().offsets[problem.horizon()];
-        for numbers in [&mut self.r, &mut self.du] {
+        for numbers in [&mut self.r, &mut self.du, &mut self.sum[1]] {
             numbers.resize(controls, 0.0);
         }
     }
@@ -57,6 +59,18 @@ impl Step {
     /// Returns the derivative of the cost along the step.
     pub(super) fn slope(&self) -> f64 {
         dot(&self.q, &self.dx) + dot(&self.r, &self.du)
+    }
+
+    /// Begins a combination of steps.
+    pub(super) fn start_sum(&mut self) {
+        self.sum.iter_mut().for_each(|sum| sum.fill(0.0));
+    }
+
+    /// Moves the combined step by the fraction α towards the last step.
+    pub(super) fn add_to_sum(&mut self, alpha: f64) {
+        for (sum, step) in self.sum.iter_mut().zip([&self.dx, &self.du]) {
+            sum.iter_mut().zip(step).for_each(|(sum, step)| *sum += alpha * (step - *sum));
+        }
     }
 }
 
@@ -211,10 +225,11 @@ impl InteriorPoint {
         (cost, Measure { theta, cost: cost + of_soft, logarithms })
     }
 
-    /// Moves the trajectory by the whole step, without evaluating it.
-    pub(super) fn apply_step(&mut self, problem: &Problem) {
+    /// Moves the trajectory by the combined step, without evaluating it.
+    pub(super) fn apply_sum(&mut self, problem: &Problem) {
         let Self { solver: SolverLoop { iterate, renewed, .. }, trial, step, .. } = self;
-        move_by(problem, &iterate.solution, 1.0, [&step.dx, &step.du], trial);
+        let [dx, du] = &step.sum;
+        move_by(problem, &iterate.solution, 1.0, [dx, du], trial);
         std::mem::swap(&mut trial.xs, &mut iterate.solution.xs);
         std::mem::swap(&mut trial.us, &mut iterate.solution.us);
         *renewed = true;

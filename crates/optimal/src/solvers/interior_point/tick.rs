@@ -14,7 +14,9 @@ use condyle_linalg::dot;
 /// Largest complementarity of a quadratic program that counts as solved, relative to the tolerance.
 const SOLVED: f64 = 10.0;
 /// Barrier parameter μ of the first sweep of a tick, relative to the cost of the disturbance.
-const PER_DISTURBANCE: f64 = 0.1;
+const PER_DISTURBANCE: f64 = 0.01;
+/// Smallest value of this μ, relative to the cost of the plan divided by the number of bounds.
+const PER_COST: f64 = 0.01;
 /// Smallest ratio of this μ to the last μ of the tick before: one linearisation does not end a large disturbance.
 const REMEMBERED: f64 = 0.7;
 
@@ -34,13 +36,13 @@ impl InteriorPoint {
     /// Returns the barrier parameter for the first sweep of a tick. A disturbance changes the set of rows that are
     /// active. With a small μ, only the rows that were active before would have curvature.
     pub(super) fn tick_barrier(&self, disturbance: f64) -> f64 {
-        let least = (REMEMBERED * self.mu).max(0.01 * self.settings.tolerance);
+        let mean_cost = self.solver.iterate.solution.cost.abs() / self.slacks.bound_count().max(1) as f64;
+        let least = (REMEMBERED * self.mu).max(PER_COST * mean_cost).max(0.01 * self.settings.tolerance);
         (PER_DISTURBANCE * disturbance).max(least).min(self.settings.tick_barrier) // a NaN becomes the least μ
     }
 
-    /// Makes steps for the quadratic program at the iterate, and moves the trajectory by the whole step of the last
-    /// sweep. A step closes all gaps of the linearised dynamics. The slack variables and multipliers keep within their
-    /// bounds.
+    /// Makes steps for the quadratic program at the iterate. With the present s, z and y, each sweep finds the whole
+    /// step Δ from the linearisation; the combined step moves towards Δ by the step length.
     pub(super) fn solve_linearisation(
         &mut self,
         problem: &mut Problem,
@@ -56,6 +58,7 @@ impl InteriorPoint {
             true => self.slacks.resume(self.mu),
             false => self.start_slacks(),
         }
+        self.step.start_sum();
         let (mut regularisation, mut alpha) = (settings.regularisation_min, 1.0);
         let (mut status, mut has_gains) = (Status::MaxIterations, false);
         for sweep in 0..sweeps {
@@ -78,6 +81,7 @@ impl InteriorPoint {
             self.find_steps(problem);
             let [primal, dual] = self.slacks.step_lengths(TAU);
             alpha = primal;
+            self.step.add_to_sum(primal);
             self.slacks.advance(primal, dual, self.mu);
             self.solver.clock.end_guarantee();
             let complementarity = self.slacks.residuals().complementarity;
@@ -86,7 +90,7 @@ impl InteriorPoint {
                 break;
             }
         }
-        self.apply_step(problem);
+        self.apply_sum(problem);
         if !has_gains {
             self.sweep_for_gains(problem, regularisation);
         } else {

@@ -18,7 +18,7 @@ pub(super) struct Barrier {
     pub(super) s: Vec<f64>,
     /// Multipliers of the lower bounds, and of the upper bounds.
     pub(super) z: [Vec<f64>; 2],
-    /// Changes of s: first those of g, which [`find_step`](Self::find_step) replaces by δs.
+    /// Changes of g at first; [`find_step`](Self::find_step) replaces them by the steps δs.
     pub(super) ds: Vec<f64>,
     dz: [Vec<f64>; 2],
     /// Inverse distances 1 / (s − lower) and 1 / (upper − s); zero where the bound is infinite.
@@ -185,8 +185,8 @@ fn store(x: &mut [f64], at: usize, numbers: Eight) {
     x.as_chunks_mut::<8>().0[at] = numbers;
 }
 
-/// Maximum of numbers that are not negative, in eight lanes; NaN if one of them is NaN. Such numbers have the same order
-/// as their bits, and NaN is the largest. Negative numbers are ignored.
+/// Maximum of numbers that are not negative, in eight lanes; NaN if one of them is NaN. Such numbers have the same
+/// order as their bits, and NaN is the largest. Negative numbers are ignored.
 #[derive(Clone, Copy, Default)]
 struct Largest([i64; 8]);
 
