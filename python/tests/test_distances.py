@@ -73,7 +73,7 @@ def test_no_bounds_mean_no_overlap() -> None:
     residual = Residual.distances(ARM, [(Sphere([0.0, 0.0, 0.1], 0.1, "tool"), other) for other in (far, near)])
     # the spheres of the second pair overlap by 0.1 m, the spheres of the first pair do not
     assert abs(at(X0, Cost("apart", 2.0, residual))[0] - 0.1**2) < ROUNDING
-    _, (*_, lower, upper) = Limit("apart", residual).__reduce__()
+    _, (*_, lower, upper, _) = Limit("apart", residual).__reduce__()
     assert (lower, upper) == ([0.0, 0.0], [np.inf, np.inf])
 
 

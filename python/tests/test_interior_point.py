@@ -42,8 +42,8 @@ FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 SOLES = ["left_sole", "right_sole"]
 NONE, UNBOUNDED = np.zeros(0), np.full(7, np.inf)
 SETTINGS = [
-    *("tolerance", "max_iterations", "barrier_start", "second_order", "inverse_dynamics_form", "time_budget"),
-    *("threads", "regularisation_min", "regularisation_max"),
+    *("tolerance", "max_iterations", "barrier_start", "tick_barrier", "second_order"),
+    *("inverse_dynamics_form", "time_budget", "threads", "regularisation_min", "regularisation_max"),
 ]
 # Tolerance of the gradient and of complementarity, and of violations.
 DUAL, PRIMAL = 1e-6, 1e-7

@@ -97,11 +97,11 @@ impl Adjoint {
             if knot.structure.is_inverse_dynamics() {
                 slacks.add_gradient(t, knot, of_x, &mut gradient[..m], of_u);
                 add_equations(knot, gradient, [of_x, of_u], pi, &ahead[..n]);
+                if coordinates == Coordinates::Controls {
+                    convert_to_controls(knot, gradient, matrix);
+                }
                 own[..n / 2].copy_from_slice(&gradient[m + n / 2..]);
                 own[n / 2..].copy_from_slice(&gradient[m..m + n / 2]);
-                if coordinates == Coordinates::Controls {
-                    convert_to_controls(knot, &mut gradient[..m], matrix);
-                }
             } else {
                 slacks.add_gradient(t, knot, of_x, of_u, &mut []);
                 own.copy_from_slice(of_x);
@@ -133,9 +133,16 @@ impl Adjoint {
     }
 }
 
-/// Solves (∂u/∂w)ᵀ x = ∂L/∂w by Gaussian elimination with row pivots, and writes x to `gradient`.
+/// Converts the gradient with respect to (w, δv, δq) to the gradient with respect to (δu, δv, δq), for u = U (w, v, q):
+///
+/// ```text
+/// U_wᵀ ∂L/∂u = ∂L/∂w,     ∂L/∂x at constant u = ∂L/∂x at constant w − U_xᵀ ∂L/∂u
+/// ```
+///
+/// The system of equations is solved by Gaussian elimination with row pivots.
 fn convert_to_controls(knot: &LqKnot, gradient: &mut [f64], matrix: &mut Vec<f64>) {
-    let (m, InverseDynamicsForm { efforts, stride, .. }) = (gradient.len(), &knot.inverse_dynamics);
+    let (m, InverseDynamicsForm { efforts, stride, .. }) = (knot.nu(), &knot.inverse_dynamics);
+    let (gradient, of_x) = gradient.split_at_mut(m);
     matrix.clear();
     for row in 0..m {
         matrix.extend(efforts.numbers.chunks_exact(*stride).take(m).map(|U| U[row]));
@@ -156,6 +163,9 @@ fn convert_to_controls(knot: &LqKnot, gradient: &mut [f64], matrix: &mut Vec<f64
     for k in (0..m).rev() {
         let (known, sum) = (&gradient[k + 1..], &matrix[k * m + k + 1..(k + 1) * m]);
         gradient[k] = (gradient[k] - dot(sum, known)) / matrix[k * m + k];
+    }
+    if m > 0 {
+        add_scaled_product(of_x, -1.0, View::new(&efforts.numbers[m..], *stride), gradient);
     }
 }
 

@@ -27,6 +27,10 @@ pub use settings::InteriorPointSettings;
 use slacks::Slacks;
 use step::{Step, Trial};
 
+/// Largest gap (rad, m, rad/s, m/s) after knot 1 with which a plan is resumed. Larger gaps follow from steps in a wrong
+/// direction, for example after a wrong measurement.
+const MOST_GAP: f64 = 10.0;
+
 /// Primal–dual interior point with multiple shooting, for problems with [`Constrained`](crate::Constrained) actions,
 /// robots with [`Limit`](crate::robot::Limit)s and bounds on controls.
 ///
@@ -331,8 +335,9 @@ impl InteriorPoint {
         Ok(self.solver.end(&settings, &watch))
     }
 
-    /// Begins a solve: checks the arguments, sets x₀ = x̂₀, and evaluates the start. A lost trajectory of a resumed
-    /// solve is replaced by x̂₀ held still, as in [`Fddp::resume`](crate::Fddp::resume). Returns the cost of the
+    /// Begins a solve: checks the arguments, sets x₀ = x̂₀, and evaluates the start. A trajectory of a resumed solve with
+    /// large gaps is replaced by its rollout. A lost trajectory is replaced by x̂₀ held still, as in
+    /// [`Fddp::resume`](crate::Fddp::resume). Returns the cost of the
     /// [disturbance](Self::disturbance).
     fn begin(
         &mut self,
@@ -360,13 +365,19 @@ impl InteriorPoint {
         let cost = self.evaluate_trial(problem);
         self.accept_trial(cost);
         let gap = max_abs(&self.solver.iterate.gaps);
-        if warm_start.is_none()
-            && is_lost(cost, gap, last_cost)
-            && let Ok([xs, us]) = quasi_static_start(problem)
-        {
+        // the gap after x̂₀ is the measured disturbance; the others are left by the last steps
+        let left = max_abs(self.solver.iterate.gaps.get(2 * problem.ndx()..).unwrap_or(&[]));
+        let is_broken = left > MOST_GAP || left.is_nan();
+        if warm_start.is_some() || !(is_broken || is_lost(cost, gap, last_cost)) {
+            return Ok(disturbance);
+        }
+        let cost_of_rollout = self.roll_out(problem);
+        if is_broken && !is_lost(cost_of_rollout, max_abs(self.trial.gaps()), last_cost) {
+            self.accept_trial(cost_of_rollout);
+        } else if let Ok([xs, us]) = quasi_static_start(problem) {
             self.trial.set(&xs, &us);
             let start_cost = self.evaluate_trial(problem);
-            if start_cost.is_finite() && !(gap.is_finite() && start_cost >= cost) {
+            if start_cost.is_finite() && (is_broken || !(gap.is_finite() && start_cost >= cost)) {
                 self.accept_trial(start_cost);
                 self.is_warm = false;
             }

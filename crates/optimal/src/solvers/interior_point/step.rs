@@ -2,7 +2,7 @@
 
 use super::InteriorPoint;
 use super::filter::Measure;
-use crate::lq::{CurvatureFn, Forward, Hessian, LqKnot, SweepError, SweepOutput};
+use crate::lq::{CurvatureFn, DIVERGED, Forward, Hessian, LqKnot, SweepError, SweepOutput};
 use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::solvers::iterate::{Iterate, Sum};
 use crate::solvers::settings::Settings;
@@ -10,7 +10,7 @@ use crate::solvers::solution::Solution;
 use crate::solvers::solver_loop::SolverLoop;
 use crate::solvers::watch::Phase;
 use crate::time::Instant;
-use condyle_linalg::dot;
+use condyle_linalg::{View, add_scaled_product, dot};
 
 /// Step of the trajectory, with the gradients of the costs.
 #[derive(Debug, Clone)]
@@ -123,6 +123,28 @@ impl InteriorPoint {
         Iterate::write_gaps(problem, xs, next, gaps);
         self.slacks.take_trial(constraints, us, problem.shape());
         sum.value()
+    }
+
+    /// Rolls out the trajectory from x̂₀ with its gains, x⁺ = φ(x, ū + K (x ⊖ x̄)), into the trial. Returns its cost,
+    /// which is infinite or NaN if the motion diverges.
+    pub(super) fn roll_out(&mut self, problem: &mut Problem) -> f64 {
+        let Self { solver: SolverLoop { iterate: Iterate { solution, .. }, .. }, trial, .. } = self;
+        let shape = problem.shape().clone();
+        let Trial { xs, us, next, gaps, .. } = trial;
+        xs[..shape.nx].copy_from_slice(problem.x0());
+        for t in 0..shape.horizon() {
+            let (x, u, dx) = (&xs[shape.x(t)], &mut us[shape.u(t)], &mut gaps[..shape.ndx]);
+            problem.action(t).difference(&solution.xs[shape.x(t)], x, dx);
+            u.copy_from_slice(&solution.us[shape.u(t)]);
+            add_scaled_product(u, 1.0, View::new(solution.K[t].as_slice(), shape.nu(t)), dx);
+            let next = &mut next[shape.x(t)];
+            problem.action_mut(t).calc(t, x, u, next);
+            if !next.iter().all(|x| x.abs() < DIVERGED) {
+                return f64::INFINITY;
+            }
+            xs[shape.x(t + 1)].copy_from_slice(next);
+        }
+        self.evaluate_trial(problem)
     }
 
     /// Makes the trial the iterate.
