@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Prints how many pushes a trotting quadruped survives in MuJoCo, with each rule for a tick of its controller.
+"""Prints how many pushes a walking robot survives in MuJoCo, with each rule for a tick of its controller.
 
-    .venv/pinocchio/bin/python tests/peers/mujoco/pushes.py [--impulses 12,16,20,24,28] [--solver tick2]
+    .venv/pinocchio/bin/python tests/peers/mujoco/pushes.py [--robot g1] [--impulses 12,16] [--solver tick2]
 
-The robot trots at 0.5 m/s. A horizontal force of 0.1 s pushes its trunk in 8 directions, at 2 times of the gait. The
-robot survives a push if it does not fall within 1.5 s. Speed, ripple and times belong to a run without a push.
+A quadruped trots at 0.5 m/s, or a humanoid walks at 0.3 m/s. A horizontal force of 0.1 s pushes its trunk in 8
+directions, at 2 times of the gait. The robot survives a push if it does not fall within 1.5 s. Speed, ripple of the
+pitch rate and times belong to a run without a push.
 """
 
 import argparse
@@ -14,29 +15,49 @@ from itertools import product
 from typing import NamedTuple, get_args
 
 import numpy as np
+from predictive import DT, Gait, Joint, Predictive, Robot, Solver
 from scenes import urdf
-from trotting import DT, Solver, Trot
 from world import Array, World
 
-import condyle
-
-
-class Robot(NamedTuple):
-    """Quadruped of example-robot-data."""
-
-    feet: Sequence[str]
-    """Frames of the feet: front left, front right, rear left, rear right."""
-    radius: float
-    """Radius of the feet (m)."""
-    leg: Sequence[float]
-    """Angles of a leg's joints in the stand (rad)."""
-
-
-ROBOTS = {
-    name: Robot(("FL_foot", "FR_foot", "RL_foot", "RR_foot"), 0.022, (0.0, 0.85, -1.6)) for name in ("go2", "go1", "a1")
-}
-SPEED, GAIN = 0.5, 1.0
-"""Commanded speed (m/s), and the acceleration until it is reached (m/s²)."""
+QUADRUPED = Robot(
+    feet=("FL_foot", "FR_foot", "RL_foot", "RR_foot"),
+    size=0.022,
+    joints={"hip": Joint(0.0, 10.0, 0.02), "thigh": Joint(0.85, 2.0, 0.02), "calf": Joint(-1.6, 2.0, 0.02)},
+    gait=Gait(groups=((0, 3), (1, 2)), stand=0.2, swing=0.24, both=0.04),
+    knots=25,
+    speed=0.5,
+    acceleration=1.0,
+    sideways=100.0,
+    effort=2e-3,
+    impulses=(12.0, 16.0, 20.0, 24.0, 28.0),
+)
+HUMANOID = Robot(
+    feet=("left_sole", "right_sole"),
+    size=(0.17, 0.055),
+    joints={
+        "hip_pitch": Joint(-0.35, 2.0, 0.02),
+        "hip": Joint(0.0, 5.0, 0.02),
+        "knee": Joint(0.7, 0.5, 0.02),
+        "ankle_pitch": Joint(-0.35, 0.5, 0.02),
+        "ankle": Joint(0.0, 0.5, 0.02),
+        "waist": Joint(0.0, 100.0, 0.5),
+        "left_shoulder_roll": Joint(0.2, 10.0, 0.2),
+        "right_shoulder_roll": Joint(-0.2, 10.0, 0.2),
+        "shoulder_pitch": Joint(0.2, 10.0, 0.2),
+        "elbow": Joint(0.6, 10.0, 0.2),
+        "": Joint(0.0, 10.0, 0.2),
+    },
+    gait=Gait(groups=((0,), (1,)), stand=0.5, swing=0.36, both=0.08),
+    knots=40,
+    speed=0.3,
+    acceleration=0.3,
+    sideways=30.0,
+    effort=1e-3,
+    impulses=(3.0, 6.0, 9.0, 12.0, 18.0),
+)
+ROBOTS = {"go2": QUADRUPED, "go1": QUADRUPED, "a1": QUADRUPED, "g1": HUMANOID}
+SOLE = (0.035, 0.0, -0.035)
+"""Middle of the sole in the frame of the G1's ankle (m)."""
 BEGIN, PUSH_TIME, SURVIVED = (2.0, 2.1), 0.1, 1.5
 """Times at which a push begins, the duration of a push, and the time without a fall after the push (s)."""
 ANGLES = range(0, 360, 45)
@@ -68,21 +89,23 @@ class Run(NamedTuple):
     """Durations of the ticks (s)."""
 
 
-def standing(model: condyle.Model, robot: Robot) -> Array:
-    """Returns the posture in which the robot stands, with the feet at height 0."""
-    q, data = condyle.neutral(model), condyle.Data(model)
-    q[7:] = [*robot.leg] * 4
-    q[2] -= min(condyle.frame_placement(model, data, q, foot)[2, 3] for foot in robot.feet)
-    return q
+def text_of(name: str) -> str:
+    """Returns the URDF of a robot. The G1 gets frames in the middle of its soles."""
+    text, added = urdf(name), ""
+    for side in ("left", "right") if name == "g1" else ():
+        origin = f'<origin xyz="{SOLE[0]} {SOLE[1]} {SOLE[2]}"/>'
+        ends = f'<parent link="{side}_ankle_roll_link"/><child link="{side}_sole"/>'
+        added += f'<link name="{side}_sole"/><joint name="{side}_sole" type="fixed">{ends}{origin}</joint>'
+    return text.replace("</robot>", f"{added}</robot>")
 
 
 def run(name: str, solver: Solver, seconds: float, push: Push | None = None) -> Run:
-    """Simulates a robot that starts from a stand and trots, until it falls or the time is over."""
+    """Simulates a robot that starts from a stand and walks, until it falls or the time is over."""
     robot = ROBOTS[name]
-    world = World(urdf(name), robot.feet, robot.radius)
-    q = standing(world.model, robot)
+    world = World(text_of(name), robot.feet, robot.size)
+    q = robot.standing(world.model)
     world.set_state(q, np.zeros(world.model.nv))
-    control = Trot(world.model, q, robot.feet, solver)
+    control = Predictive(world.model, robot, solver)
     control.start(np.concatenate(world.state()))
     period, velocities, fallen = round(DT / world.dt), [], False
     for i in range(round(seconds / world.dt)):
@@ -93,7 +116,7 @@ def run(name: str, solver: Solver, seconds: float, push: Push | None = None) -> 
             fallen = True
             break
         if i % period == 0 and i > 0:
-            control.command[0] = np.clip(GAIN * (t - 0.3), 0.0, SPEED)
+            control.command[0] = np.clip(robot.acceleration * (t - robot.gait.stand - 0.1), 0.0, robot.speed)
             control.tick(x, t)
         force = np.zeros(3)
         if push is not None and push.begin <= t < push.begin + PUSH_TIME:
@@ -114,10 +137,12 @@ def main() -> None:
     """Prints the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robot", choices=list(ROBOTS), default="go2")
-    parser.add_argument("--impulses", default="12,16,20,24,28", help="N s, separated by commas")
+    parser.add_argument("--impulses", help="N s, separated by commas")
     parser.add_argument("--solver", choices=get_args(Solver), action="append")
     arguments = parser.parse_args()
-    impulses = [float(text) for text in arguments.impulses.split(",")]
+    impulses: Sequence[float] = ROBOTS[arguments.robot].impulses
+    if arguments.impulses is not None:
+        impulses = [float(text) for text in arguments.impulses.split(",")]
     heads = [
         "",
         *(f"{impulse:g} N s" for impulse in impulses),

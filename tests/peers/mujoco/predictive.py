@@ -1,8 +1,8 @@
-"""Model predictive control of a trotting quadruped: the gait, the references, and a tick with each solver."""
+"""Model predictive control of robots with legs: the gait, the references, and a tick with each solver."""
 
 import time
 from collections.abc import Sequence
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from world import Array
@@ -22,43 +22,101 @@ from condyle.optimal import (
     Problem,
     Residual,
     Solution,
+    WrenchCone,
 )
 
 Solver = Literal["tick2", "fddp1", "full_step"]
 """Rule of a tick: `tick(2)` of `InteriorPoint`, or of `Fddp` one iteration, or iterations until a full step (at most
 3)."""
 
-KNOTS, DT = 25, 0.02
-"""Number of knots of the horizon, and their duration (s). A tick follows after each DT."""
-STAND, SWING, BOTH = 0.2, 0.24, 0.04
-"""Durations (s): the stand before the first step, a swing, and the time with all feet on the ground between swings."""
-STEP = SWING + BOTH
-PAIRS = ((0, 3), (1, 2))
-"""Feet that swing together, as indices of the sequence front left, front right, rear left, rear right."""
-STANCES = ((0, 1, 2, 3), (1, 2), (0, 3))
-"""Feet on the ground: always all of them, or while one of the pairs swings."""
-HEIGHT = 0.06
-"""Height of a swing (m)."""
+DT = 0.02
+"""Duration of a knot, and period of the ticks (s)."""
+FRICTION = 0.5
+"""Friction coefficient of the plan. The coefficient in MuJoCo is larger."""
 CAPTURE = 0.1
 """Distance by which a foothold moves for each m/s of deviation from the commanded velocity (s)."""
-FRICTION, LEAST = 0.5, 5.0
-"""Friction coefficient and smallest normal force (N) of the plan. The coefficient in MuJoCo is larger."""
 END = 0.1
 """Weight of the terminal state, relative to the other knots."""
+HEIGHT = 0.06
+"""Height of a swing (m)."""
 
 
-def swinging(t: float) -> tuple[int | None, float]:
-    """Returns the pair of feet in the air at the time t (s), and the elapsed fraction of its swing."""
-    step, since = divmod(t - STAND + 1e-9, STEP)
-    if step < 0 or since >= SWING:
-        return None, 0.0
-    return int(step) % 2, since / SWING
+class Gait(NamedTuple):
+    """Gait in which groups of feet swing in turn, after a stand."""
+
+    groups: tuple[tuple[int, ...], ...]
+    """Feet that swing together, as indices, in the sequence of their swings."""
+    stand: float
+    """Duration of the stand before the first swing (s)."""
+    swing: float
+    """Duration of a swing (s)."""
+    both: float
+    """Time between two swings, with all feet on the ground (s)."""
+
+    @property
+    def step(self) -> float:
+        """Time between the beginnings of two swings (s)."""
+        return self.swing + self.both
+
+    def swinging(self, t: float) -> tuple[int | None, float]:
+        """Returns the group of feet in the air at the time t (s), and the elapsed fraction of its swing."""
+        step, since = divmod(t - self.stand + 1e-9, self.step)
+        if step < 0 or since >= self.swing:
+            return None, 0.0
+        return int(step) % len(self.groups), since / self.swing
+
+    def stance(self, t: float) -> int:
+        """Returns the index of the stance at the time t (s): 0 with all feet on the ground, else 1 + the group."""
+        group, _ = self.swinging(t)
+        return 0 if group is None else 1 + group
 
 
-def stance(t: float) -> int:
-    """Returns the index of the stance at the time t (s)."""
-    pair, _ = swinging(t)
-    return 0 if pair is None else 1 + pair
+class Joint(NamedTuple):
+    """Angle of a joint in the stand, and weights of its deviations."""
+
+    angle: float
+    """Angle (rad)."""
+    weight: float
+    """Weight of the angle's deviation."""
+    rate: float
+    """Weight of the velocity."""
+
+
+class Robot(NamedTuple):
+    """Robot of example-robot-data, and the settings of its controller."""
+
+    feet: Sequence[str]
+    """Frames of the feet."""
+    size: float | tuple[float, float]
+    """Radius of a foot, or side lengths of a sole (m)."""
+    joints: dict[str, Joint]
+    """Joints by a part of their name; the first part that fits counts."""
+    gait: Gait
+    knots: int
+    """Number of knots of the horizon."""
+    speed: float
+    """Commanded speed (m/s)."""
+    acceleration: float
+    """Acceleration until the commanded speed is reached (m/s²)."""
+    sideways: float
+    """Weight of the trunk's velocity to the left."""
+    effort: float
+    """Weight of the efforts."""
+    impulses: tuple[float, ...]
+    """Impulses of pushes (N s)."""
+    trusted: float = 0.85
+    """Side lengths of a sole that the plan assumes, relative to the real ones."""
+
+    def joint(self, name: str) -> Joint:
+        """Returns the settings of a joint."""
+        return next(joint for part, joint in self.joints.items() if part in name)
+
+    def standing(self, model: condyle.Model) -> Array:
+        """Returns the posture in which the robot stands, with the feet at height 0."""
+        q, data = condyle.neutral(model), condyle.Data(model)
+        q[7:] = [self.joint(name).angle for name in model.names[2:]]
+        q[2] -= min(condyle.frame_placement(model, data, q, foot)[2, 3] for foot in self.feet)
+        return q
 
 
 def heading(q: Array) -> float:
@@ -79,13 +137,12 @@ def turned(angle: Array | float, vector: Array) -> Array:
     return np.stack([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]], -1)
 
 
-class Trot:
-    """Controller of a trot: a plan for the next half second, which a tick renews, and the plan's feedback."""
+class Predictive:
+    """Controller of a walk or a trot: a plan, which a tick renews, and the plan's feedback."""
 
-    def __init__(self, model: condyle.Model, q: Array, feet: Sequence[str], solver: Solver = "tick2") -> None:
-        """q: the posture in which the robot stands on the ground. feet: frames of the feet, front left, front right,
-        rear left, rear right."""
-        self.model, self.feet, self.rule = model, list(feet), solver
+    def __init__(self, model: condyle.Model, robot: Robot, solver: Solver = "tick2") -> None:
+        self.model, self.robot, self.rule, self.feet = model, robot, solver, list(robot.feet)
+        q = robot.standing(model)
         self.command = np.zeros(3)
         """Velocity forwards and to the left (m/s), and rate of turning (rad/s)."""
         self.seconds: list[float] = []
@@ -97,30 +154,47 @@ class Trot:
         self._height = q[2] - self._placed[:, 2].mean()
         self._stance = 0
         self._effort = model.limits.effort[6:]
-        self._knots = [self._knot(touching) for touching in STANCES]
+        every = range(len(self.feet))
+        self._stances = [tuple(every), *(tuple(k for k in every if k not in group) for group in robot.gait.groups)]
+        """Feet on the ground: all of them, or while one of the groups swings."""
+        self._knots = [self._knot(touching) for touching in self._stances]
 
     def _places(self, q: Array) -> Array:
         places = [condyle.frame_placement(self.model, self._data, q, foot)[:3, 3] for foot in self.feet]
         return np.array(places)
 
     def _state(self, weight: float) -> Cost:
-        joints = self.model.nv - 6
-        posture = np.r_[0.0, 0.0, 2000.0, 400.0, 400.0, 100.0, [10.0, 2.0, 2.0] * (joints // 3)]
-        rates = np.r_[100.0, 100.0, 50.0, 3.0, 3.0, 10.0, np.full(joints, 0.02)]
+        joints = [self.robot.joint(name) for name in self.model.names[2:]]
+        posture = np.r_[0.0, 0.0, 2000.0, 400.0, 400.0, 100.0, [joint.weight for joint in joints]]
+        rates = np.r_[100.0, self.robot.sideways, 50.0, 3.0, 3.0, 10.0, [joint.rate for joint in joints]]
         return Cost("state", weight, Residual.state(self._x), Activation.weighted(np.r_[posture, rates]))
+
+    def _swing(self, k: int) -> list[Cost]:
+        """Returns the costs of a foot that swings. A sole remains level."""
+        foot = self.feet[k]
+        place = Residual.frame_translation(self.model, foot, self._placed[k])
+        costs = [Cost(f"{foot} swings", 1.0, place, Activation.weighted([300.0, 300.0, 3e4]))]
+        if not isinstance(self.robot.size, float):
+            costs.append(Cost(f"{foot} tilts", 1e3, Residual.tilt(self.model, foot)))
+        return costs
+
+    def _cone(self, foot: str) -> Residual:
+        """Returns the cone of the force of a foot, or of the wrench of a sole."""
+        friction = FrictionCone(FRICTION, least=5.0)
+        if isinstance(self.robot.size, float):
+            return Residual.friction_cone(foot, friction)
+        return Residual.wrench_cone(foot, WrenchCone(friction, [self.robot.trusted * side for side in self.robot.size]))
 
     def _knot(self, touching: Sequence[int]) -> ContactDynamics:
         """Returns the model of the knots of a stance. Cones and efforts are limits for `InteriorPoint`, or costs and
         bounds for `Fddp`."""
+        kind: Literal["point", "rigid"] = "point" if isinstance(self.robot.size, float) else "rigid"
         grips = [self.feet[k] for k in touching]
-        contacts = {foot: ContactConstraint(foot, "point", None, "local_world_aligned", kd=1.0 / DT) for foot in grips}
+        contacts = {foot: ContactConstraint(foot, kind, None, "local_world_aligned", kd=1.0 / DT) for foot in grips}
         still = ContactDynamics(self.model, contacts, DT, []).quasi_static(self._x)
-        costs = [self._state(1.0), Cost("effort", 2e-3, Residual.control(still))]
-        weights = Activation.weighted([300.0, 300.0, 3e4])
-        for k in set(range(4)) - set(touching):
-            swing = Residual.frame_translation(self.model, self.feet[k], self._placed[k])
-            costs.append(Cost(f"{self.feet[k]} swings", 1.0, swing, weights))
-        cones = {foot: Residual.friction_cone(foot, FrictionCone(FRICTION, least=LEAST)) for foot in grips}
+        costs = [self._state(1.0), Cost("effort", self.robot.effort, Residual.control(still))]
+        costs += [cost for k in range(len(self.feet)) if k not in touching for cost in self._swing(k)]
+        cones = {foot: self._cone(foot) for foot in grips}
         if self.rule == "tick2":
             limits = [Limit(foot, cone) for foot, cone in cones.items()]
             limits.append(Limit("effort", Residual.control(np.zeros(len(still))), -self._effort, self._effort))
@@ -130,16 +204,16 @@ class Trot:
 
     def _observe(self, x: Array, t: float) -> None:
         """Records where the feet touch the ground, and where they left it."""
-        places, now = self._places(x[: self.model.nq]), stance(t)
-        touches = np.isin(range(4), STANCES[now])[:, None]
-        left = np.isin(range(4), STANCES[self._stance])[:, None] & ~touches
+        places, now = self._places(x[: self.model.nq]), self.robot.gait.stance(t)
+        touches = np.isin(range(len(self.feet)), self._stances[now])[:, None]
+        left = np.isin(range(len(self.feet)), self._stances[self._stance])[:, None] & ~touches
         self._placed = np.where(touches, places, self._placed)
         self._lifted = np.where(left, places, self._lifted)
         self._stance = now
 
     def _refer(self, x: Array, t: float) -> None:
         """Writes the references of all knots: the path of the trunk from x at the command, and the swings."""
-        nq, (vx, vy, wz) = self.model.nq, self.command
+        nq, gait, knots, (vx, vy, wz) = self.model.nq, self.robot.gait, self.robot.knots, self.command
         yaw, level = heading(x), self._placed[:, 2].mean()
         velocity = rotated(x[3:7], x[nq : nq + 3])[:2]
 
@@ -150,25 +224,25 @@ class Trot:
             """Returns the positions at which foot k lands if it lands at the times s after now."""
             hip = self._hips[k]
             along = yaw + wz * s
-            ahead = hip + 0.5 * STEP * np.array([vx - wz * hip[1], vy + wz * hip[0]])
+            ahead = hip + 0.5 * gait.step * np.array([vx - wz * hip[1], vy + wz * hip[0]])
             late = CAPTURE * (velocity - turned(along, np.array([vx, vy])))
             return np.c_[path(s) + turned(along, ahead) + late, np.full(len(s), level)]
 
-        s = DT * np.arange(KNOTS + 1)
-        states = np.tile(self._x, (KNOTS + 1, 1))
+        s = DT * np.arange(knots + 1)
+        states = np.tile(self._x, (knots + 1, 1))
         states[:, :2], states[:, 2] = path(s), level + self._height
         half = 0.5 * (yaw + wz * s)
         states[:, 3:7] = np.c_[0.0 * s, 0.0 * s, np.sin(half), np.cos(half)]
         states[:, nq : nq + 6] = vx, vy, 0.0, 0.0, 0.0, wz
         self.problem.set_references("state", states)
-        phases = [swinging(t + ahead) for ahead in s]
+        phases = [gait.swinging(t + ahead) for ahead in s]
         for k, foot in enumerate(self.feet):
-            airborne = np.array([pair is not None and k in PAIRS[pair] for pair, _ in phases[:-1]])
+            airborne = np.array([group is not None and k in gait.groups[group] for group, _ in phases[:-1]])
             if airborne.any():
                 done = np.array([phase for _, phase in phases])
-                begun = s - done * SWING
-                start = np.where(begun[:, None] <= 1e-9, self._lifted[k], foothold(k, begun - STEP))
-                end = foothold(k, begun + SWING)
+                begun = s - done * gait.swing
+                start = np.where(begun[:, None] <= 1e-9, self._lifted[k], foothold(k, begun - gait.step))
+                end = foothold(k, begun + gait.swing)
                 forward = (done - np.sin(2.0 * np.pi * done) / (2.0 * np.pi))[:, None]
                 target = start + forward * (end - start)
                 target[:, 2] += HEIGHT * np.sin(np.pi * done) ** 2
@@ -176,10 +250,10 @@ class Trot:
 
     def start(self, x: Array) -> Solution:
         """Solves the first problem, from the state x at the time 0."""
-        stages = [stance(k * DT) for k in range(KNOTS)]
+        stages = [self.robot.gait.stance(k * DT) for k in range(self.robot.knots)]
         self.problem = Problem(x, self._knots, stages, FreeDynamics(self.model, None, [self._state(END)]))
         self.policy = Policy(self.problem)
-        xs = np.tile(x, (KNOTS + 1, 1))
+        xs = np.tile(x, (self.robot.knots + 1, 1))
         us = self.problem.quasi_static(xs)
         self._observe(x, 0.0)
         self._refer(x, 0.0)
@@ -198,7 +272,7 @@ class Trot:
         """Renews the plan at the time t (s), for the measured state x."""
         begin = time.perf_counter()
         self._observe(x, t)
-        self.solver.shift(stance(t + (KNOTS - 1) * DT))
+        self.solver.shift(self.robot.gait.stance(t + (self.robot.knots - 1) * DT))
         self._refer(x, t)
         self.problem.set_x0(x)
         if isinstance(self.solver, InteriorPoint):
