@@ -3410,7 +3410,8 @@ class InteriorPoint:
     problem: the problem to solve. All memory is allocated once, for the size of this problem.
     settings: any of the following settings, by name. `tolerance`: see above, default 1e-6; the gradient and the
         complementarity are scaled as in IPOPT. `max_iterations`: default 300. `barrier_start`: μ of the first
-        iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `second_order`:
+        iteration; None (default) chooses the cost of the warm start divided by the number of bounds. `tick_barrier`:
+        the largest μ of a `tick`, in the unit of the cost, default 0.1. `second_order`:
         whether to use the curvature of the dynamics near the solution, if the models provide it. This saves iterations
         if this curvature is large compared with the costs. With soft limits, the curvature is used from the start, or,
         without this setting, once the residuals have not decreased for eight iterations. `inverse_dynamics_form`,
