@@ -335,8 +335,8 @@ impl InteriorPoint {
         Ok(self.solver.end(&settings, &watch))
     }
 
-    /// Begins a solve: checks the arguments, sets x₀ = x̂₀, and evaluates the start. A trajectory of a resumed solve with
-    /// large gaps is replaced by its rollout. A lost trajectory is replaced by x̂₀ held still, as in
+    /// Begins a solve: checks the arguments, sets x₀ = x̂₀, and evaluates the start. In a resumed solve, a trajectory
+    /// with large gaps is replaced by its rollout. A lost trajectory is replaced by x̂₀ held still, as in
     /// [`Fddp::resume`](crate::Fddp::resume). Returns the cost of the
     /// [disturbance](Self::disturbance).
     fn begin(
