@@ -5,6 +5,10 @@ use crate::motion::Plan;
 use condyle::optimal::{Outcome, Violation, ViolationKind};
 use serde::Serialize;
 
+/// Maximum violation of a limit that still counts as held (rad, rad/s, m, m/s, N m, N), and maximum gap of the
+/// dynamics. It is half of `report::ROUNDING`.
+pub(crate) const HELD: f64 = 5e-6;
+
 /// Largest distance from a bound at which the bound counts as reached, relative to the range of the quantity. With one
 /// bound, the range is the absolute value of the bound, and at least 1.
 const REACHED: f64 = 1e-3;

@@ -4,7 +4,7 @@
 use crate::error::{Error, positive};
 use crate::gait::Gait;
 use crate::limits::{LimitCounts, check_start, last_frame, start};
-use crate::met::{Held, Worst};
+use crate::met::{HELD, Held, Worst};
 use crate::motion::{Goal, Plan};
 use crate::robot::{self, ReadingOptions};
 use crate::task::{self, Task};
@@ -108,9 +108,6 @@ const DEFAULT_DT: f64 = 0.01;
 /// Tolerance of the solver for gaits. The cost of a gait is several hundred, so the tolerance is less than a millionth
 /// of the cost.
 const GAIT_TOLERANCE: f64 = 1e-4;
-/// Maximum violation of a limit that still counts as held (rad, rad/s, m, m/s, N m, N), and maximum gap of the
-/// dynamics. It is half of `report::ROUNDING`.
-pub(crate) const HELD: f64 = 5e-6;
 
 /// Runs `condyle plan`.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {

@@ -1,7 +1,7 @@
 //! Prints the result of `condyle plan`: iterations, computing times, and exceeded limits.
 
 use crate::limits::{LimitCounts, Limited, limited};
-use crate::met::{Met, Worst};
+use crate::met::{HELD, Met, Worst};
 use crate::motion::Plan;
 use crate::terminal::{Style, styled};
 use condyle::optimal::{Iteration, Status};
@@ -238,7 +238,7 @@ fn line_of(met: &Met) -> String {
 
 /// Returns the largest violation that a solve with limits left, unless the limits and the dynamics hold.
 pub(crate) fn worst(plan: &Plan) -> Option<Worst> {
-    Worst::new(plan, crate::plan::HELD)
+    Worst::new(plan, HELD)
 }
 
 /// Returns the report as JSON.
