@@ -14,7 +14,7 @@ use condyle_linalg::dot;
 /// Largest complementarity of a quadratic program that counts as solved, relative to the tolerance.
 const SOLVED: f64 = 10.0;
 /// Barrier parameter μ of the first sweep of a tick, relative to the cost of the disturbance.
-const PER_DISTURBANCE: f64 = 0.01;
+const PER_DISTURBANCE: f64 = 0.03;
 /// Smallest value of this μ, relative to the cost of the plan divided by the number of bounds.
 const PER_COST: f64 = 0.01;
 /// Smallest ratio of this μ to the last μ of the tick before: one linearisation does not end a large disturbance.
