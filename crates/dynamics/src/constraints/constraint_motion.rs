@@ -74,8 +74,10 @@ fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Mo
 /// Returns the product of gain and error along each axis.
 #[inline(always)]
 fn scaled<S: Scalar>(gains: &[f64; 6], error: Motion<S>) -> Motion<S> {
-    let error = error.to_array();
-    let product: [S; 6] = core::array::from_fn(|k| error[k] * S::splat(gains[k]));
+    let mut product = error.to_array();
+    for k in 0..6 {
+        product[k] *= S::splat(gains[k]);
+    }
     product.into()
 }
 
@@ -284,7 +286,10 @@ impl<S: Scalar> FramePair<S> {
         let error: [S; 6] = core::array::from_fn(|r| error[r]);
         let turned = Motion::from(error) + target.velocity.scale_add(kd, target.acceleration);
         // the position error, whose axes have different gains, and the part of `turned` without it
-        let position = plan.kp_axes.as_ref().map(|gains| (gains, self.outward(plan, self.error())));
+        let position = match &plan.kp_axes {
+            Some(gains) => Some((gains, self.outward(plan, self.error()))),
+            None => None,
+        };
         let turned = match position {
             Some((gains, error)) => turned - scaled(gains, error),
             None => turned,

@@ -95,8 +95,11 @@ impl Barrier {
         let Self { bounds: [lower, upper], s, z: [zl, zu], ds, dz: [dzl, dzu], inverse: [il, iu], .. } = self;
         lower.resize(padded, f64::NEG_INFINITY);
         upper.resize(padded, f64::INFINITY);
-        for numbers in [s, zl, zu, ds, dzl, dzu, il, iu] {
+        for numbers in [&mut *s, &mut *zl, &mut *zu, ds, dzl, dzu, il, iu] {
             numbers.resize(padded, 0.0);
+        }
+        for i in (0..padded).filter(|&i| lower[i] == f64::NEG_INFINITY && upper[i] == f64::INFINITY) {
+            (s[i], zl[i], zu[i]) = (0.0, 0.0, 0.0);
         }
     }
 
@@ -114,12 +117,12 @@ impl Barrier {
         [self.s[i] - self.bounds[0][i], self.bounds[1][i] - self.s[i]]
     }
 
-    /// Moves the multipliers of row i to the neighbourhood of the central path. Multipliers of 0 move to the path.
+    /// Moves the multipliers of row i to the neighbourhood of the central path. Multipliers of 0 and NaN move to the path.
     pub(super) fn center(&mut self, i: usize, mu: f64, factor: f64) {
         let distances = self.distances(i);
         for (z, distance) in self.z.iter_mut().zip(distances) {
             let path = mu / distance;
-            z[i] = if z[i] == 0.0 { path } else { clamp(z[i], path, factor) };
+            z[i] = if z[i] == 0.0 || z[i].is_nan() { path } else { clamp(z[i], path, factor) };
         }
     }
 
