@@ -76,7 +76,7 @@ fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Mo
 fn scaled<S: Scalar>(gains: &[f64; 6], error: Motion<S>) -> Motion<S> {
     let mut product = error.to_array();
     for k in 0..6 {
-        product[k] *= S::splat(gains[k]);
+        product[k] = product[k] * S::splat(gains[k]);
     }
     product.into()
 }
@@ -285,13 +285,10 @@ impl<S: Scalar> FramePair<S> {
         let Jlog = if plan.kp > 0.0 || plan.kp_axes.is_some() { Some(jlog6(self.error())) } else { None };
         let error: [S; 6] = core::array::from_fn(|r| error[r]);
         let turned = Motion::from(error) + target.velocity.scale_add(kd, target.acceleration);
-        // the position error, whose axes have different gains, and the part of `turned` without it
-        let position = match &plan.kp_axes {
-            Some(gains) => Some((gains, self.outward(plan, self.error()))),
-            None => None,
-        };
-        let turned = match position {
-            Some((gains, error)) => turned - scaled(gains, error),
+        // the position error, if its axes have different gains, and the part of `turned` without it
+        let apart = if plan.kp_axes.is_some() { self.outward(plan, self.error()) } else { Motion::zero() };
+        let turned = match &plan.kp_axes {
+            Some(gains) => turned - scaled(gains, apart),
             None => turned,
         };
         for touch in &plan.touches {
@@ -325,8 +322,8 @@ impl<S: Scalar> FramePair<S> {
             }
             if plan.aligned() && first {
                 by_q += turn(s.angular, turned); // along the world's axes, it turns with frame 1
-                if let Some((gains, error)) = position {
-                    by_q += scaled(gains, turn(s.angular, error));
+                if let Some(gains) = &plan.kp_axes {
+                    by_q += scaled(gains, turn(s.angular, apart));
                 }
             }
             let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
