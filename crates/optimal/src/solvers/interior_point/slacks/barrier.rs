@@ -117,7 +117,8 @@ impl Barrier {
         [self.s[i] - self.bounds[0][i], self.bounds[1][i] - self.s[i]]
     }
 
-    /// Moves the multipliers of row i to the neighbourhood of the central path. Multipliers of 0 and NaN move to the path.
+    /// Moves the multipliers of row i to the neighbourhood of the central path. Multipliers of 0 and NaN move to the
+    /// path.
     pub(super) fn center(&mut self, i: usize, mu: f64, factor: f64) {
         let distances = self.distances(i);
         for (z, distance) in self.z.iter_mut().zip(distances) {
