@@ -1,5 +1,7 @@
 //! Problems, made of actions of any kind.
 
+mod knot_models;
+
 use super::actions::terms;
 use super::costs::Cost;
 use super::evaluation::{by_knot, controls, evaluate, gaps};
@@ -7,7 +9,7 @@ use super::models::{boxed, residuals};
 use super::own::{Fault, faults};
 use super::references;
 use super::residuals::take_written;
-use super::robot_action::{Boxed, Described, WrittenAt, change, knot_of};
+use super::robot_action::{Described, WrittenAt, change, knot_of};
 use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
 use crate::constrained::{aim, gains};
@@ -21,7 +23,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyList;
 use rust::Observer;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// Locks a value; returns an error if another call holds the lock.
 pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
@@ -521,115 +523,5 @@ impl Problem {
         raised?;
         let xs = xs.map_err(problem_error)?;
         output(py, None, &[problem.horizon() + 1, problem.nx()], |out| out.copy_from_slice(&xs))
-    }
-}
-
-impl Problem {
-    /// Creates a problem from models, the terminal model last.
-    fn make(
-        x0: Vec<f64>,
-        all: Vec<Boxed>,
-        knot_models: Vec<usize>,
-        (objects, written): (Vec<Option<Py<PyAny>>>, Vec<Py<PyAny>>),
-        fault: Fault,
-    ) -> PyResult<Self> {
-        let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
-        let end = actions.pop().expect("the terminal one is there");
-        let problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
-        let described: Vec<Option<Arc<Described>>> = described;
-        let space = described.last().and_then(Option::as_ref).and_then(|_| rust::StateSpace::new(&problem).ok());
-        let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
-        let (inner, described) = (Mutex::new(problem), Mutex::new(described));
-        let (objects, written, faults) = (Mutex::new(objects), Mutex::new(written), Mutex::new(faults));
-        Ok(Self {
-            inner,
-            described,
-            objects,
-            written,
-            fault,
-            faults,
-            moved: AtomicUsize::new(0),
-            space,
-            is_outdated: AtomicBool::new(false),
-        })
-    }
-
-    /// Replaces the model of a knot, and its description.
-    fn replace(
-        &self,
-        py: Python<'_>,
-        knot: usize,
-        Boxed { action, described: new }: Boxed,
-        object: Option<Py<PyAny>>,
-        written: Vec<Py<PyAny>>,
-    ) -> PyResult<()> {
-        let mut problem = lock("problem", &self.inner)?;
-        let horizon = problem.horizon();
-        if knot >= horizon {
-            return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {}", horizon - 1)));
-        }
-        problem.set_knot(knot, action).map_err(problem_error)?;
-        let (k, mut described) = (problem.knot_models()[knot], lock("problem", &self.described)?);
-        let mut objects = lock("problem", &self.objects)?;
-        if k == described.len() - 1 {
-            described.insert(k, None); // inserted before the terminal model
-            objects.insert(k, None);
-        }
-        if let Some(new) = &new {
-            lock("problem", &self.faults)?.extend(faults(&new.knot));
-        }
-        described[k] = new;
-        let old = std::mem::replace(&mut objects[k], object);
-        drop((problem, described, objects));
-        if let Some(old) = old {
-            old.drop_ref(py); // the object's destructor may run Python code
-        }
-        lock("problem", &self.written)?.extend(written);
-        Ok(())
-    }
-
-    /// Copies costs that were changed in place to the descriptions of the models.
-    fn describe(&self) -> PyResult<()> {
-        if self.is_outdated.swap(false, Ordering::Relaxed) {
-            let mut problem = lock("problem", &self.inner)?;
-            references::describe(&mut problem, &mut lock("problem", &self.described)?);
-        }
-        Ok(())
-    }
-
-    /// Shifts the descriptions of the models by one knot.
-    pub(super) fn describe_shift(&self) -> PyResult<()> {
-        let mut described = lock("problem", &self.described)?;
-        let models = described.len() - 1;
-        let all = described[..models].iter_mut().flatten().filter(|described| described.moves());
-        all.for_each(|described| Arc::make_mut(described).shift());
-        self.moved.fetch_add(1, Ordering::Relaxed);
-        Ok(())
-    }
-
-    /// Returns the number of times that the horizon was shifted.
-    pub(super) fn moved(&self) -> usize {
-        self.moved.load(Ordering::Relaxed)
-    }
-
-    /// Calls a function with each variable that stores errors of Python functions, until the function returns a value.
-    fn each_fault<T>(&self, mut f: impl FnMut(&mut Option<PyErr>) -> Option<T>) -> Option<T> {
-        let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut found = None;
-        for fault in std::iter::once(&self.fault).chain(&*faults) {
-            let this = f(&mut fault.lock().unwrap_or_else(PoisonError::into_inner));
-            found = found.or(this);
-        }
-        found
-    }
-
-    /// Raises the stored error of the problem's Python functions, if there is one.
-    pub(super) fn raise(&self) -> PyResult<()> {
-        self.each_fault(Option::take).map_or(Ok(()), Err)
-    }
-
-    /// Returns whether a Python function of the problem has raised an error, which is then stored.
-    pub(super) fn has_failed(&self) -> bool {
-        self.each_fault(|error| error.is_some().then_some(())).is_some()
     }
 }

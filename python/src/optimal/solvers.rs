@@ -1,80 +1,20 @@
 //! Solvers and their solutions.
 
-use super::evaluation::{controls, solution as give};
+use super::evaluation::solution as give;
+use super::outcomes::{give_outcome, multipliers_by_knot};
 use super::policy::Policy;
 use super::problem::{Problem, lock};
+use super::run::{Observer, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
-use crate::arrays::{Give, class, matrix};
 use crate::exceptions::{problem_error, wrong_word};
-use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyMapping, PyMappingProxy, PySlice, PyTuple};
+use pyo3::types::{PyDict, PyMapping, PyMappingProxy};
 use std::sync::Mutex;
-
-/// The output that a user wants after each iteration of a solve.
-struct Observer<'py> {
-    callback: Option<Bound<'py, PyAny>>,
-    verbose: bool,
-    progress: bool,
-}
-
-impl Observer<'_> {
-    /// Returns a function that the solve calls after each iteration; `None` if the user wants no output.
-    fn start(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
-        let Self { callback, verbose, progress } = self;
-        match (callback, verbose | progress) {
-            (None, false) => Ok(None),
-            (Some(callback), false) => Ok(Some(callback.clone().unbind())),
-            _ => {
-                let reporter = py.import("condyle._report")?.getattr("Reporter")?;
-                Ok(Some(reporter.call1((callback, *verbose, *progress))?.unbind()))
-            }
-        }
-    }
-}
-
-/// Runs a solve, from the warm start (xs, us) if a warm start is given. Other Python threads can run meanwhile.
-fn run<'py, S: Send>(
-    py: Python<'py>,
-    problem: &Py<Problem>,
-    solver: &Mutex<S>,
-    warm_start: Option<[&Bound<'_, PyAny>; 2]>,
-    observer: Observer<'py>,
-    solve: impl for<'a> FnOnce(
-        &'a mut S,
-        &mut rust::Problem,
-        [&[f64]; 2],
-        &mut Interruptions<'_>,
-    ) -> Result<&'a rust::Solution, rust::Error>
-    + Send,
-) -> PyResult<Bound<'py, PyAny>> {
-    let mut inner = lock("problem", &problem.get().inner)?;
-    let mut solver = lock("solver", solver)?;
-    let (mut x, mut u) = (vec![], vec![]);
-    if let Some([xs, us]) = warm_start {
-        x = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
-        u = controls(&inner, us)?;
-    }
-    let (inner, solver, closes) = (&mut *inner, &mut *solver, observer.verbose || observer.progress);
-    let failed = || problem.get().has_failed();
-    let signals = Signals::new(signals::LONG);
-    let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
-    let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
-    let raised = problem.get().raise(); // called in every case: it also clears the stored error
-    let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
-    if let Some(observer) = observer.filter(|_| closes) {
-        observer.call_method0(py, "close")?;
-    }
-    signals.finish()?;
-    raised?;
-    by_observer.map_or(Ok(()), Err)?;
-    give(py, problem, inner, result.map_err(problem_error)?)
-}
 
 /// Defines a solver class. The macro writes the methods that all solvers have. The constructor and the methods of only
 /// one class are arguments of the macro.
@@ -607,58 +547,4 @@ InteriorPoint, set_interior_point, show_interior_point {
         solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
     }
 }
-}
-
-/// Converts an outcome to a Python object.
-fn give_outcome<'py>(py: Python<'py>, o: &rust::Outcome) -> PyResult<Bound<'py, PyAny>> {
-    let multipliers = o.multipliers.iter().map(|y| y.give(py, None)).collect::<PyResult<Vec<_>>>()?;
-    let worst = o.worst.as_ref().map(|worst| give_violation(py, worst)).transpose()?;
-    let gave_way = o.gave_way.iter().map(|row| give_violation(py, row)).collect::<PyResult<Vec<_>>>()?;
-    let named = PyDict::new(py);
-    named.set_item("limits", limits(py, o)?)?;
-    named.set_item("soft_cost", o.soft_cost)?;
-    named.set_item("gave_way", PyTuple::new(py, gave_way)?)?;
-    let numbers = (o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst, o.barrier);
-    class!(py, "Outcome")?.call(numbers, Some(&named))
-}
-
-/// Returns the rows of each named limit: for each knot a slice, which is empty at a knot without the limit.
-fn limits<'py>(py: Python<'py>, outcome: &rust::Outcome) -> PyResult<Bound<'py, PyDict>> {
-    let limits = PyDict::new(py);
-    for limit in &outcome.limits {
-        if !limits.contains(&*limit.name)? {
-            let knots = outcome.multipliers.len();
-            limits.set_item(&*limit.name, PyList::new(py, (0..knots).map(|_| PySlice::new(py, 0, 0, 1)))?)?;
-        }
-        if let Some(knots) = limits.get_item(&*limit.name)? {
-            let rows = PySlice::new(py, limit.rows.start as isize, limit.rows.end as isize, 1);
-            knots.set_item(limit.knot, rows)?;
-        }
-    }
-    Ok(limits)
-}
-
-/// Returns the multipliers of the limit `name` as a list for each knot, from an array with an equal number of columns
-/// at all knots. For an unknown name, the lists are empty.
-fn multipliers_by_knot(problem: &mut rust::Problem, name: &str, values: &Bound<'_, PyAny>) -> PyResult<Vec<Vec<f64>>> {
-    let mut counts = vec![0; problem.horizon() + 1];
-    for limit in problem.limit_rows().iter().filter(|limit| &*limit.name == name) {
-        counts[limit.knot] = limit.rows.len();
-    }
-    let most = counts.iter().copied().max().unwrap_or(0);
-    if most == 0 {
-        return Ok(vec![vec![]; counts.len()]);
-    }
-    let values = matrix(&format!("multipliers of `{name}`"), values, [counts.len(), most])?;
-    Ok(counts.iter().zip(values.chunks(most)).map(|(&count, y)| y[..count].to_vec()).collect())
-}
-
-/// Converts a violated row to a Python object.
-fn give_violation<'py>(py: Python<'py>, row: &rust::Violation) -> PyResult<Bound<'py, PyAny>> {
-    let kind = match row.kind {
-        rust::ViolationKind::Gap => "gap",
-        rust::ViolationKind::ControlBound => "control_bound",
-        _ => "constraint",
-    };
-    class!(py, "Violation")?.call1((kind, row.knot, row.row, row.name.as_deref(), row.entry, row.amount))
 }

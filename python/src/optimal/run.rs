@@ -1,0 +1,70 @@
+//! One solve: its observer, the signals that interrupt it, and the errors of Python functions.
+
+use super::evaluation::{controls, solution as give};
+use super::problem::{Problem, lock};
+use crate::arrays::matrix;
+use crate::exceptions::problem_error;
+use crate::signals::{self, Interruptions, Signals};
+use condyle::optimal as rust;
+use pyo3::prelude::*;
+use std::sync::Mutex;
+
+/// The output that a user wants after each iteration of a solve.
+pub(super) struct Observer<'py> {
+    pub(super) callback: Option<Bound<'py, PyAny>>,
+    pub(super) verbose: bool,
+    pub(super) progress: bool,
+}
+
+impl Observer<'_> {
+    /// Returns a function that the solve calls after each iteration; `None` if the user wants no output.
+    fn start(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
+        let Self { callback, verbose, progress } = self;
+        match (callback, verbose | progress) {
+            (None, false) => Ok(None),
+            (Some(callback), false) => Ok(Some(callback.clone().unbind())),
+            _ => {
+                let reporter = py.import("condyle._report")?.getattr("Reporter")?;
+                Ok(Some(reporter.call1((callback, *verbose, *progress))?.unbind()))
+            }
+        }
+    }
+}
+
+/// Runs a solve, from the warm start (xs, us) if a warm start is given. Other Python threads can run meanwhile.
+pub(super) fn run<'py, S: Send>(
+    py: Python<'py>,
+    problem: &Py<Problem>,
+    solver: &Mutex<S>,
+    warm_start: Option<[&Bound<'_, PyAny>; 2]>,
+    observer: Observer<'py>,
+    solve: impl for<'a> FnOnce(
+        &'a mut S,
+        &mut rust::Problem,
+        [&[f64]; 2],
+        &mut Interruptions<'_>,
+    ) -> Result<&'a rust::Solution, rust::Error>
+    + Send,
+) -> PyResult<Bound<'py, PyAny>> {
+    let mut inner = lock("problem", &problem.get().inner)?;
+    let mut solver = lock("solver", solver)?;
+    let (mut x, mut u) = (vec![], vec![]);
+    if let Some([xs, us]) = warm_start {
+        x = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
+        u = controls(&inner, us)?;
+    }
+    let (inner, solver, closes) = (&mut *inner, &mut *solver, observer.verbose || observer.progress);
+    let failed = || problem.get().has_failed();
+    let signals = Signals::new(signals::LONG);
+    let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
+    let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
+    let raised = problem.get().raise(); // called in every case: it also clears the stored error
+    let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
+    if let Some(observer) = observer.filter(|_| closes) {
+        observer.call_method0(py, "close")?;
+    }
+    signals.finish()?;
+    raised?;
+    by_observer.map_or(Ok(()), Err)?;
+    give(py, problem, inner, result.map_err(problem_error)?)
+}
