@@ -84,7 +84,7 @@ ARGUMENTS = {
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
         lower pi placement point rest stiffness
         q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort
-        Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
+        Plan.controls corners durations normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
         InteriorPoint.set_multipliers.values Problem.set_references.values
         Problem.set_contact.kp Problem.set_entry_weights.weights""",
@@ -114,12 +114,12 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
-        facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
+        Schedule.model Schedule.switch.model count facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping delta dt eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
+        bias damping delta dt elapsed eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
         regularisation
-        restitution s smoothing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
+        restitution s smoothing spacing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings",
@@ -130,6 +130,7 @@ ARGUMENTS = {
         for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")
     ),
     "list[int]": "_lend.shape _lend.strides",
+    "Sequence[int]": "AugmentedLagrangian.retime.knot_models Fddp.retime.knot_models InteriorPoint.retime.knot_models Problem.set_knots.knot_models",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -227,7 +228,7 @@ RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Policy.__call__ Problem._between Problem.references Problem.rollout Problem.x0
+        Policy.__call__ Problem._between Problem._moved Problem.references Problem.rollout Problem.x0
         Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
@@ -250,13 +251,14 @@ RESULTS = {
     "float": """
         HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
         distance kinetic_energy mechanical_energy potential_energy
-        FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Task.weight""",
+        FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Schedule.spacing Task.weight""",
     "float | None": "FrictionContact.yaw_friction Joint.pitch Policy.end",
     "tuple[float, float]": "Plan.span",
     "Data": "_SpelledData._ours",
     "int": """
         _SpelledData._given ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame
-        Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority""",
+        Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority
+        AugmentedLagrangian.retime Fddp.retime InteriorPoint.retime Schedule.model""",
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
@@ -282,7 +284,7 @@ RESULTS = {
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_contact Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot
-        Problem.set_references
+        Problem.set_knots Problem.set_references Schedule.forget Schedule.switch
         Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",
@@ -294,6 +296,8 @@ RESULTS = {
     "list[GravityCompensation]": "Model.gravity_compensation",
     "list[Actuator]": "Model.actuators",
     "list[tuple[int, float]]": "Ltdl.row",
+    "list[tuple[float, int]]": "Schedule.switches",
+    "tuple[list[int], _Array]": "Schedule.knots",
     "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__ Simulation.__reduce__",
     "HyperDual": "HyperDual",
     "Model": """

@@ -16,6 +16,7 @@ mod references;
 mod residuals;
 mod robot_action;
 mod run;
+mod schedule;
 mod settings;
 mod solvers;
 mod sweep;
@@ -29,5 +30,6 @@ pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycl
 pub(crate) use policy::Policy;
 pub(crate) use problem::{Problem, lock};
 pub(crate) use residuals::Residual;
+pub(crate) use schedule::Schedule;
 pub(crate) use solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
 pub(crate) use sweep::Sweep;

@@ -196,6 +196,13 @@ pub enum Error {
         dt: f64,
     },
 
+    /// A horizon would begin before the old one.
+    #[error("a horizon that begins {elapsed} s after the old one: the time must be at least 0")]
+    Elapsed {
+        /// Time (s) from the beginning of the old horizon to the beginning of the new one.
+        elapsed: f64,
+    },
+
     /// The duration of a knot cannot be set, because the knot is an impact or an action without integration over time.
     #[error("knot {knot}: its action has no duration")]
     NoDuration {

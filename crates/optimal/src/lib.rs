@@ -94,7 +94,7 @@ pub use lq::{
 pub use nalgebra;
 pub use problem::{
     ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, GroupModel, Lqr, NumDiff,
-    PathConstraint, Problem, Unicycle,
+    PathConstraint, Problem, Schedule, Unicycle,
 };
 pub use solvers::{
     AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, InteriorPoint, InteriorPointSettings, Iteration,

@@ -12,7 +12,8 @@ use condyle_optimal::robot::{
     OwnResidual, Residual, RobotState, Shape,
 };
 use condyle_optimal::{
-    AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, PolicyPublisher, Problem, Status, Sweep,
+    ActionModel, AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, PolicyPublisher, Problem, Schedule,
+    Status, Sweep,
 };
 use condyle_spatial::Scalar;
 use counting::{allocated, allocations};
@@ -386,6 +387,64 @@ fn count_of_constrained_solves(change: fn(Limit) -> Limit) {
         solver.tick(&mut problem, 2).unwrap();
     });
     assert_eq!(count, 0);
+}
+
+/// Counts the allocations of periods shorter than a knot, in which contacts change at times within knots.
+#[test]
+fn a_horizon_at_other_times_allocates_nothing() {
+    let model = std::sync::Arc::new(robots::quadruped());
+    let q = [vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0], [0.0, 0.7, -1.4, 0.0, -0.7, 1.4].repeat(2)].concat();
+    let x0 = [q, vec![0.0; 18]].concat();
+    let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
+    let cone = FrictionCone::new(0.7);
+    let (lower, upper) = cone.bounds();
+    let rest = || Cost::new("rest", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic);
+    let stance = |feet: &[&str]| {
+        let contact = |foot: &&str| {
+            let point = ContactConstraint::point(model.frame(foot).unwrap());
+            Contact::new(foot, ContactConstraint { kd: 50.0, ..point })
+        };
+        let contacts: Vec<_> = feet.iter().map(contact).collect();
+        let limit = |foot: &&str| {
+            let residual = Residual::FrictionCone { contact: (*foot).into(), cone: cone.clone() };
+            Limit::new(foot, residual, lower.clone(), upper.clone())
+        };
+        let knot = ContactDynamics::running(model.clone(), &contacts, 0.02, vec![rest()]).unwrap();
+        Box::new(knot.with_limits(feet.iter().map(limit).collect()).unwrap()) as Box<dyn ActionModel>
+    };
+    let models = vec![stance(&feet), stance(&[feet[0], feet[3]]), stance(&[feet[1], feet[2]])];
+    let end = FreeDynamics::terminal(model.clone(), vec![rest()]).unwrap();
+    let mut problem = Problem::new(x0.clone(), models, vec![0; 12], Box::new(end)).unwrap();
+    let mut schedule = Schedule::new(0.02, 0).unwrap();
+    for step in 0..12 {
+        let begin = 0.05 + 0.1 * f64::from(step);
+        schedule.switch(begin, 1 + step as usize % 2).unwrap();
+        schedule.switch(begin + 0.07, 0).unwrap();
+    }
+    let xs = x0.repeat(13);
+    let us = problem.quasi_static(&xs).unwrap();
+    let references = x0.repeat(13);
+    let (mut fddp, mut solver) = (Fddp::new(&problem), InteriorPoint::new(&problem));
+    fddp.settings.max_iterations = 1;
+    fddp.solve(&mut problem, &xs, &us).unwrap();
+    solver.solve(&mut problem, &xs, &us).unwrap();
+    let (mut knot_models, mut durations) = ([0; 12], [0.0; 12]);
+    let mut period = |problem: &mut Problem, solver: &mut InteriorPoint, tick: u32| {
+        schedule.write_knots(0.007 * f64::from(tick), &mut knot_models, &mut durations);
+        solver.retime(problem, 0.007, &knot_models, &durations).unwrap();
+        problem.set_references("rest", &references).unwrap();
+        solver.tick(problem, 2).unwrap();
+    };
+    // in the first steps, knots get memory for references and rows of limits
+    (1..100).for_each(|tick| period(&mut problem, &mut solver, tick));
+    let counts: Vec<_> = (100..160).map(|tick| allocations(|| period(&mut problem, &mut solver, tick))).collect();
+    assert_eq!(counts, [0; 60]);
+    let mut retime = |problem: &mut Problem, tick: u32| {
+        schedule.write_knots(0.007 * f64::from(tick), &mut knot_models, &mut durations);
+        fddp.retime(problem, 0.007, &knot_models, &durations).unwrap();
+    };
+    retime(&mut problem, 160);
+    assert_eq!(allocations(|| (161..175).for_each(|tick| retime(&mut problem, tick))), 0);
 }
 
 /// Counts the allocations of solves in which limits become active. The robot first stands; then the forces of its feet

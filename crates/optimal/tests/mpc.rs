@@ -7,6 +7,8 @@ mod common;
 mod policies;
 #[path = "mpc/recovery.rs"]
 mod recovery;
+#[path = "mpc/retime.rs"]
+mod retime;
 #[path = "mpc/trot.rs"]
 mod trot;
 

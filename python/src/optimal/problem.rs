@@ -133,6 +133,7 @@ impl Problem {
         };
         let mut knots = Vec::new();
         let mut first: Option<&Arc<condyle::Model>> = None;
+        let (knot_models, added) = Self::separate_durations(&problem, &described);
         for (k, described) in described.iter().enumerate() {
             let Some(Described { robot, knot }) = described.as_deref() else {
                 return Err(wrong(k, "expected an action of a robot, which alone can be JSON"));
@@ -147,8 +148,13 @@ impl Problem {
             knots.push(knot.clone());
         }
         let terminal = knots.pop().expect("the terminal one is there");
+        for (k, dt) in added {
+            let mut knot: rust::robot::Knot = knots[k].clone();
+            knot.dynamics.set_dt(dt);
+            knots.push(knot);
+        }
         let model = first.expect("the terminal one is there");
-        let (x0, knot_models) = (problem.x0().to_vec(), problem.knot_models().to_vec());
+        let x0 = problem.x0().to_vec();
         let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, knot_models, terminal };
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
@@ -159,11 +165,22 @@ impl Problem {
         let (py, this) = (slf.py(), slf.get());
         this.describe()?;
         let described = lock("problem", &this.described)?;
+        let problem = lock("problem", &this.inner)?;
+        let (knot_models, added) = Self::separate_durations(&problem, &described);
+        let last = described.len() - 1;
+        let of_added = added.iter().map(|(k, dt)| {
+            let of = described[*k].as_ref().expect("only robots have other durations");
+            (None, Some(Arc::new(of.with_duration(*dt))))
+        });
+        let objects = lock("problem", &this.objects)?;
+        let pairs = objects.iter().map(Option::as_ref).zip(described.iter().cloned());
+        let mut all: Vec<(Option<&Py<PyAny>>, Option<Arc<Described>>)> = pairs.collect();
+        all.splice(last..last, of_added);
         let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
         let mut parts = Vec::new();
-        for (object, described) in lock("problem", &this.objects)?.iter().zip(&*described) {
+        for (object, described) in &all {
             let Some(described) = described.as_deref() else {
-                parts.push(object.as_ref().map_or_else(|| py.None(), |object| object.clone_ref(py)));
+                parts.push(object.map_or_else(|| py.None(), |object| object.clone_ref(py)));
                 continue;
             };
             let robot = &described.robot;
@@ -174,8 +191,7 @@ impl Problem {
             let (text, written) = described.knot_parts(py)?;
             parts.push((model, text, written).into_pyobject(py)?.into_any().unbind());
         }
-        let problem = lock("problem", &this.inner)?;
-        let arguments = (problem.x0().to_vec(), parts, problem.knot_models().to_vec());
+        let arguments = (problem.x0().to_vec(), parts, knot_models);
         Ok((slf.get_type().getattr("_from_parts")?, arguments).into_pyobject(py)?.into_any())
     }
 
@@ -395,17 +411,32 @@ impl Problem {
     /// dt: the duration (s).
     ///
     /// Raises `ProblemError` if dt is not above 0, or if the knot's action does not belong to a robot or is an impact.
-    fn set_duration(&self, py: Python<'_>, knot: usize, dt: f64) -> PyResult<()> {
-        self.describe()?;
-        let described = {
-            let (problem, described) = (lock("problem", &self.inner)?, lock("problem", &self.described)?);
-            problem.knot_models().get(knot).and_then(|&k| described[k].as_deref().cloned())
-        };
-        let Some(mut new) = described.filter(|new| new.knot.dynamics.dt().is_some()) else {
+    fn set_duration(&self, knot: usize, dt: f64) -> PyResult<()> {
+        let (mut problem, described) = (lock("problem", &self.inner)?, lock("problem", &self.described)?);
+        let own = problem.knot_models().get(knot).and_then(|&k| described[k].as_deref());
+        if own.is_none_or(|own| own.knot.dynamics.dt().is_none()) {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot with a duration")));
-        };
-        new.knot.dynamics.set_dt(dt);
-        self.replace(py, knot, new.boxed()?, None, vec![])
+        }
+        problem.set_duration(knot, dt).map_err(problem_error)
+    }
+
+    /// Sets the models and durations of all knots, before the first solve. Later, `retime` of a solver also moves its
+    /// solution.
+    ///
+    /// knot_models: the index of the model of each knot, N indices.
+    /// durations: the duration (s) of each knot, N numbers, 0 for an impact.
+    ///
+    /// A knot whose model changes has the costs and limits that its new model has for all knots.
+    ///
+    /// Raises `ProblemError` for an unknown model, for a duration that is not above 0 or not 0 at an impact, and for a
+    /// new duration of an action that does not belong to a robot. Then nothing changes.
+    fn set_knots(&self, knot_models: Vec<usize>, durations: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut problem = lock("problem", &self.inner)?;
+        let durations = vector("durations", durations, knot_models.len())?;
+        self.check_durations(&problem, &knot_models, &durations)?;
+        let before = problem.knot_models().to_vec();
+        problem.set_knots(&knot_models, &durations).map_err(problem_error)?;
+        self.describe_knots(0, &before, &knot_models)
     }
 
     /// Computes the quasi-static controls of all knots, which hold the state of each knot still as well as possible:
@@ -467,6 +498,25 @@ impl Problem {
         let (x0, x1) = (vector("x0", x0, space.nx())?, vector("x1", x1, space.nx())?);
         let mut dx = vec![0.0; space.ndx()];
         output(py, None, &[space.nx()], |x| space.between([&x0, &x1], s, &mut dx, x))
+    }
+
+    /// Computes x ⊕ (b ⊖ a), the state x after the change from a to b. Locks nothing, so it can run during a solve.
+    fn _moved<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        a: &Bound<'py, PyAny>,
+        b: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let Some(space) = &self.space else {
+            return Err(ProblemError::new_err("terminal: expected an action of a robot, whose states are predicted"));
+        };
+        let (py, nx) = (x.py(), space.nx());
+        let (x, a, b) = (vector("x", x, nx)?, vector("a", a, nx)?, vector("b", b, nx)?);
+        if let Some(k) = x.iter().position(|x| !x.is_finite()) {
+            return Err(ProblemError::new_err(format!("`x[{k}]` is {}, which is not finite", x[k])));
+        }
+        let mut dx = vec![0.0; space.ndx()];
+        output(py, None, &[nx], |out| space.moved(&x, [&a, &b], &mut dx, out))
     }
 
     /// Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1

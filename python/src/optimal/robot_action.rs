@@ -152,6 +152,19 @@ impl Described {
         moved(&mut self.knot.limits_at);
     }
 
+    /// Removes the costs and limits of knot t.
+    pub(super) fn release(&mut self, t: usize) {
+        self.knot.costs_at.remove(&t);
+        self.knot.limits_at.remove(&t);
+    }
+
+    /// Returns the same action with the duration `dt` (s).
+    pub(super) fn with_duration(&self, dt: f64) -> Self {
+        let mut copy = self.clone();
+        copy.knot.dynamics.set_dt(dt);
+        copy
+    }
+
     /// Returns whether a shift changes the action, because some costs or limits apply at single knots.
     pub(super) fn moves(&self) -> bool {
         !(self.knot.costs_at.is_empty() && self.knot.limits_at.is_empty())

@@ -8,6 +8,7 @@ use super::run::{Observer, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
+use crate::arrays::vector;
 use crate::exceptions::{problem_error, wrong_word};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
@@ -168,6 +169,43 @@ macro_rules! solver {
                 self.problem.get().describe_shift()?;
                 solver.shift(&mut problem).map_err(problem_error)?;
                 self.problem.get().raise()
+            }
+
+            /// Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+            /// into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+            /// So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+            ///
+            /// Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+            /// a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+            /// other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+            /// name keep their multipliers. After the end of the last solution, states and controls follow as in
+            /// `shift`.
+            ///
+            /// Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+            /// A knot whose model changes has the costs and limits that its new model has for all knots, until
+            /// `set_references` is called.
+            ///
+            /// elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            ///     horizon, at least 0.
+            /// knot_models: the index of the model of each knot, N indices.
+            /// durations: the duration (s) of each knot, N numbers, 0 for an impact.
+            ///
+            /// Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
+            fn retime(
+                &self,
+                elapsed: f64,
+                knot_models: Vec<usize>,
+                durations: &Bound<'_, PyAny>,
+            ) -> PyResult<usize> {
+                let mut problem = lock("problem", &self.problem.get().inner)?;
+                let mut solver = lock("solver", &self.solver)?;
+                let durations = vector("durations", durations, knot_models.len())?;
+                self.problem.get().check_durations(&problem, &knot_models, &durations)?;
+                let before = problem.knot_models().to_vec();
+                let passed = solver.retime(&mut problem, elapsed, &knot_models, &durations).map_err(problem_error)?;
+                self.problem.get().describe_knots(passed, &before, &knot_models)?;
+                self.problem.get().raise()?;
+                Ok(passed)
             }
         }
     };

@@ -21,6 +21,7 @@ from condyle.optimal import (
     Policy,
     Problem,
     Residual,
+    Schedule,
     Solution,
     WrenchCone,
 )
@@ -30,7 +31,9 @@ Solver = Literal["tick2", "fddp1", "full_step"]
 3)."""
 
 DT = 0.02
-"""Duration of a knot, and period of the ticks (s)."""
+"""Duration of a knot (s)."""
+RATE = 50.0
+"""Rate of the ticks (Hz), unless a controller has another one."""
 FRICTION = 0.5
 """Friction coefficient of the plan. The coefficient in MuJoCo is larger."""
 CAPTURE = 0.1
@@ -69,6 +72,15 @@ class Gait(NamedTuple):
         """Returns the index of the stance at the time t (s): 0 with all feet on the ground, else 1 + the group."""
         group, _ = self.swinging(t)
         return 0 if group is None else 1 + group
+
+    def schedule(self, steps: int = 500) -> Schedule:
+        """Returns the stances in time, for a number of steps."""
+        schedule = Schedule(DT, 0)
+        for n in range(steps):
+            begin = self.stand + n * self.step
+            schedule.switch(begin, 1 + n % len(self.groups))
+            schedule.switch(begin + self.swing, 0)
+        return schedule
 
 
 class Joint(NamedTuple):
@@ -140,8 +152,16 @@ def turned(angle: Array | float, vector: Array) -> Array:
 class Predictive:
     """Controller of a walk or a trot: a plan, which a tick renews, and the plan's feedback."""
 
-    def __init__(self, model: condyle.Model, robot: Robot, solver: Solver = "tick2") -> None:
+    def __init__(
+        self, model: condyle.Model, robot: Robot, solver: Solver = "tick2", rate: float | None = None
+    ) -> None:
+        """rate: rate of the ticks (Hz), which is independent of the knots. With None, each tick shifts the horizon by a
+        knot."""
         self.model, self.robot, self.rule, self.feet = model, robot, solver, list(robot.feet)
+        self._schedule = None if rate is None else robot.gait.schedule()
+        self._times = DT * np.arange(robot.knots + 1)
+        """Times at which the knots begin, after the beginning of the horizon (s)."""
+        self._begin = 0.0
         q = robot.standing(model)
         self.command = np.zeros(3)
         """Velocity forwards and to the left (m/s), and rate of turning (rad/s)."""
@@ -228,7 +248,7 @@ class Predictive:
             late = CAPTURE * (velocity - turned(along, np.array([vx, vy])))
             return np.c_[path(s) + turned(along, ahead) + late, np.full(len(s), level)]
 
-        s = DT * np.arange(knots + 1)
+        s = self._times
         states = np.tile(self._x, (knots + 1, 1))
         states[:, :2], states[:, 2] = path(s), level + self._height
         half = 0.5 * (yaw + wz * s)
@@ -253,6 +273,10 @@ class Predictive:
         stages = [self.robot.gait.stance(k * DT) for k in range(self.robot.knots)]
         self.problem = Problem(x, self._knots, stages, FreeDynamics(self.model, None, [self._state(END)]))
         self.policy = Policy(self.problem)
+        if self._schedule is not None:
+            stages, durations = self._schedule.knots(0.0, self.robot.knots)
+            self.problem.set_knots(stages, durations)
+            self._times = np.r_[0.0, np.cumsum(durations)]
         xs = np.tile(x, (self.robot.knots + 1, 1))
         us = self.problem.quasi_static(xs)
         self._observe(x, 0.0)
@@ -272,7 +296,12 @@ class Predictive:
         """Renews the plan at the time t (s), for the measured state x."""
         begin = time.perf_counter()
         self._observe(x, t)
-        self.solver.shift(self.robot.gait.stance(t + (self.robot.knots - 1) * DT))
+        if self._schedule is None:
+            self.solver.shift(self.robot.gait.stance(t + (self.robot.knots - 1) * DT))
+        else:
+            stances, durations = self._schedule.knots(t, self.robot.knots)
+            self.solver.retime(t - self._begin, stances, durations)
+            self._begin, self._times = t, np.r_[0.0, np.cumsum(durations)]
         self._refer(x, t)
         self.problem.set_x0(x)
         if isinstance(self.solver, InteriorPoint):

@@ -15,7 +15,7 @@ from itertools import product
 from typing import NamedTuple, get_args
 
 import numpy as np
-from predictive import DT, Gait, Joint, Predictive, Robot, Solver
+from predictive import RATE, Gait, Joint, Predictive, Robot, Solver
 from scenes import urdf
 from world import Array, World
 
@@ -99,15 +99,26 @@ def text_of(name: str) -> str:
     return text.replace("</robot>", f"{added}</robot>")
 
 
-def run(name: str, solver: Solver, seconds: float, push: Push | None = None) -> Run:
-    """Simulates a robot that starts from a stand and walks, until it falls or the time is over."""
-    robot = ROBOTS[name]
+def run(
+    name: str,
+    solver: Solver,
+    seconds: float,
+    push: Push | None = None,
+    rate: float | None = None,
+    gait: Gait | None = None,
+) -> Run:
+    """Simulates a robot that starts from a stand and walks, until it falls or the time is over.
+
+    rate: rate of the ticks (Hz); with None, a tick for each knot.
+    gait: gait of the robot; with None, its own.
+    """
+    robot = ROBOTS[name] if gait is None else ROBOTS[name]._replace(gait=gait)
     world = World(text_of(name), robot.feet, robot.size)
     q = robot.standing(world.model)
     world.set_state(q, np.zeros(world.model.nv))
-    control = Predictive(world.model, robot, solver)
+    control = Predictive(world.model, robot, solver, rate)
     control.start(np.concatenate(world.state()))
-    period, velocities, fallen = round(DT / world.dt), [], False
+    velocities, fallen, ticks, rate = [], False, 0, rate or RATE
     for i in range(round(seconds / world.dt)):
         t = i * world.dt
         x = np.concatenate(world.state())
@@ -115,7 +126,8 @@ def run(name: str, solver: Solver, seconds: float, push: Push | None = None) -> 
         if fallen or not np.isfinite(x).all():
             fallen = True
             break
-        if i % period == 0 and i > 0:
+        if int(t * rate + 1e-6) > ticks:
+            ticks = int(t * rate + 1e-6)
             control.command[0] = np.clip(robot.acceleration * (t - robot.gait.stand - 0.1), 0.0, robot.speed)
             control.tick(x, t)
         force = np.zeros(3)

@@ -117,6 +117,20 @@ pub struct ConstraintRow<'a> {
 }
 
 impl ConstraintRows {
+    /// Returns the sizes of the allocated memory.
+    pub(crate) fn capacities(&self) -> [usize; 4] {
+        [self.rows.capacity(), self.groups.capacity(), self.forms.capacity(), self.numbers.capacity()]
+    }
+
+    /// Allocates at least the given [capacities](Self::capacities).
+    pub(crate) fn reserve(&mut self, capacities: [usize; 4]) {
+        let Self { rows, groups, forms, numbers } = self;
+        rows.reserve(capacities[0].saturating_sub(rows.len()));
+        groups.reserve(capacities[1].saturating_sub(groups.len()));
+        forms.reserve(capacities[2].saturating_sub(forms.len()));
+        numbers.reserve(capacities[3].saturating_sub(numbers.len()));
+    }
+
     /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.rows.len()

@@ -157,6 +157,11 @@ pub trait KnotGroup {
         false
     }
 
+    /// Uses scratch memory of `other`, an action of the same problem and thread, if possible.
+    fn share(&mut self, other: &dyn KnotGroup) {
+        let _ = other;
+    }
+
     /// Selects the model that later changes affect, among the models that this action represents.
     fn choose(&mut self, model: usize) {
         let _ = model;
@@ -165,6 +170,17 @@ pub trait KnotGroup {
     /// Assigns knot t, of `horizon` knots, to one of the models that this action represents.
     fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         let _ = (t, horizon, model);
+    }
+
+    /// Removes the costs, limits and the duration that knot t of the selected model has in place of the model's own.
+    fn release(&mut self, t: usize) {
+        let _ = t;
+    }
+
+    /// Allocates memory so that [`set_duration`](Self::set_duration) allocates nothing in a horizon with `horizon`
+    /// knots.
+    fn reserve_durations(&mut self, horizon: usize) {
+        let _ = horizon;
     }
 
     /// Sets the duration (s) of knot t of the selected model; returns whether the knot has a duration.

@@ -45,6 +45,13 @@ fn merge(action: &mut dyn ActionModel, model: &mut dyn ActionModel, place: Optio
     }
 }
 
+/// Makes actions of one thread share scratch memory, if possible: all use the memory of `first`.
+pub(super) fn share(first: &dyn ActionModel, action: &mut dyn ActionModel) {
+    if let Some((own, first)) = innermost(action).zip(first.knot_group()) {
+        own.share(first);
+    }
+}
+
 /// Allocates the workspace of an action, and of the action that it wraps.
 pub(super) fn reserve(action: &mut dyn ActionModel) {
     if let Some(group) = innermost(action) {
@@ -60,8 +67,16 @@ impl Models {
             let place = all.place_of(model);
             all.places.of.push(place);
         }
+        all.share();
         all.actions.iter_mut().for_each(|action| reserve(&mut **action));
         all
+    }
+
+    /// Makes the actions share scratch memory.
+    fn share(&mut self) {
+        if let [first, others @ ..] = &mut self.actions[..] {
+            others.iter_mut().for_each(|action| share(&**first, &mut **action));
+        }
     }
 
     /// Returns the position of a model. The model is merged into an action of the same kind, or else added as a new
@@ -106,6 +121,7 @@ impl Models {
             Some(old) => *old = place,
             None => self.places.of.push(place),
         }
+        self.share();
         reserve(&mut *self.actions[place[0]]);
         index
     }
@@ -157,9 +173,12 @@ impl Models {
     /// [`Error::NoCopy`] for an action that cannot be copied.
     pub(crate) fn try_clone(&self) -> Result<Self, Error> {
         let model = |k: usize| self.places.of.iter().position(|place| place[0] == k);
-        let mut actions = Vec::with_capacity(self.actions.len());
+        let mut actions: Vec<Box<dyn ActionModel>> = Vec::with_capacity(self.actions.len());
         for (k, action) in self.actions.iter().enumerate() {
             let mut copy = action.try_clone().ok_or(Error::NoCopy { model: model(k) })?;
+            if let Some(first) = actions.first() {
+                share(&**first, &mut *copy);
+            }
             reserve(&mut *copy);
             actions.push(copy);
         }

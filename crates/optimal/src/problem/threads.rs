@@ -8,7 +8,7 @@
 
 use super::action::ActionModel;
 use super::group::{Evaluation, Results, evaluate};
-use super::models::{Models, reserve};
+use super::models::{Models, reserve, share};
 use crate::lq::{Gains, KnotFeedback, LqKnot};
 use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
@@ -85,10 +85,16 @@ impl Copies {
         self.of.resize_with(threads - 1, Vec::new);
         for copies in &mut self.of {
             copies.resize_with(models.len(), || None);
-            for (copy, model) in copies.iter_mut().zip(models) {
-                if copy.is_none() {
-                    *copy = model.try_clone();
-                    copy.iter_mut().for_each(|copy| reserve(&mut **copy));
+            for k in 0..models.len() {
+                let (before, rest) = copies.split_at_mut(k);
+                if rest[0].is_none() {
+                    rest[0] = models[k].try_clone();
+                    if let Some(copy) = &mut rest[0] {
+                        if let Some(first) = before.iter().flatten().next() {
+                            share(&**first, &mut **copy);
+                        }
+                        reserve(&mut **copy);
+                    }
                 }
             }
         }

@@ -162,6 +162,21 @@ impl<T> PerKnot<T> {
         self.of.iter().enumerate().filter(|(_, k)| **k > 0).map(|(t, &k)| (t, &self.all[k]))
     }
 
+    /// Removes the separate value of knot t, which then has the common value. Allocates nothing.
+    pub(crate) fn release(&mut self, t: usize) {
+        if let Some(slot) = self.of.get_mut(t) {
+            let slot = core::mem::take(slot);
+            self.free.extend((slot > 0).then_some(slot));
+        }
+    }
+
+    /// Allocates memory for separate values of all knots of a horizon with `horizon` knots.
+    pub(crate) fn reserve(&mut self, horizon: usize) {
+        self.of.reserve(horizon.saturating_sub(self.of.len()));
+        self.all.reserve((horizon + 1).saturating_sub(self.all.len()));
+        self.free.reserve((horizon + 1).saturating_sub(self.free.len()));
+    }
+
     /// Moves the horizon by one knot: knot t becomes knot t − 1.
     pub(crate) fn shift(&mut self) {
         if !self.of.is_empty() {
@@ -291,6 +306,12 @@ impl HorizonTerms {
     pub(crate) fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         self.costs.serve(t, horizon, model);
         self.limits.serve(t, horizon, model);
+    }
+
+    /// Removes the separate costs and limits of knot t of the chosen model.
+    pub(crate) fn release(&mut self, t: usize) {
+        self.costs.chosen_mut().release(t);
+        self.limits.release(t);
     }
 
     /// Moves the horizon by one knot: knot t becomes knot t − 1.

@@ -244,6 +244,11 @@ impl Limits {
         self.sets.serve(t, horizon, model);
     }
 
+    /// Removes the separate limits of knot t of the chosen model.
+    pub(super) fn release(&mut self, t: usize) {
+        self.sets.chosen_mut().release(t);
+    }
+
     /// Moves the horizon by one knot: knot t becomes knot t − 1.
     pub(super) fn shift(&mut self) {
         self.sets.all_mut().iter_mut().for_each(PerKnot::shift);

@@ -270,6 +270,40 @@ impl AugmentedLagrangian {
         Ok(())
     }
 
+    /// Moves the horizon of `problem` by `elapsed` seconds, gives its knots new models and durations (s), and turns the
+    /// solution into a warm start for it, as [`Fddp::retime`](crate::Fddp::retime) does. Multipliers come from the
+    /// same knots as controls. If models differ, limits with the same name keep theirs. The multipliers are scaled by
+    /// the durations of the knots. Allocates.
+    ///
+    /// # Errors
+    /// The same errors as [`Fddp::retime`](crate::Fddp::retime).
+    pub fn retime(
+        &mut self,
+        problem: &mut Problem,
+        elapsed: f64,
+        knot_models: &[usize],
+        durations: &[f64],
+    ) -> Result<usize, Error> {
+        let passed = self.solver.retime(problem, &self.inner, elapsed, knot_models, durations)?;
+        let counts: Vec<usize> = (0..=problem.horizon()).map(|t| problem.constraint_count(t)).collect();
+        for multipliers in [&mut self.outcome.multipliers, &mut self.kept.multipliers] {
+            let old = std::mem::take(multipliers);
+            if old.len() != counts.len() {
+                continue;
+            }
+            multipliers.extend(counts.iter().map(|&count| vec![0.0; count]));
+            for (t, now) in multipliers.iter_mut().enumerate() {
+                self.solver.retiming.each_rows(problem, t, &mut |to, knot, from, scale| {
+                    if let (Some(now), Some(old)) = (now.get_mut(to), old[knot].get(from)) {
+                        now.iter_mut().zip(old).for_each(|(now, old)| *now = scale * old);
+                    }
+                });
+            }
+        }
+        problem.write_limit_rows(&mut self.outcome.limits);
+        Ok(passed)
+    }
+
     /// Sets the multipliers of the limit `name`, one list for each knot 0 … N, which is empty at a knot without this
     /// limit. The result of [`Outcome::multipliers_of`] has this form. The next [`solve`](Self::solve) or
     /// [`resume`](Self::resume) starts from them. Other limits keep the multipliers of the last solve; without a

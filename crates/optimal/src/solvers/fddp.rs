@@ -179,6 +179,60 @@ impl Fddp {
         self.solver.shift(problem, &self.settings)
     }
 
+    /// Moves the horizon of `problem` by `elapsed` seconds, gives its knots new models and durations (s), and turns the
+    /// solution into a warm start for it. A controller calls this method in each period, with knots from a
+    /// [`Schedule`](crate::Schedule). So the period is independent of the spacing of the knots, and contacts may begin
+    /// and end at any time. With `elapsed` equal to the duration of knot 0 and the knots of a [shifted](Problem::shift)
+    /// problem, the result is the one of [`shift`](Self::shift).
+    ///
+    /// Each new knot takes its numbers from the old plan at the same time. States are interpolated, as in
+    /// [`Solution::at`]; a new knot has the controls and gains of the old knot at
+    /// its middle. If this knot has
+    /// other contacts, the controls hold the state still, and the gains are zero. After the end of the old plan, the
+    /// last control is repeated or holds the state still, and states follow as in [`shift`](Self::shift).
+    ///
+    /// Returns the number of knots that have passed. The costs and limits that belong to a single knot move by this
+    /// number. A knot whose
+    /// model changes loses them. Allocates only at the first call, or if the number of a knot's controls changes.
+    ///
+    /// ```
+    /// # use condyle_dynamics::robots;
+    /// # use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+    /// use condyle_optimal::{Fddp, Problem, Schedule};
+    /// # let arm = std::sync::Arc::new(robots::arm7());
+    /// # let costs = vec![Cost::new("effort", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic)];
+    /// # let knot = Box::new(FreeDynamics::running(arm.clone(), 0.02, costs)?);
+    /// # let (x0, end) = (vec![0.1; 14], Box::new(FreeDynamics::terminal(arm, vec![])?));
+    /// let mut problem = Problem::new(x0.clone(), vec![knot], vec![0; 10], end)?;
+    /// let mut solver = Fddp::new(&problem);
+    /// solver.solve(&mut problem, &x0.repeat(11), &vec![0.0; 70])?;
+    /// let (schedule, mut begin) = (Schedule::new(0.02, 0)?, 0.0);
+    /// let (mut models, mut durations) = ([0; 10], [0.0; 10]);
+    /// for now in [0.005, 0.01, 0.015, 0.02, 0.025] {
+    ///     schedule.write_knots(now, &mut models, &mut durations);
+    ///     solver.retime(&mut problem, now - begin, &models, &durations)?;
+    ///     begin = now;
+    ///     // here: set_x0 with the measured state, and new references
+    ///     solver.resume_to_full_step(&mut problem, 3)?;
+    /// }
+    /// assert!((problem.duration(0).unwrap() - 0.015).abs() < 1e-12);
+    /// # Ok::<(), condyle_optimal::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::NothingToResume`] before the first solve; [`Error::Elapsed`] if `elapsed` is negative or not finite; the
+    /// errors of [`Problem::set_knots`]; [`Error::NoDuration`] for a user-defined action. Problem and solution are then
+    /// unchanged.
+    pub fn retime(
+        &mut self,
+        problem: &mut Problem,
+        elapsed: f64,
+        knot_models: &[usize],
+        durations: &[f64],
+    ) -> Result<usize, Error> {
+        self.solver.retime(problem, &self.settings, elapsed, knot_models, durations)
+    }
+
     /// Returns the result of the last solve.
     pub fn solution(&self) -> &Solution {
         &self.solver.iterate.solution

@@ -270,6 +270,12 @@ impl Solution {
         self.shape.clone_from(shape);
     }
 
+    /// Changes the dimensions to `shape`, and the length of the controls. The caller changes the gains.
+    pub(super) fn reshape(&mut self, shape: &Shape) {
+        self.us.resize(shape.offsets[shape.horizon()], 0.0);
+        self.shape.clone_from(shape);
+    }
+
     pub(crate) fn shape(&self) -> &Shape {
         &self.shape
     }

@@ -8,6 +8,7 @@
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;
+use super::retime::Retiming;
 use super::search::{LineSearch, Search, Surroundings};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Iteration, Solution, Status, Timings};
@@ -37,10 +38,12 @@ pub(super) struct SolverLoop {
     /// Whether some control has a bound.
     bounded: bool,
     /// Whether the solver has a trajectory from which a solve can resume.
-    started: bool,
+    pub(super) started: bool,
     /// Whether a warm start or a solve has set the trajectory since the last shift. If not, the next shift repeats the
     /// last state.
     pub(super) renewed: bool,
+    /// Old plan of a retiming.
+    pub(super) retiming: Retiming,
 }
 
 /// Options of a pass that the calling solver sets, in addition to the settings.
@@ -99,6 +102,7 @@ impl SolverLoop {
             bounded: false,
             started: false,
             renewed: false,
+            retiming: Retiming::default(),
         }
     }
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Number of knots of the horizon; a step of the trot has 6 knots with two feet in the air, and 2 knots on four feet.
 const HORIZON: usize = 12;
 const DT: f64 = 0.02;
-const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
+pub(super) const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
 
 /// Returns the model of each knot of the trot: all feet on the ground, or one of two diagonal pairs of feet.
 fn stance(t: usize) -> usize {
@@ -22,7 +22,7 @@ fn stance(t: usize) -> usize {
 }
 
 /// Returns the standing state and the contacts of each stance.
-fn stances() -> (Vec<f64>, [Vec<Contact>; 3]) {
+pub(super) fn stances() -> (Vec<f64>, [Vec<Contact>; 3]) {
     let quadruped = robots::quadruped();
     let q = [vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0], [0.0, 0.7, -1.4, 0.0, -0.7, 1.4].repeat(2)].concat();
     let contact = |foot: &&str| {

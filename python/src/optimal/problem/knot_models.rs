@@ -93,6 +93,67 @@ impl Problem {
         Ok(())
     }
 
+    /// Returns an error for a duration that differs from the present one, at a knot whose model has no description.
+    pub(in crate::optimal) fn check_durations(
+        &self,
+        problem: &rust::Problem,
+        knot_models: &[usize],
+        durations: &[f64],
+    ) -> PyResult<()> {
+        let described = lock("problem", &self.described)?;
+        let models = described.len() - 1;
+        for (t, (&k, &dt)) in knot_models.iter().zip(durations).enumerate() {
+            let is_robot = k >= models || described[k].is_some(); // unknown models are errors of the problem
+            if !is_robot && (t >= problem.horizon() || problem.duration(t) != Some(dt)) {
+                return Err(ProblemError::new_err(format!("knot {t}: expected an action of a robot with a duration")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves the descriptions of the models by the knots that have passed, and removes the costs and limits of single
+    /// knots whose models have changed from `before` to `after`.
+    pub(in crate::optimal) fn describe_knots(&self, passed: usize, before: &[usize], after: &[usize]) -> PyResult<()> {
+        for _ in 0..passed {
+            self.describe_shift()?;
+        }
+        let mut described = lock("problem", &self.described)?;
+        for (t, (before, after)) in before[passed..].iter().zip(after).enumerate() {
+            if before != after
+                && let Some(described) = &mut described[*before]
+                && described.moves()
+            {
+                Arc::make_mut(described).release(t);
+            }
+        }
+        self.moved.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Returns the index of each knot's model, where a knot whose duration differs from the duration of its model has a
+    /// new model. Also returns the new models, as the index of a model and a duration.
+    pub(super) fn separate_durations(
+        problem: &rust::Problem,
+        described: &[Option<Arc<Described>>],
+    ) -> (Vec<usize>, Vec<(usize, f64)>) {
+        let mut added: Vec<(usize, f64)> = Vec::new();
+        let models = described.len() - 1;
+        let knot_models = problem.knot_models().iter().enumerate().map(|(t, &k)| {
+            let own = described[k].as_ref().and_then(|described| described.knot.dynamics.dt());
+            let (Some(own), Some(dt)) = (own, problem.duration(t)) else { return k };
+            if own == dt {
+                return k;
+            }
+            let known = added.iter().position(|other| *other == (k, dt));
+            models
+                + known.unwrap_or_else(|| {
+                    added.push((k, dt));
+                    added.len() - 1
+                })
+        });
+        (knot_models.collect(), added)
+    }
+
     /// Returns the number of times that the horizon was shifted.
     pub(in crate::optimal) fn moved(&self) -> usize {
         self.moved.load(Ordering::Relaxed)

@@ -175,6 +175,15 @@ impl Problem {
         t == 0 || group(t).zip(group(t - 1)).is_none_or(|(own, before)| own.has_controls_of(before))
     }
 
+    /// Returns whether the controls of two models have the same meaning: see
+    /// [`continues_controls`](Self::continues_controls). Both models have the same number of controls.
+    pub(crate) fn has_same_controls(&self, one: usize, other: usize) -> bool {
+        let [a, b] = [one, other].map(|index| self.models.of(index));
+        one == other
+            || a.nu() == b.nu()
+                && a.knot_group().zip(b.knot_group()).is_none_or(|(own, other)| own.has_controls_of(other))
+    }
+
     /// Computes the controls that hold the state x of a robot's knot t still, as nearly as possible, into `u`. Returns
     /// whether the knot has such controls. Allocates nothing.
     pub(crate) fn hold_still(&mut self, t: usize, x: &[f64], u: &mut [f64]) -> bool {

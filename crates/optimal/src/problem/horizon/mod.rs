@@ -1,11 +1,12 @@
 //! Optimal control problem over a horizon of knots.
 
 mod evaluation;
+mod knots;
 
 use super::action::ActionModel;
 use super::action_view::{ActionView, Actions};
 use super::group::innermost;
-use super::models::{Models, check, reserve};
+use super::models::{Models, check, reserve, share};
 use super::shape::Shape;
 use super::threads::Copies;
 use crate::error::{Error, assert_length};
@@ -95,6 +96,7 @@ impl Problem {
         let shape = Shape { nx, ndx, offsets: Vec::with_capacity(horizon + 1) };
         let (runs, knots) = (Vec::with_capacity(horizon), (0..=horizon).collect());
         let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
+        share(&*models.actions[0], &mut *terminal);
         reserve(&mut *terminal);
         let mut problem = Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread };
         problem.arrange();
@@ -335,6 +337,7 @@ impl Problem {
         let Self { x0, models, knot_models, terminal, shape, runs: own_runs, knots, unread, .. } = self;
         let (x0, models, knot_models, shape) = (x0.clone(), models.try_clone()?, knot_models.clone(), shape.clone());
         let mut terminal = terminal.try_clone().ok_or(Error::NoCopy { model: None })?;
+        share(&*models.actions[0], &mut *terminal);
         reserve(&mut *terminal);
         let mut runs = Vec::with_capacity(knot_models.len()); // `shift` may need this capacity and must not allocate
         runs.extend_from_slice(own_runs);

@@ -9,6 +9,7 @@ use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
     LimbElimination, invert_blocks, restore, solve_blocks, write_drift, write_jacobian, write_motion,
 };
+use super::shared_data::Lent;
 use crate::problem::Evaluation;
 use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, SHARED, constraint_set};
@@ -18,14 +19,27 @@ use crate::robot::knot_data::{KnotData, WIDEST, unpack};
 use crate::robot::residuals::gravity_residual::GravityResidual;
 use crate::robot::residuals::kernel::{KnotGroup, ResidualKernel};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Model, aba, aba_derivatives, constrained_dynamics,
+    ConstraintSet, ContactConstraint, Model, aba, aba_derivatives, constrained_dynamics,
     constrained_dynamics_derivatives, constrained_equations_at, constrained_inverse_dynamics,
     constrained_inverse_dynamics_derivatives, rnea, rnea_derivatives,
 };
-use condyle_spatial::block::{Block, gather_rows, scatter};
+use condyle_spatial::block::{Block, Real, SimdToken, gather_rows, scatter};
 use condyle_spatial::{Matrix, matrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
+
+/// Token that allows this crate to name SIMD vector types.
+pub(crate) struct Gate;
+
+// SAFETY: SIMD vectors are used only by the kernels of `condyle_dynamics`, and by code that is called like these
+// kernels.
+#[allow(unsafe_code)]
+unsafe impl SimdToken for Gate {}
+
+/// Vector with few lanes.
+pub(crate) type Short = <f64 as Real>::Narrow<Gate>;
+/// Vector with the lanes of the widest registers.
+pub(crate) type Long = <f64 as Real>::Wide<Gate>;
 
 /// Kind of dynamics: the equations that determine the accelerations.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,7 +100,7 @@ pub(crate) enum Pass<S> {
 /// Dynamics of as many knots as the scalar `S` has lanes.
 #[derive(Debug)]
 pub(crate) struct KnotBatch<S> {
-    pub data: Data<S>,
+    pub data: Lent<S>,
     pub pass: Pass<S>,
     gravity_residual: GravityResidual<S>,
     residuals: ResidualKernel<S>,
@@ -102,9 +116,10 @@ pub(crate) struct KnotBatch<S> {
 }
 
 impl<S: Block<Number = f64>> KnotBatch<S> {
-    /// Allocates the workspace for a robot. The contacts of `kind` must have been checked before.
+    /// Allocates the workspace for a robot, except the memory `data`. The contacts of `kind` must have been checked
+    /// before.
     #[inline(never)]
-    pub(crate) fn new(model: &Model, kind: &DynamicsKind) -> Self {
+    pub(crate) fn new(model: &Model, kind: &DynamicsKind, data: Lent<S>) -> Self {
         let (nv, zeros) = (model.nv(), |n| vec![S::zero(); n]);
         let pass = match kind {
             DynamicsKind::None | DynamicsKind::Impact { .. } => Pass::None,
@@ -121,11 +136,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 Pass::ContactInverse(set, J)
             }
         };
-        let (data, gravity_residual, residuals) = (Data::new(model), GravityResidual::new(nv), ResidualKernel::new(nv));
+        let (gravity_residual, residuals) = (GravityResidual::new(nv), ResidualKernel::new(nv));
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
         let lambda = zeros(rows);
-        let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Vec::new());
+        let linear = LinearEquations::new();
         Self { data, pass, gravity_residual, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
@@ -140,7 +155,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 
     /// Allocates the workspace for the equations of knots in inverse-dynamics form.
     pub(crate) fn reserve(&mut self, tableau: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
-        self.linear = LinearEquations::new(tableau, eliminations);
+        self.linear.reserve(tableau, eliminations);
     }
 
     /// Computes the dynamics of the knots of `group`, from the efforts or accelerations in the data of each knot. Also
@@ -168,6 +183,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     /// if `forces` is set.
     fn run_pass(&mut self, model: &Model, derivatives: bool, forces: bool, to: &mut [KnotData]) {
         let Self { data, pass, q, v, tau, a, lambda, .. } = self;
+        let data = &mut *data.get();
         match pass {
             Pass::None => return,
             Pass::Free if !derivatives => a.copy_from_slice(aba(model, data, q, v, tau, &[])),
@@ -234,6 +250,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
     /// from the equations.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
         let Self { data, pass, q, v, a, lambda, linear, .. } = self;
+        let data = &mut *data.get();
         pack(to.len(), |k| &to[k].a, a);
         match pass {
             Pass::Contact(set, J) => {
@@ -289,7 +306,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
             }
         }
         let Self { data, gravity_residual, residuals, q, v, a, visited, .. } = self;
-        let requirements = first.layout().requirements;
+        let (data, requirements) = (&mut *data.get(), first.layout().requirements);
         let mut group =
             KnotGroup { terms: &each[..to.len()], data: to, slopes: what != Evaluation::Values, visited: *visited };
         if requirements.gravity {
@@ -317,13 +334,22 @@ struct LinearEquations<S> {
 }
 
 impl<S: Block<Number = f64>> LinearEquations<S> {
-    fn new(size: Tableau, eliminations: Vec<Arc<LimbElimination>>) -> Self {
+    /// Creates equations without memory.
+    fn new() -> Self {
+        let [tableau, before, inverses, Y] = [(); 4].map(|()| Vec::new());
+        Self { size: Tableau { nv: 0, rows: 0 }, eliminations: Vec::new(), tableau, before, inverses, Y }
+    }
+
+    /// Allocates memory for equations of the given size and for their eliminations.
+    fn reserve(&mut self, size: Tableau, eliminations: Vec<Arc<LimbElimination>>) {
         let most = |room: fn(&LimbElimination) -> usize| {
             eliminations.iter().map(|elimination| room(elimination)).max().unwrap_or(0)
         };
-        let zeros = |n| vec![S::zero(); n];
-        let (inverses, Y) = (zeros(most(LimbElimination::room)), zeros(most(LimbElimination::columns)));
-        Self { size, eliminations, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
+        self.tableau.resize(size.len(), S::zero());
+        self.before.resize(size.len(), S::zero());
+        self.inverses.resize(most(LimbElimination::room), S::zero());
+        self.Y.resize(most(LimbElimination::columns), S::zero());
+        (self.size, self.eliminations) = (size, eliminations);
     }
 
     /// Eliminates the limbs and the base of each knot where the pivots are large enough, and writes the equations to

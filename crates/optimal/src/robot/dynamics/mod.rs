@@ -12,4 +12,5 @@ pub(super) mod kkt_elimination;
 mod limb_elimination;
 pub(crate) mod robot;
 mod sensitivities;
+mod shared_data;
 mod still;

@@ -1,11 +1,12 @@
 //! Dynamics of a robot, for all kinds of dynamics: accelerations, costs and limits for a group of knots.
 #![allow(non_snake_case)] // names follow the literature: J
 
-use super::batch::{DynamicsKind, Group, KnotBatch, Pass};
+use super::batch::{DynamicsKind, Group, KnotBatch, Long, Pass, Short};
 use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
 use super::sensitivities::DynamicsSensitivities;
+use super::shared_data::SharedData;
 use super::still::Still;
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
@@ -25,21 +26,9 @@ use condyle_dynamics::{
     gravity, integrate, integrate_jacobian_groups, neutral,
 };
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Real, SimdToken};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
-
-/// Token that allows this crate to name SIMD vector types.
-struct Gate;
-
-// SAFETY: SIMD vectors are used only by the kernels of `condyle_dynamics`, and by code that is called like these
-// kernels.
-#[allow(unsafe_code)]
-unsafe impl SimdToken for Gate {}
-
-type Short = <f64 as Real>::Narrow<Gate>;
-type Long = <f64 as Real>::Wide<Gate>;
 
 /// Maximum number of postures that are tried in the search for a regular posture.
 const POSTURES: usize = 8;
@@ -58,6 +47,7 @@ pub(crate) struct RobotDynamics {
     capabilities: Capabilities,
     /// Coordinates of each group of positions that is not a vector space.
     pub(crate) groups: Vec<Range<usize>>,
+    shared: SharedData,
     work: OnDemand<Work>,
 }
 
@@ -146,11 +136,12 @@ impl Work {
         given: Output,
         capabilities: &Capabilities,
         groups: &[Range<usize>],
+        shared: &SharedData,
     ) -> Self {
         let (nv, lanes) = (model.nv(), lanes(kind));
         let mut vectors = (lanes > 1).then(|| {
-            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, kind));
-            VectorBatches { short: KnotBatch::new(model, kind), long }
+            let long = (lanes > Short::LANES).then(|| KnotBatch::new(model, kind, shared.long(model)));
+            VectorBatches { short: KnotBatch::new(model, kind, shared.short(model)), long }
         });
         let moved_by = match kind {
             DynamicsKind::Free => Some(Vec::new()),
@@ -175,7 +166,7 @@ impl Work {
             elimination
         });
         Self {
-            single: KnotBatch::new(model, kind),
+            single: KnotBatch::new(model, kind, shared.single(model)),
             vectors,
             impact: Impact::new(model, kind),
             data: vec![data; lanes],
@@ -244,7 +235,8 @@ impl RobotDynamics {
         }
         let given = if capabilities.inverse { Output::Acceleration } else { Output::Effort };
         let groups = groups(&model);
-        Ok(Self { model, actuation, terms, kind, given, capabilities, groups, work: OnDemand::default() })
+        let (shared, work) = (SharedData::default(), OnDemand::default());
+        Ok(Self { model, actuation, terms, kind, given, capabilities, groups, shared, work })
     }
 
     /// Returns the contacts, in the order of their forces in λ.
@@ -314,10 +306,18 @@ impl RobotDynamics {
 
     /// Returns references to all fields. Allocates the workspace if it does not exist.
     fn parts(&mut self) -> Parts<'_> {
-        let Self { model, actuation, terms, kind, given, capabilities, groups, work } = self;
+        let Self { model, actuation, terms, kind, given, capabilities, groups, shared, work } = self;
         terms.reserve();
-        let work = work.get(|| Work::new(model, actuation, kind, *given, capabilities, groups));
+        let work = work.get(|| Work::new(model, actuation, kind, *given, capabilities, groups, shared));
         Parts { model, actuation, terms, capabilities, groups, work }
+    }
+
+    /// Uses the memory of `other` for the algorithms of the dynamics, if both robots have the same model and this robot
+    /// has no workspace yet.
+    pub(crate) fn share(&mut self, other: &Self) {
+        if Arc::ptr_eq(&self.model, &other.model) && self.work.made().is_none() {
+            self.shared.share(&other.shared);
+        }
     }
 
     /// Moves the costs and limits of `other` to this robot if both have the same dynamics. Returns whether the dynamics
@@ -378,7 +378,7 @@ impl RobotDynamics {
         if let Some(impact) = impact {
             let terms_at = terms.at(knots[0], group.limited);
             data[0].residuals.reserve(model.nv(), terms.layouts());
-            impact.run(model, &mut single.data, xs, terms_at, what != Evaluation::Values, &mut data[0]);
+            impact.run(model, &mut single.data.get(), xs, terms_at, what != Evaluation::Values, &mut data[0]);
             return single.run_residuals_at(model, group, terms, &mut data[0]);
         }
         for (k, data) in data.iter_mut().enumerate() {
@@ -534,6 +534,7 @@ impl RobotDynamics {
             Pass::Free => {
                 actuation.effort(u, &mut knot.tau);
                 let (nv, (q, v)) = (model.nv(), x.split_at(model.nq()));
+                let data = &mut *data.get();
                 let d = aba_hessian(model, data, q, v, &knot.tau, &[], mu);
                 for c in 0..nv {
                     for r in 0..nv {
@@ -553,7 +554,8 @@ impl RobotDynamics {
                 da_dq.copy_from(d.first.da_dq);
                 da_dv.copy_from(d.first.da_dv);
                 da_dtau.copy_from(d.first.da_dtau);
-                Some(Derivatives { a: d.first.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) })
+                knot.a.copy_from_slice(d.first.a);
+                Some(Derivatives { a: &knot.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) })
             }
             Pass::Inverse | Pass::ContactInverse(..) => {
                 knot.a.copy_from_slice(&u[..model.nv()]);

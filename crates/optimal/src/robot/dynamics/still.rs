@@ -70,6 +70,7 @@ impl Still {
         map.as_mut_slice().fill(0.0);
         drives.write_columns(map.as_mut_slice());
         let KnotBatch { data, pass, .. } = batch;
+        let data = &mut *data.get();
         if let Pass::Contact(set, J) | Pass::ContactInverse(set, J) = pass {
             let rows = set.rows();
             constrained_inverse_dynamics(model, data, set, q, v, &zeros[..nv], &zeros[..rows], &[]);

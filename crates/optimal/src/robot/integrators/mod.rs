@@ -342,6 +342,13 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         same
     }
 
+    fn share(&mut self, other: &dyn KnotGroup) {
+        let others = other.dynamics_ref().and_then(|robot| robot.downcast_ref::<RobotDynamics>());
+        if let Some((own, other)) = robot_mut(&mut self.inner).zip(others) {
+            own.share(other);
+        }
+    }
+
     fn choose(&mut self, model: usize) {
         self.durations.choose(model);
         if let Some(robot) = robot_mut(&mut self.inner) {
@@ -354,6 +361,17 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         if let Some(robot) = robot_mut(&mut self.inner) {
             robot.terms.serve(t, horizon, model);
         }
+    }
+
+    fn release(&mut self, t: usize) {
+        self.durations.chosen_mut().release(t);
+        if let Some(robot) = robot_mut(&mut self.inner) {
+            robot.terms.release(t);
+        }
+    }
+
+    fn reserve_durations(&mut self, horizon: usize) {
+        self.durations.all_mut().iter_mut().for_each(|durations| durations.reserve(horizon));
     }
 
     fn set_duration(&mut self, t: usize, dt: f64) -> bool {

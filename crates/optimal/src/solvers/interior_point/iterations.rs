@@ -334,6 +334,7 @@ impl InteriorPoint {
         let merit = self.best_merit(kkt, now.steps);
         self.solver.best.leave(&mut self.solver.iterate, merit);
         self.accept_trial(cost);
+        self.solver.renewed = true;
         self.slacks.advance(alpha, beta, self.mu);
     }
 

@@ -245,6 +245,30 @@ impl InteriorPoint {
         Ok(())
     }
 
+    /// Moves the horizon of `problem` by `elapsed` seconds, gives its knots new models and durations (s), and turns the
+    /// solution into a warm start for it, as [`Fddp::retime`](crate::Fddp::retime) does. Slack variables and
+    /// multipliers come from the same knots as controls. If models differ, limits with the same name keep theirs. The
+    /// multipliers are scaled by the durations of the knots.
+    ///
+    /// # Errors
+    /// The same errors as [`Fddp::retime`](crate::Fddp::retime).
+    pub fn retime(
+        &mut self,
+        problem: &mut Problem,
+        elapsed: f64,
+        knot_models: &[usize],
+        durations: &[f64],
+    ) -> Result<usize, Error> {
+        let settings = self.settings.shared()?;
+        let passed = self.solver.retime(problem, &settings, elapsed, knot_models, durations)?;
+        self.step.reshape(problem);
+        self.trial.reshape(problem);
+        if self.is_warm {
+            self.slacks.retime(problem, &self.solver.retiming)?;
+        }
+        Ok(passed)
+    }
+
     /// Makes one linearisation at the last trajectory and up to `sweeps` steps of the interior point for the quadratic
     /// program that results, as a controller does in each period. The time is known in advance: no step is searched.
     /// Steps end earlier when the program is solved, or when the [time budget](InteriorPointSettings::time_budget) is

@@ -8,6 +8,7 @@ use crate::error::Error;
 use crate::lq::{ConstraintRow, LqKnot, RowTerms};
 use crate::problem::{Problem, Shape, outside};
 use crate::solvers::outcome::{Violation, ViolationKind};
+use crate::solvers::retime::Retiming;
 use barrier::{Barrier, Products, StepLimits, padded};
 use core::ops::Range;
 use soft::SoftRows;
@@ -72,6 +73,8 @@ pub(super) struct Slacks {
     diagonals: Vec<f64>,
     /// Offsets, s, z and y before a shift.
     old: (Vec<usize>, [Vec<f64>; 4]),
+    /// Numbers of constraints before a retiming.
+    old_counts: Vec<usize>,
 }
 
 /// Residuals of all rows at an iterate.
@@ -159,12 +162,7 @@ impl Slacks {
     /// both have the same number of rows. The last knot before the terminal one takes the numbers of the knot before
     /// it.
     pub(super) fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
-        let (offsets, numbers) = &mut self.old;
-        offsets.clone_from(&self.offsets);
-        let Barrier { s, z: [zl, zu], .. } = &self.barrier;
-        for (old, now) in numbers.iter_mut().zip([s, zl, zu, &self.y]) {
-            old.clone_from(now);
-        }
+        self.keep_old();
         self.arrange(problem)?;
         let Self { offsets, barrier: Barrier { s, z: [zl, zu], .. }, y, old: (before, numbers), .. } = self;
         let horizon = problem.horizon();
@@ -182,6 +180,48 @@ impl Slacks {
             }
         }
         Ok(())
+    }
+
+    /// Reads the rows of a problem whose knots have other times. Each knot takes s, z and y of limits from the knot of
+    /// the old horizon that the retiming names. Multipliers are proportional to the duration of a knot.
+    pub(super) fn retime(&mut self, problem: &mut Problem, retiming: &Retiming) -> Result<(), Error> {
+        self.keep_old();
+        std::mem::swap(&mut self.old_counts, &mut self.counts);
+        self.arrange(problem)?;
+        let Self { offsets, counts, barrier: Barrier { s, z: [zl, zu], .. }, y, old, old_counts, .. } = self;
+        let (before, numbers) = &*old;
+        for (old, now) in numbers.iter().zip([s, zl, zu, y]) {
+            let is_slack = core::ptr::eq(old, &numbers[0]);
+            now.fill(0.0);
+            let mut copy = |to: usize, from: usize, count: usize, scale: f64| {
+                let scale = if is_slack { 1.0 } else { scale };
+                now[to..to + count].iter_mut().zip(&old[from..from + count]).for_each(|(now, old)| *now = scale * old);
+            };
+            for t in 0..counts.len() {
+                retiming.each_rows(problem, t, &mut |to, knot, from, scale| {
+                    if from.end <= old_counts[knot] {
+                        copy(offsets[t] + to.start, before[knot] + from.start, from.len(), scale);
+                    }
+                });
+                let Some(source) = retiming.sources.get(t) else { continue };
+                let (to, from) = (offsets[t] + counts[t], before[source.knot] + old_counts[source.knot]);
+                let bounds = offsets[t + 1] - to;
+                if source.has_controls && bounds == before[source.knot + 1] - from {
+                    copy(to, from, bounds, source.scale);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Copies offsets, s, z and y before the rows change.
+    fn keep_old(&mut self) {
+        let (offsets, numbers) = &mut self.old;
+        offsets.clone_from(&self.offsets);
+        let Barrier { s, z: [zl, zu], .. } = &self.barrier;
+        for (old, now) in numbers.iter_mut().zip([s, zl, zu, &self.y]) {
+            old.clone_from(now);
+        }
     }
 
     /// Returns the number of all rows.
