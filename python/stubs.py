@@ -114,14 +114,16 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
-        Schedule.model Schedule.switch.model count facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
+        Schedule.model Schedule.switch.model
+        count facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping delta dt elapsed eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
+        bias damping delta dt elapsed
+        eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
         regularisation
         restitution s smoothing spacing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
-        fade max_force min_force yaw_friction FrictionContact.friction""",
+        fade max_force min_force now then yaw_friction FrictionContact.friction""",
     "float | None": "DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings",
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
@@ -130,7 +132,9 @@ ARGUMENTS = {
         for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")
     ),
     "list[int]": "_lend.shape _lend.strides",
-    "Sequence[int]": "AugmentedLagrangian.retime.knot_models Fddp.retime.knot_models InteriorPoint.retime.knot_models Problem.set_knots.knot_models",
+    "Sequence[int]": """
+        AugmentedLagrangian.retime.knot_models Fddp.retime.knot_models InteriorPoint.retime.knot_models
+        Problem.set_knots.knot_models""",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",
     "_Reference": "reference",
@@ -228,7 +232,8 @@ RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Policy.__call__ Problem._between Problem._moved Problem.references Problem.rollout Problem.x0
+        Policy.__call__ Problem._between Problem.references
+        AugmentedLagrangian.predict Fddp.predict InteriorPoint.predict Problem.rollout Problem.x0
         Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
         Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
@@ -251,7 +256,8 @@ RESULTS = {
     "float": """
         HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
         distance kinetic_energy mechanical_energy potential_energy
-        FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation Schedule.spacing Task.weight""",
+        FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation
+        Schedule.spacing Task.weight""",
     "float | None": "FrictionContact.yaw_friction Joint.pitch Policy.end",
     "tuple[float, float]": "Plan.span",
     "Data": "_SpelledData._ours",

@@ -96,6 +96,7 @@ __all__ = [
     "Problem",
     "ProblemError",
     "Residual",
+    "Schedule",
     "Simulation",
     "Sweep",
     "Task",
@@ -2837,6 +2838,20 @@ class AugmentedLagrangian:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> AugmentedLagrangian: ...
+    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
+        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+
+        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+
+        x: the measured state, nx numbers.
+        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            knot continues.
+
+        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+        """
+
     def publish(self, policy: Policy, start: float = 0.0) -> None:
         """Publishes the last solution for the threads that call a policy.
 
@@ -2860,6 +2875,29 @@ class AugmentedLagrangian:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
+        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+
+        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+        name keep their multipliers. After the end of the last solution, states and controls follow as in
+        `shift`.
+
+        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+        A knot whose model changes has the costs and limits that its new model has for all knots, until
+        `set_references` is called.
+
+        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            horizon, at least 0.
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def set_multipliers(self, name: str, values: ArrayLike) -> None:
@@ -3157,6 +3195,20 @@ class Fddp:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
+    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
+        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+
+        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+
+        x: the measured state, nx numbers.
+        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            knot continues.
+
+        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+        """
+
     def publish(self, policy: Policy, start: float = 0.0) -> None:
         """Publishes the last solution for the threads that call a policy.
 
@@ -3193,6 +3245,29 @@ class Fddp:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
+        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+
+        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+        name keep their multipliers. After the end of the last solution, states and controls follow as in
+        `shift`.
+
+        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+        A knot whose model changes has the costs and limits that its new model has for all knots, until
+        `set_references` is called.
+
+        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            horizon, at least 0.
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def shift(self, last: int) -> None:
@@ -3460,6 +3535,20 @@ class InteriorPoint:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> InteriorPoint: ...
+    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
+        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+
+        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+
+        x: the measured state, nx numbers.
+        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            knot continues.
+
+        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+        """
+
     def publish(self, policy: Policy, start: float = 0.0) -> None:
         """Publishes the last solution for the threads that call a policy.
 
@@ -3483,6 +3572,29 @@ class InteriorPoint:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
+        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+
+        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+        name keep their multipliers. After the end of the last solution, states and controls follow as in
+        `shift`.
+
+        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+        A knot whose model changes has the costs and limits that its new model has for all knots, until
+        `set_references` is called.
+
+        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            horizon, at least 0.
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def set_multipliers(self, name: str, values: ArrayLike) -> None:
@@ -3805,6 +3917,19 @@ class Problem:
         Raises `ProblemError` if the model does not fit.
         """
 
+    def set_knots(self, knot_models: Sequence[int], durations: ArrayLike) -> None:
+        """Sets the models and durations of all knots, before the first solve. Later, `retime` of a solver also moves its
+        solution.
+
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        A knot whose model changes has the costs and limits that its new model has for all knots.
+
+        Raises `ProblemError` for an unknown model, for a duration that is not above 0 or not 0 at an impact, and for a
+        new duration of an action that does not belong to a robot. Then nothing changes.
+        """
+
     def set_references(self, name: str, values: ArrayLike) -> None:
         """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
         each period, between solves.
@@ -4029,6 +4154,71 @@ class Residual:
     @staticmethod
     def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
         """Returns the rows r = A w of a wrench cone, for a rigid contact's wrench w."""
+
+@final
+class Schedule:
+    """The models of a horizon in time: from each switching time on, knots have another model. A trot for example switches
+    between models that differ in their contacts.
+
+    `knots(t, count)` returns the models and durations of a horizon that begins at any time t, for `retime` of a solver.
+    Knots begin at times that do not depend on t, and no knot contains a switching time. The time between two switches
+    is divided into equal knots, whose duration is as near to the spacing as possible. Only the first knot of a horizon
+    differs: it begins at t. It takes the rest of the present knot, together with the next knot if the rest is at most
+    half the spacing and no switch follows. So later knots remain the same when the horizon moves. The number of knots
+    is constant, and the end of the horizon moves.
+
+    spacing: the duration of a knot (s).
+    model: the index of the model before the first switch.
+
+    Raises `ProblemError` if the spacing is not above 0.
+
+    >>> from condyle.optimal import Schedule
+    >>> schedule = Schedule(0.02, 0)
+    >>> schedule.switch(0.05, 1)
+    >>> schedule.switch(0.10, 0)
+    >>> models, durations = schedule.knots(0.015, 5)
+    >>> models, durations.round(6).tolist()
+    ([0, 0, 1, 1, 0], [0.015, 0.02, 0.025, 0.025, 0.02])
+    """
+
+    def __new__(cls, spacing: float, model: int = 0) -> Schedule: ...
+    @property
+    def spacing(self) -> float:
+        """The duration of a knot (s)."""
+
+    @property
+    def switches(self) -> list[tuple[float, int]]:
+        """The switches that are not forgotten: times (s), each with the model from this time on."""
+
+    @staticmethod
+    def _from_text(text: str) -> Schedule: ...
+    def forget(self, t: float) -> None:
+        """Forgets the switches before the present phase, so that the schedule does not grow.
+
+        t: a time (s) in the present phase.
+        """
+
+    def knots(self, t: float, count: int) -> tuple[list[int], _Array]:
+        """Returns the models and durations of the knots of a horizon: a list of indices and an array (s).
+
+        t: the time (s) at which the horizon begins.
+        count: the number of knots.
+
+        Raises `ProblemError` if t is not finite.
+        """
+
+    def model(self, t: float) -> int:
+        """Returns the index of the model at the time t (s)."""
+
+    def switch(self, t: float, model: int) -> None:
+        """Adds a switch. Switches at or after t are removed: a contact that occurs earlier than planned is a switch now,
+        followed by the new switches.
+
+        t: the time (s) from which on knots have the model.
+        model: the index of the model.
+
+        Raises `ProblemError` if t is not finite.
+        """
 
 @final
 class Sweep:

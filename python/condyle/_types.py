@@ -712,20 +712,6 @@ class Solution(_Solution):
         x = self._source[0]._between(self.xs[knot], self.xs[knot + 1], s)
         return PlanPoint(knot, x, self.us[knot], self.K[knot])
 
-    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
-        """Predicts the state at the time `then` from the state x at the time `now`: it changes as the plan does,
-        x ⊕ (x̄(then) ⊖ x̄(now)).
-
-        A controller predicts the state at which its next plan begins, while the robot executes the present plan. Both
-        times (s) are counted from the beginning of knot 0, as in `at`. Another thread can call this method while a
-        solve runs.
-
-        x: the measured state, nx numbers.
-
-        Raises `ValueError` as `at` does, and `ProblemError` for a number that is not finite.
-        """
-        return self._source[0]._moved(x, self.at(now).x, self.at(then).x)
-
     def _evaluated(self) -> Evaluation:
         if self._evaluation is None:
             if self._source is None:

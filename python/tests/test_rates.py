@@ -90,7 +90,7 @@ def test_a_retiming_by_one_knot_is_a_shift(kind: Any) -> None:
 
 
 def test_a_plan_at_other_times() -> None:
-    """Checks that states are those of the plan at the same times, and controls those of the same knots."""
+    """Compares states with the plan at the same times, and controls with the same knots of the plan."""
     problem = arm_problem()
     solver = Fddp(problem, max_iterations=20)
     plan = solved(problem, solver)
@@ -160,14 +160,30 @@ def test_references_move_with_their_knots() -> None:
 
 
 def test_a_predicted_state() -> None:
-    """Checks that the state of the plan itself is predicted exactly."""
+    """Compares the prediction with a simulation of the same dynamics, whose controls follow the policy."""
     problem = arm_problem()
-    plan = solved(problem, Fddp(problem))
-    assert plan.predict(plan.xs[1], DT, 3 * DT) == pytest.approx(plan.xs[3], abs=1e-12)
-    moved = plan.predict(plan.xs[1] + 0.1, DT, 3 * DT)
-    assert moved == pytest.approx(plan.xs[3] + 0.1, abs=1e-12)
-    with pytest.raises(ProblemError, match="not finite"):
-        plan.predict(np.full(14, np.nan), 0.0, DT)
+    solver = Fddp(problem)
+    plan = solved(problem, solver)
+    policy = condyle.optimal.Policy(problem)
+    solver.publish(policy)
+    x = plan.xs[1] + 0.05
+    simulation = Simulation(ARM, dt=2e-4)
+    simulation.set_state(x[:7], x[7:])
+
+    def law(now: Any) -> None:
+        now.tau[:] = policy(DT + now.time, np.r_[now.q, now.v])
+
+    assert simulation.run(150, law) == "done"
+    then = np.r_[simulation.q, simulation.v]
+    predicted = solver.predict(x, DT, DT + 0.03)
+    # the plan itself changes by another amount
+    other = x + plan.at(DT + 0.03).x - plan.xs[1]
+    errors = [np.abs(state - then).max() for state in (predicted, other)]
+    assert errors[0] < 0.1 * errors[1], errors
+    assert solver.predict(x, DT, DT) == pytest.approx(x, abs=0)
+    for wrong in ((np.full(14, np.nan), 0.0, DT), (x, 0.0, np.inf)):
+        with pytest.raises(ProblemError, match="not finite"):
+            solver.predict(*wrong)
 
 
 @pytest.mark.parametrize("rate", [50.0, 130.0])
@@ -181,11 +197,13 @@ def test_a_quadruped_trots_in_place(rate: float) -> None:
     def knot(air: tuple[int, ...]) -> ContactDynamics:
         grips = [foot for k, foot in enumerate(FEET) if k not in air]
         kd = 1.0 / DT
-        contacts = {foot: condyle.ContactConstraint(foot, "point", None, "local_world_aligned", kd=kd) for foot in grips}
+        contacts = {
+            foot: condyle.ContactConstraint(foot, "point", None, "local_world_aligned", kd=kd) for foot in grips
+        }
         costs = [Cost("state", 1.0, Residual.state(STAND), state), effort(12)]
         for foot in [FEET[k] for k in air]:
             place = condyle.frame_placement(QUADRUPED, data, STAND[:19], foot)[:3, 3]
-            swing = Residual.frame_translation(QUADRUPED, foot, place + [0.0, 0.0, 0.04])
+            swing = Residual.frame_translation(QUADRUPED, foot, place + np.array([0.0, 0.0, 0.04]))
             costs.append(Cost(foot, 1.0, swing, Activation.weighted([300.0, 300.0, 3e3])))
         limits = [Limit(foot, Residual.friction_cone(foot, FrictionCone(0.5, least=5.0))) for foot in grips]
         limits.append(Limit("effort", Residual.control(np.zeros(12)), -effort_limit, effort_limit))

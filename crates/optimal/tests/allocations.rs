@@ -424,14 +424,17 @@ fn a_horizon_at_other_times_allocates_nothing() {
     let xs = x0.repeat(13);
     let us = problem.quasi_static(&xs).unwrap();
     let references = x0.repeat(13);
+    problem.set_references("rest", &references).unwrap(); // each knot gets memory for its references
     let (mut fddp, mut solver) = (Fddp::new(&problem), InteriorPoint::new(&problem));
     fddp.settings.max_iterations = 1;
     fddp.solve(&mut problem, &xs, &us).unwrap();
     solver.solve(&mut problem, &xs, &us).unwrap();
-    let (mut knot_models, mut durations) = ([0; 12], [0.0; 12]);
+    let (mut knot_models, mut durations, mut ahead) = ([0; 12], [0.0; 12], vec![0.0; x0.len()]);
     let mut period = |problem: &mut Problem, solver: &mut InteriorPoint, tick: u32| {
         schedule.write_knots(0.007 * f64::from(tick), &mut knot_models, &mut durations);
+        solver.solution().predict(problem, &x0, 0.0, 0.007, &mut ahead).unwrap();
         solver.retime(problem, 0.007, &knot_models, &durations).unwrap();
+        problem.set_x0(&ahead).unwrap();
         problem.set_references("rest", &references).unwrap();
         solver.tick(problem, 2).unwrap();
     };

@@ -500,25 +500,6 @@ impl Problem {
         output(py, None, &[space.nx()], |x| space.between([&x0, &x1], s, &mut dx, x))
     }
 
-    /// Computes x ⊕ (b ⊖ a), the state x after the change from a to b. Locks nothing, so it can run during a solve.
-    fn _moved<'py>(
-        &self,
-        x: &Bound<'py, PyAny>,
-        a: &Bound<'py, PyAny>,
-        b: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let Some(space) = &self.space else {
-            return Err(ProblemError::new_err("terminal: expected an action of a robot, whose states are predicted"));
-        };
-        let (py, nx) = (x.py(), space.nx());
-        let (x, a, b) = (vector("x", x, nx)?, vector("a", a, nx)?, vector("b", b, nx)?);
-        if let Some(k) = x.iter().position(|x| !x.is_finite()) {
-            return Err(ProblemError::new_err(format!("`x[{k}]` is {}, which is not finite", x[k])));
-        }
-        let mut dx = vec![0.0; space.ndx()];
-        output(py, None, &[nx], |out| space.moved(&x, [&a, &b], &mut dx, out))
-    }
-
     /// Computes the linear-quadratic approximation of the problem around states and controls: a list of N + 1
     /// `LqKnot`s, which a `Sweep` solves.
     ///

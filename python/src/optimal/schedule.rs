@@ -13,8 +13,9 @@ use std::sync::Mutex;
 /// `knots(t, count)` returns the models and durations of a horizon that begins at any time t, for `retime` of a solver.
 /// Knots begin at times that do not depend on t, and no knot contains a switching time. The time between two switches
 /// is divided into equal knots, whose duration is as near to the spacing as possible. Only the first knot of a horizon
-/// is shorter: it begins at t, and ends where it would end anyway. So all later knots remain the same when the horizon
-/// moves. The number of knots is constant, and the end of the horizon moves.
+/// differs: it begins at t. It takes the rest of the present knot, together with the next knot if the rest is at most
+/// half the spacing and no switch follows. So later knots remain the same when the horizon moves. The number of knots
+/// is constant, and the end of the horizon moves.
 ///
 /// spacing: the duration of a knot (s).
 /// model: the index of the model before the first switch.
@@ -25,9 +26,9 @@ use std::sync::Mutex;
 /// >>> schedule = Schedule(0.02, 0)
 /// >>> schedule.switch(0.05, 1)
 /// >>> schedule.switch(0.10, 0)
-/// >>> models, durations = schedule.knots(0.025, 5)
+/// >>> models, durations = schedule.knots(0.015, 5)
 /// >>> models, durations.round(6).tolist()
-/// ([0, 0, 1, 1, 0], [0.005, 0.02, 0.025, 0.025, 0.02])
+/// ([0, 0, 1, 1, 0], [0.015, 0.02, 0.025, 0.025, 0.02])
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Schedule(Mutex<rust::Schedule>);
 

@@ -8,7 +8,7 @@ use super::run::{Observer, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
-use crate::arrays::vector;
+use crate::arrays::{Give, vector};
 use crate::exceptions::{problem_error, wrong_word};
 use condyle::optimal as rust;
 use pyo3::exceptions::PyValueError;
@@ -169,6 +169,34 @@ macro_rules! solver {
                 self.problem.get().describe_shift()?;
                 solver.shift(&mut problem).map_err(problem_error)?;
                 self.problem.get().raise()
+            }
+
+            /// Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+            /// is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+            /// u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+            ///
+            /// A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+            ///
+            /// x: the measured state, nx numbers.
+            /// now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            ///     knot continues.
+            ///
+            /// Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+            fn predict<'py>(
+                &self,
+                x: &Bound<'py, PyAny>,
+                now: f64,
+                then: f64,
+            ) -> PyResult<Bound<'py, PyAny>> {
+                let py = x.py();
+                let mut problem = lock("problem", &self.problem.get().inner)?;
+                let solver = lock("solver", &self.solver)?;
+                let x = vector("x", x, problem.nx())?;
+                let mut next = vec![0.0; problem.nx()];
+                let solution = solver.solution();
+                solution.predict(&mut problem, &x, now, then, &mut next).map_err(problem_error)?;
+                self.problem.get().raise()?;
+                next.give(py, None)
             }
 
             /// Moves the horizon by any time, gives its knots new models and durations, and turns the last solution

@@ -152,9 +152,7 @@ def turned(angle: Array | float, vector: Array) -> Array:
 class Predictive:
     """Controller of a walk or a trot: a plan, which a tick renews, and the plan's feedback."""
 
-    def __init__(
-        self, model: condyle.Model, robot: Robot, solver: Solver = "tick2", rate: float | None = None
-    ) -> None:
+    def __init__(self, model: condyle.Model, robot: Robot, solver: Solver = "tick2", rate: float | None = None) -> None:
         """rate: rate of the ticks (Hz), which is independent of the knots. With None, each tick shifts the horizon by a
         knot."""
         self.model, self.robot, self.rule, self.feet = model, robot, solver, list(robot.feet)

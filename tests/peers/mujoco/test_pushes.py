@@ -25,6 +25,22 @@ def test_the_walk_is_steady(name: str, solver: Solver) -> None:
     assert calm.velocities[:, 4].std() < RIPPLE
 
 
+@pytest.mark.parametrize("rate", [50.0, 100.0, 130.0, 200.0])
+def test_a_trot_is_steady_at_any_rate(rate: float) -> None:
+    """Compares the trot with the trot of a controller that ticks once in each knot. The commanded speed is 0.5 m/s."""
+    calm = run("go2", "tick2", 3.5, rate=rate)
+    assert not calm.fallen and calm.velocities[:, 0].mean() == pytest.approx(ROBOTS["go2"].speed, rel=0.02)
+    assert calm.velocities[:, 4].std() < RIPPLE
+
+
+def test_steps_may_take_any_time() -> None:
+    """Checks steps of 275 ms, no multiple of the knots or of the period."""
+    gait = ROBOTS["go2"].gait._replace(swing=0.23, both=0.045)
+    calm = run("go2", "tick2", 3.5, rate=130.0, gait=gait)
+    assert not calm.fallen and calm.velocities[:, 0].mean() == pytest.approx(ROBOTS["go2"].speed, rel=0.02)
+    assert calm.velocities[:, 4].std() < RIPPLE
+
+
 def test_a_push_is_survived() -> None:
     """Pushes the robot so hard that it falls with one iteration of FDDP in each tick."""
     assert survives("go2", "tick2", Push(20.0, 90.0, BEGIN[0]))

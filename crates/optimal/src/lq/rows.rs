@@ -125,10 +125,10 @@ impl ConstraintRows {
     /// Allocates at least the given [capacities](Self::capacities).
     pub(crate) fn reserve(&mut self, capacities: [usize; 4]) {
         let Self { rows, groups, forms, numbers } = self;
-        rows.reserve(capacities[0].saturating_sub(rows.len()));
-        groups.reserve(capacities[1].saturating_sub(groups.len()));
-        forms.reserve(capacities[2].saturating_sub(forms.len()));
-        numbers.reserve(capacities[3].saturating_sub(numbers.len()));
+        rows.reserve_exact(capacities[0].saturating_sub(rows.len()));
+        groups.reserve_exact(capacities[1].saturating_sub(groups.len()));
+        forms.reserve_exact(capacities[2].saturating_sub(forms.len()));
+        numbers.reserve_exact(capacities[3].saturating_sub(numbers.len()));
     }
 
     /// Returns the number of rows.

@@ -189,6 +189,13 @@ pub trait KnotGroup {
         false
     }
 
+    /// Computes the next state of knot t after `dt` seconds in place of the knot's duration, into `next`. Returns
+    /// whether the knot has a duration.
+    fn advance(&mut self, t: usize, x: &[f64], u: &[f64], dt: f64, next: &mut [f64]) -> bool {
+        let _ = (t, x, u, dt, next);
+        false
+    }
+
     /// Computes the controls that hold the state x still into `u`, as [`ActionModel::quasi_static`] does, but without
     /// allocation. Returns whether this action has such controls.
     fn hold_still(&mut self, x: &[f64], u: &mut [f64]) -> bool {

@@ -200,7 +200,8 @@ impl Fddp {
     /// # use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
     /// use condyle_optimal::{Fddp, Problem, Schedule};
     /// # let arm = std::sync::Arc::new(robots::arm7());
-    /// # let costs = vec![Cost::new("effort", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic)];
+    /// # let effort = Residual::Control { reference: vec![0.0; 7] };
+    /// # let costs = vec![Cost::new("effort", 1.0, effort, Activation::Quadratic)];
     /// # let knot = Box::new(FreeDynamics::running(arm.clone(), 0.02, costs)?);
     /// # let (x0, end) = (vec![0.1; 14], Box::new(FreeDynamics::terminal(arm, vec![])?));
     /// let mut problem = Problem::new(x0.clone(), vec![knot], vec![0; 10], end)?;
@@ -220,9 +221,9 @@ impl Fddp {
     /// ```
     ///
     /// # Errors
-    /// [`Error::NothingToResume`] before the first solve; [`Error::Elapsed`] if `elapsed` is negative or not finite; the
-    /// errors of [`Problem::set_knots`]; [`Error::NoDuration`] for a user-defined action. Problem and solution are then
-    /// unchanged.
+    /// [`Error::NothingToResume`] before the first solve; [`Error::Elapsed`] if `elapsed` is negative or not finite;
+    /// the errors of [`Problem::set_knots`]; [`Error::NoDuration`] for a user-defined action. Problem and solution are
+    /// then unchanged.
     pub fn retime(
         &mut self,
         problem: &mut Problem,

@@ -9,6 +9,7 @@ mod limit_rows;
 mod multipliers;
 mod outcome;
 mod policy;
+mod predict;
 mod retime;
 mod rollout;
 mod search;

@@ -86,12 +86,6 @@ impl StateSpace {
         dx.iter_mut().for_each(|dx| *dx *= s);
         self.0.integrate(x0, dx, x);
     }
-
-    /// Computes x ⊕ (b ⊖ a) into `out` (nx), the state x after the change from a to b. `dx` (ndx) is scratch.
-    pub fn moved(&self, x: &[f64], [a, b]: [&[f64]; 2], dx: &mut [f64], out: &mut [f64]) {
-        self.0.difference(a, b, dx);
-        self.0.integrate(x, dx, out);
-    }
 }
 
 /// Plan at one time: the result of [`Solution::at`].
@@ -128,24 +122,6 @@ impl Solution {
         dx.iter_mut().for_each(|dx| *dx *= s);
         space.integrate(self.x(knot), &dx, &mut x);
         Ok(PlanPoint { knot, x, u: self.u(knot).to_vec(), K: self.K[knot].clone() })
-    }
-}
-
-impl Solution {
-    /// Predicts the state at the time `then` from the state x at the time `now`, as x ⊕ (x̄(then) ⊖ x̄(now)): the state
-    /// changes as the plan does. Both times (s) are counted from the beginning of knot 0, as in [`at`](Self::at). A
-    /// controller predicts the state at which its next plan begins, while the present plan is executed. Allocates.
-    ///
-    /// # Errors
-    /// [`Error`] if x does not have nx finite numbers, and the errors of [`at`](Self::at).
-    pub fn predict(&self, problem: &Problem, x: &[f64], now: f64, then: f64) -> Result<Vec<f64>, Error> {
-        Error::check("x", x, problem.nx())?;
-        let [a, b] = [self.at(problem, now)?.x, self.at(problem, then)?.x];
-        let (mut dx, mut next) = (vec![0.0; problem.ndx()], vec![0.0; problem.nx()]);
-        let space = problem.action(problem.horizon());
-        space.difference(&a, &b, &mut dx);
-        space.integrate(x, &dx, &mut next);
-        Ok(next)
     }
 }
 

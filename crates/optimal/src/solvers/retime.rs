@@ -229,8 +229,9 @@ impl Retiming {
     }
 
     /// Calls `copy` with the constraint rows of the new knot t that take their numbers from the old horizon: with the
-    /// new rows, the index of the old knot, its rows, and the factor of the multipliers. Rows are counted from the first
-    /// constraint of their knot. If the models differ, these are the rows of limits that both models have by name.
+    /// new rows, the index of the old knot, its rows, and the factor of the multipliers. Rows are counted from the
+    /// first constraint of their knot. If the models differ, these are the rows of limits that both models have by
+    /// name.
     pub(super) fn each_rows(
         &self,
         problem: &mut Problem,

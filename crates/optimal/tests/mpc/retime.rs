@@ -52,7 +52,8 @@ fn knots_of_a_schedule_remain_when_the_horizon_moves() {
             }
             let (models, durations) = knots(&schedule, t, HORIZON);
             let all = times(t, &durations);
-            assert!(durations.iter().all(|dt| *dt > 0.0 && *dt < 1.51 * SPACING), "{durations:?}");
+            assert!(durations.iter().all(|dt| *dt > 0.0 && *dt < 1.76 * SPACING), "{durations:?}");
+            assert!(durations[0] > 0.49 * SPACING || models[1] != models[0] || durations[1] < 0.9 * SPACING);
             for (model, pair) in models.iter().zip(all.windows(2)) {
                 assert_eq!(*model, schedule.model(0.5 * (pair[0] + pair[1])));
             }
@@ -61,8 +62,8 @@ fn knots_of_a_schedule_remain_when_the_horizon_moves() {
                 assert!(all.iter().any(|time| (time - switch).abs() < 1e-9), "no knot begins at {switch}: {all:?}");
             }
             if let Some(before) = before.replace(all.clone()) {
-                let kept = before[1..].iter().filter(|time| **time > t + 3e-4 && **time < end - 1e-9);
-                assert!(kept.clone().count() > HORIZON - 3);
+                let kept = before[1..].iter().filter(|time| **time > t + 0.51 * SPACING && **time < end - 1e-9);
+                assert!(kept.clone().count() > HORIZON - 4);
                 for time in kept {
                     assert!(all.iter().any(|other| (other - time).abs() < 1e-9), "{time} is lost: {all:?}");
                 }
@@ -317,13 +318,13 @@ fn a_warm_start_survives_a_change_of_the_schedule() {
     };
     for k in 0..4 {
         let (old, new) = (trot(), change(k));
-        let mut problem = problem(&old, 0.05);
+        let mut problem = problem(&old, 0.03);
         let mut solver = InteriorPoint::new(&problem);
         let [xs, us] = guess(&mut problem);
         assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap().status, Status::Converged);
         let plain = solver.solution().us.clone();
         let (models, durations) = knots(&new, 0.06, HORIZON);
-        solver.retime(&mut problem, 0.01, &models, &durations).unwrap();
+        assert_eq!(solver.retime(&mut problem, 0.03, &models, &durations), Ok(1));
         let start = solver.solution().clone();
         problem.set_x0(start.x(0)).unwrap();
         let [warm, _] = cost(&mut problem, &start);
@@ -340,9 +341,10 @@ fn a_warm_start_survives_a_change_of_the_schedule() {
         let (iterations, best) = (best.trace.len(), best.cost);
         let [xs, us] = guess(&mut problem);
         let cold = solver.solve(&mut problem, &xs, &us).unwrap().trace.len();
-        // measured after one tick: cost + 2.3 %, gap 0.8; after two ticks: cost + 0.05 %, gap 0.03
-        let [[first, first_gap], [second, second_gap]] = ticks;
-        assert!(first < 1.05 * best && first_gap < 1.5, "change {k}: {ticks:?}, optimum {best}");
+        // measured after one tick: cost + 2 %, or 5.3 times the cost with the other feet, and gap 0.9; after two ticks:
+        // cost + 0.06 %, gap 0.03
+        let ([[first, first_gap], [second, second_gap]], most) = (ticks, if k == 2 { 7.0 } else { 1.05 });
+        assert!(first < most * best && first_gap < 1.5, "change {k}: {ticks:?}, optimum {best}");
         assert!(second < 1.002 * best && second_gap < 0.1, "change {k}: {ticks:?}, optimum {best}");
         assert!(warm < 3.0 * best && unchanged > 100.0 * best, "change {k}: {warm}, {unchanged}, optimum {best}");
         assert!(iterations < cold, "change {k}: {iterations} iterations, {cold} without a warm start");
@@ -413,4 +415,51 @@ fn knots_may_change_their_numbers_of_controls() {
     assert_eq!(sizes, [(30, 30), (24, 24), (24, 24), (30, 30)]);
     solver.resume(&mut problem).unwrap();
     assert!(solver.solution().cost.is_finite());
+}
+
+/// Compares predictions with the plan itself, with steps of half the duration, and with bounds on controls.
+#[test]
+fn a_prediction_follows_the_plan() {
+    let schedule = trot();
+    let mut problem = problem(&schedule, 0.0);
+    let mut solver = InteriorPoint::new(&problem);
+    let [xs, us] = guess(&mut problem);
+    let plan = solver.solve(&mut problem, &xs, &us).unwrap().clone();
+    let (nx, mut ahead) = (problem.nx(), vec![0.0; problem.nx()]);
+    let mut gap = vec![0.0; problem.ndx()];
+    let mut error = |problem: &mut Problem, from: usize, to: usize| {
+        let starts = |t: usize| (0..t).map(|t| problem.duration(t).unwrap()).sum::<f64>();
+        let (now, then) = (starts(from), starts(to));
+        plan.predict(problem, plan.x(from), now, then, &mut ahead).unwrap();
+        problem.difference(plan.x(to), &ahead, &mut gap);
+        gap.iter().fold(0.0_f64, |most, gap| most.max(gap.abs()))
+    };
+    assert_eq!(error(&mut problem, 3, 3), 0.0);
+    // in stance, the motion is slow, and steps of 2 ms follow the steps of 20 ms
+    assert!(error(&mut problem, 0, 3) < 0.02);
+    assert!(error(&mut problem, 3, 7) < 1.0); // feet leave the ground: rad/s
+    let mut short = vec![0.0; nx];
+    assert!(matches!(plan.predict(&mut problem, &xs[1..nx], 0.0, 0.1, &mut short), Err(Error::Length { .. })));
+    let late = plan.predict(&mut problem, plan.x(0), 0.0, f64::NAN, &mut short);
+    assert!(matches!(late, Err(Error::NotFinite { name: "time", .. })));
+}
+
+/// Checks that the copies of the actions for other threads change as well: the results are bit-identical.
+#[test]
+fn copies_for_threads_have_the_same_knots() {
+    let schedule = trot();
+    let [one, two] = [1, 2].map(|threads| {
+        let mut problem = problem(&schedule, 0.0);
+        let mut solver = Fddp::new(&problem);
+        (solver.settings.threads, solver.settings.max_iterations) = (threads, 3);
+        let [xs, us] = guess(&mut problem);
+        solver.solve(&mut problem, &xs, &us).unwrap();
+        for tick in 1..12 {
+            let (models, durations) = knots(&schedule, 0.013 * f64::from(tick), HORIZON);
+            solver.retime(&mut problem, 0.013, &models, &durations).unwrap();
+            solver.resume(&mut problem).unwrap();
+        }
+        solver.solution().clone()
+    });
+    assert_eq!((one.xs, one.us, one.cost), (two.xs, two.us, two.cost));
 }

@@ -70,6 +70,8 @@ pub struct Problem {
     copies: Copies,
     /// Output buffer for the next state of the terminal action, which is never read.
     unread: Vec<f64>,
+    /// Scratch of predictions.
+    scratch: Vec<f64>,
 }
 
 impl Problem {
@@ -98,7 +100,8 @@ impl Problem {
         let (models, copies, unread) = (Models::new(models), Copies::default(), vec![0.0; nx]);
         share(&*models.actions[0], &mut *terminal);
         reserve(&mut *terminal);
-        let mut problem = Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread };
+        let mut problem =
+            Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread, scratch: Vec::new() };
         problem.arrange();
         Ok(problem)
     }
@@ -342,7 +345,7 @@ impl Problem {
         let mut runs = Vec::with_capacity(knot_models.len()); // `shift` may need this capacity and must not allocate
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
-        Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread })
+        Ok(Self { x0, models, knot_models, terminal, shape, runs, knots, copies, unread, scratch: Vec::new() })
     }
 
     /// Returns the terminal model as a `T`, if it has that type.
@@ -396,6 +399,11 @@ impl Problem {
 
     pub(crate) fn shape(&self) -> &Shape {
         &self.shape
+    }
+
+    /// Returns scratch memory that keeps its size between calls.
+    pub(crate) fn scratch(&mut self) -> &mut Vec<f64> {
+        &mut self.scratch
     }
 
     /// Returns the model of knot t; for t = N, the terminal model.

@@ -202,9 +202,29 @@ impl<M: ContinuousModel> Integrated<M> {
         if matches!(self.method, Method::RungeKutta(_)) { u } else { &u[..self.inner.nu()] }
     }
 
-    /// Writes the next state of one knot of the last computed group. Returns the cost of the knot.
-    fn step(&mut self, lane: usize, input: KnotInput<'_>, next: &mut [f64]) -> f64 {
-        let (method, dt) = (self.method, *self.durations.at(input.t).at(input.t));
+    /// Computes the next state of knot t after `dt` seconds. Returns the cost of the knot.
+    #[track_caller]
+    fn calc_after(&mut self, t: usize, x: &[f64], u: &[f64], dt: f64, next: &mut [f64]) -> f64 {
+        self.assert_knot(x, u);
+        if self.method != Method::Terminal {
+            assert_length("next", next.len(), self.nx());
+        }
+        self.set_limits_in_cost(true);
+        let input = KnotInput { t, x, u: self.controls_of_step(u) };
+        if !matches!(self.method, Method::RungeKutta(_)) {
+            solve(&mut self.inner, Group::one(&input, Evaluation::Values, true));
+        }
+        self.step(0, input, dt, next)
+    }
+
+    /// Returns the duration of knot t.
+    fn duration_of(&self, t: usize) -> f64 {
+        *self.durations.at(t).at(t)
+    }
+
+    /// Writes the next state of one knot of the last computed group, after `dt` seconds. Returns the cost of the knot.
+    fn step(&mut self, lane: usize, input: KnotInput<'_>, dt: f64, next: &mut [f64]) -> f64 {
+        let method = self.method;
         let (inner, Work { retraction, runge_kutta, .. }) = self.parts();
         match (method, runge_kutta) {
             (Method::Euler, _) => euler::calc(inner, lane, input, dt, retraction, next),
@@ -302,7 +322,8 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
                     let to = &mut results.constraints[i * constraints..][..constraints];
                     self.write_limits(lane, input, to);
                 }
-                results.costs[i] = self.step(lane, input, &mut results.next[i * nx..][..nx]);
+                let dt = self.duration_of(input.t);
+                results.costs[i] = self.step(lane, input, dt, &mut results.next[i * nx..][..nx]);
             }
         }
     }
@@ -378,6 +399,14 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
         let has_duration = !matches!(self.method, Method::Terminal | Method::Impact);
         if has_duration {
             self.durations.chosen_mut().set(Some(t), dt);
+        }
+        has_duration
+    }
+
+    fn advance(&mut self, t: usize, x: &[f64], u: &[f64], dt: f64, next: &mut [f64]) -> bool {
+        let has_duration = !matches!(self.method, Method::Terminal | Method::Impact);
+        if has_duration {
+            self.calc_after(t, x, u, dt, next);
         }
         has_duration
     }
@@ -468,16 +497,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
 
     #[track_caller]
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
-        self.assert_knot(x, u);
-        if self.method != Method::Terminal {
-            assert_length("next", next.len(), self.nx());
-        }
-        self.set_limits_in_cost(true);
-        let input = KnotInput { t, x, u: self.controls_of_step(u) };
-        if !matches!(self.method, Method::RungeKutta(_)) {
-            solve(&mut self.inner, Group::one(&input, Evaluation::Values, true));
-        }
-        self.step(0, input, next)
+        self.calc_after(t, x, u, self.duration_of(t), next)
     }
 
     #[track_caller]
