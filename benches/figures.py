@@ -29,6 +29,7 @@ COMMANDS = {
     "dynamics": "python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "dynamics_avx2": "CONDYLE_LEVEL=avx2 python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "fddp": ".venv/crocoddyl/bin/python benches/peers/ocp.py --cpu 1 --solver fddp reach trot walk humanoid",
+    "mpc": ".venv/crocoddyl/bin/python benches/peers/mpc.py --cpu 1",
     "threads": ".venv/crocoddyl/bin/python benches/peers/ocp_threads.py",
     "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_comparison.py",
     "generated": "CC=clang-19 .venv/pinocchio/bin/python benches/generated.py --cpu 1",
@@ -220,6 +221,23 @@ def casadi_functions(figures: Figures) -> str:
     return "\n".join(lines)
 
 
+MPC = {"go2": "Go2, 25 knots", "g1": "G1, 40 knots"}
+
+
+def mpc_table(figures: Figures) -> str:
+    """Returns the table of times of ticks: medians and 99th percentiles (ms), and the ratio to Crocoddyl's time."""
+    lines = [
+        "| ms | a tick | references | after the state | Crocoddyl | ratio |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in figures.rows("mpc"):
+        times = [row["ms"][part] for part in ("total", "references", "after")]
+        cells = [f"{median:.3f} ({p99:.3f})" for median, p99 in times]
+        cells += [f"{row['theirs_ms'][0]:.2f}", f"{row['ratio']:.2f}"] if "ratio" in row else ["–", "–"]
+        lines.append(f"| {MPC[row['robot']]}, `{row['rule']}` | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
 SOLVERS = {
     "fddp": "FDDP",
     "ipopt_with_ours": "IPOPT, our functions",
@@ -284,6 +302,7 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "three ways": ways_table,
     "generated": generated_table,
     "cppadcodegen": cppadcodegen_table,
+    "mpc": mpc_table,
     "threads": threads_table,
     "casadi functions": casadi_functions,
     "casadi motion": casadi_motion,

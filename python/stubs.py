@@ -181,6 +181,7 @@ ARGUMENTS = {
     "_Controls": "us",
     "Problem": "problem",
     "Policy": "policy",
+    "AugmentedLagrangian | Fddp | InteriorPoint": "Record.solver",
     # functions whose arguments are arrays of floats, or arrays of numbers that carry their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
     "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
@@ -264,7 +265,7 @@ RESULTS = {
     "int": """
         _SpelledData._given ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame
         Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority
-        AugmentedLagrangian.retime Fddp.retime InteriorPoint.retime Schedule.model""",
+        AugmentedLagrangian.retime Fddp.retime InteriorPoint.retime Record.__len__ Schedule.model""",
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
@@ -290,8 +291,8 @@ RESULTS = {
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_contact Problem.set_costs Problem.set_duration Problem.set_entry_weights Problem.set_knot
-        Problem.set_knots Problem.set_references Schedule.forget Schedule.switch
-        Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
+        Problem.set_knots Problem.set_references Problem.set_weight Problem.set_x0 Record.save Record.stop
+        Schedule.forget Schedule.switch Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",
@@ -329,6 +330,9 @@ RESULTS = {
     "Solution": """
         AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve InteriorPoint.resume
         InteriorPoint.solve InteriorPoint.tick""",
+    "RecordedTick": "Record.__getitem__",
+    "Difference | None": "Record.replay",
+    "tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]": "Record.start",
     "Evaluation": "Problem.evaluate Problem._evaluate",
     "list[LqKnot]": "Problem.derivatives",
     "SweepResult": "Sweep.run",

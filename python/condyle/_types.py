@@ -679,6 +679,33 @@ class PlanPoint(NamedTuple):
     """The feedback gains of the knot, (nu, ndx)."""
 
 
+class RecordedTick(NamedTuple):
+    """A tick of a `Record`: the calls since the tick before it, and the result of the last call."""
+
+    calls: list[tuple[str, dict[str, Any]]]
+    """The calls in their sequence: the name of the method of `Problem` or of the solver, and its arguments by name.
+    The last call is `solve`, `resume` or `tick`. "settings" contains settings that were assigned. The costs of
+    `set_costs` and the model of `set_knot` are JSON.
+    """
+    status: str
+    """The status of the solution."""
+    xs: _Array
+    """The states of the solution, (N + 1, nx)."""
+    us: _Array
+    """The controls of the solution, (N, nu), or the numbers of all knots in one array if models differ in nu."""
+
+
+class Difference(NamedTuple):
+    """The first difference between a `Record` and its replay."""
+
+    tick: int
+    """The index of the tick."""
+    array: str
+    """The array that differs: "status", "xs", "us" or "K"."""
+    largest: float
+    """The largest difference of two numbers; NaN for the status and for K, of which a record has only a checksum."""
+
+
 @disjoint_base
 class Solution(_Solution):
     """The result of a solve: the best iterate, for every status.
@@ -975,6 +1002,8 @@ _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",
     "PlanPoint": "optimal",
+    "RecordedTick": "optimal",
+    "Difference": "optimal",
     "Solution": "optimal",
     "Evaluation": "optimal",
     "SweepResult": "optimal",

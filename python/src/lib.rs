@@ -120,7 +120,7 @@ mod _condyle {
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics, Cost,
         DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics, InteriorPoint,
-        Limit, Lqr, Policy, Problem, Residual, Schedule, Sweep, Unicycle, WrenchCone,
+        Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sweep, Unicycle, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -83,6 +83,8 @@ mod lq;
 mod problem;
 #[cfg(feature = "serde")]
 mod read;
+#[cfg(feature = "serde")]
+pub mod record;
 pub mod robot;
 mod solvers;
 mod time;

@@ -5,6 +5,9 @@ mod budgets;
 mod common;
 #[path = "mpc/policies.rs"]
 mod policies;
+#[cfg(feature = "serde")]
+#[path = "mpc/records.rs"]
+mod records;
 #[path = "mpc/recovery.rs"]
 mod recovery;
 #[path = "mpc/retime.rs"]

@@ -7,8 +7,8 @@ use super::costs::Cost;
 use super::evaluation::{by_knot, controls, evaluate, gaps};
 use super::models::{boxed, residuals};
 use super::own::{Fault, faults};
+use super::record::{Recorder, kept};
 use super::references;
-use super::residuals::take_written;
 use super::robot_action::{Described, WrittenAt, change, knot_of};
 use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
@@ -22,6 +22,7 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 use rust::Observer;
+use rust::record::{Call, ContactChange};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 
@@ -66,6 +67,8 @@ pub(crate) struct Problem {
     pub(super) space: Option<rust::StateSpace>,
     /// Whether costs were changed in place, so that the descriptions of the models contain old numbers.
     is_outdated: AtomicBool,
+    /// Record of all calls that change this problem, if there is one.
+    pub(super) recorder: Recorder,
 }
 
 #[pymethods]
@@ -105,13 +108,9 @@ impl Problem {
     /// is beyond the limits of `Problem`.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
-        let data: rust::robot::RobotProblem =
-            serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no problem: {error}")))?;
-        let robot = Arc::new(data.model);
-        let knots = data.knots.into_iter().chain([data.terminal]);
-        let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
-        let objects = all.iter().map(|_| None).collect();
-        Self::make(data.x0, all, data.knot_models, (objects, vec![]), Fault::default())
+        Self::from_data(
+            serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no problem: {error}")))?,
+        )
     }
 
     /// Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
@@ -120,43 +119,7 @@ impl Problem {
     /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
     /// different robots.
     fn to_json(&self) -> PyResult<String> {
-        self.describe()?;
-        let problem = lock("problem", &self.inner)?;
-        let described = lock("problem", &self.described)?;
-        let models = described.len() - 1;
-        let wrong = |k: usize, what: &str| {
-            let name = if k < models { format!("models[{k}]") } else { "terminal".to_owned() };
-            ProblemError::new_err(format!("{name}: {what}"))
-        };
-        let bytes = |robot: &condyle::Model| {
-            postcard::to_allocvec(robot).map_err(|error| ProblemError::new_err(error.to_string()))
-        };
-        let mut knots = Vec::new();
-        let mut first: Option<&Arc<condyle::Model>> = None;
-        let (knot_models, added) = Self::separate_durations(&problem, &described);
-        for (k, described) in described.iter().enumerate() {
-            let Some(Described { robot, knot }) = described.as_deref() else {
-                return Err(wrong(k, "expected an action of a robot, which alone can be JSON"));
-            };
-            let other = first.get_or_insert(robot);
-            if !Arc::ptr_eq(other, robot) && bytes(other)? != bytes(robot)? {
-                return Err(wrong(k, "expected the robot of the first model, found another one"));
-            }
-            if !take_written(&mut knot.clone()).is_empty() {
-                return Err(wrong(k, "it has a residual that is written in Python, which JSON has not"));
-            }
-            knots.push(knot.clone());
-        }
-        let terminal = knots.pop().expect("the terminal one is there");
-        for (k, dt) in added {
-            let mut knot: rust::robot::Knot = knots[k].clone();
-            knot.dynamics.set_dt(dt);
-            knots.push(knot);
-        }
-        let model = first.expect("the terminal one is there");
-        let x0 = problem.x0().to_vec();
-        let data = rust::robot::RobotProblem { model: (**model).clone(), x0, knots, knot_models, terminal };
-        serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
+        serde_json::to_string(&self.data()?).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
     /// Returns the function and the arguments from which `pickle` makes an equal problem. Knots of robots are stored as
@@ -248,6 +211,7 @@ impl Problem {
     fn set_x0(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let x0 = vector("x0", x0, problem.nx())?;
+        self.recorder.note(|| Call::SetX0 { x0: kept(&x0) });
         problem.set_x0(&x0).map_err(problem_error)
     }
 
@@ -262,8 +226,9 @@ impl Problem {
         let mut problem = lock("problem", &self.inner)?;
         let Ok(weight) = weight.extract::<f64>() else {
             self.is_outdated.store(true, Ordering::Relaxed);
-            return references::set_weights(&mut problem, name, weight);
+            return references::set_weights(&self.recorder, &mut problem, name, weight);
         };
+        self.recorder.note(|| Call::SetWeight { name: name.to_owned(), weight });
         let mut described = lock("problem", &self.described)?;
         let mut found = false;
         for k in (0..described.len() - 1).map(Some).chain([None]) {
@@ -297,7 +262,7 @@ impl Problem {
     /// knots before the one in the message have their new targets.
     fn set_references(&self, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
         self.is_outdated.store(true, Ordering::Relaxed);
-        references::set(&mut *lock("problem", &self.inner)?, name, values)
+        references::set(&self.recorder, &mut *lock("problem", &self.inner)?, name, values)
     }
 
     /// Writes new weights of the entries of the residual, for a cost with `Activation.weighted` or
@@ -310,7 +275,7 @@ impl Problem {
     /// negative or not finite.
     fn set_entry_weights(&self, name: &str, weights: &Bound<'_, PyAny>) -> PyResult<()> {
         self.is_outdated.store(true, Ordering::Relaxed);
-        references::set_entry_weights(&mut *lock("problem", &self.inner)?, name, weights)
+        references::set_entry_weights(&self.recorder, &mut *lock("problem", &self.inner)?, name, weights)
     }
 
     /// Changes targets and gains of the contact with this name at all knots that have it, without making new models.
@@ -336,13 +301,15 @@ impl Problem {
         let mut read = condyle::constraints::Target::identity();
         aim(&mut read, placement, velocity, acceleration)?;
         let kp = kp.map(gains).transpose()?;
-        let change = |to: &mut condyle::ContactConstraint| {
-            to.target.placement = placement.map_or(to.target.placement, |_| read.placement);
-            to.target.velocity = velocity.map_or(to.target.velocity, |_| read.velocity);
-            to.target.acceleration = acceleration.map_or(to.target.acceleration, |_| read.acceleration);
-            (to.kp, to.kp_axes) = kp.unwrap_or((to.kp, to.kp_axes));
-            to.kd = kd.unwrap_or(to.kd);
+        let change = ContactChange {
+            placement: placement.map(|_| read.placement),
+            velocity: velocity.map(|_| read.velocity),
+            acceleration: acceleration.map(|_| read.acceleration),
+            kp,
+            kd,
         };
+        self.recorder.note(|| Call::SetContact { contact: contact.to_owned(), change: change.clone() });
+        let change = |to: &mut condyle::ContactConstraint| change.apply(to);
         if !lock("problem", &self.inner)?.change_contacts(contact, change).map_err(problem_error)? {
             return Err(PyKeyError::new_err(format!("no knot has a contact '{contact}'")));
         }
@@ -377,6 +344,7 @@ impl Problem {
         };
         let own: Vec<_> = costs.iter().filter_map(|cost| cost.own(py)).collect();
         let costs = terms(&model, &costs);
+        self.recorder.note(|| Call::SetCosts { knot, costs: costs.clone() });
         let Some(set) = change!(&mut problem, k, |action| action.set_costs(knot, costs.clone())) else {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot")));
         };

@@ -1,11 +1,13 @@
 //! References of a whole horizon: targets and weights of one cost at all knots.
 
+use super::record::{Recorder, kept};
 use super::robot_action::{Described, change};
 use crate::arrays::{matrix, output, tensor, vector};
 use crate::exceptions::problem_error;
 use condyle::optimal as rust;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
+use rust::record::Call;
 use rust::robot::Target;
 use std::sync::Arc;
 
@@ -50,24 +52,45 @@ pub(super) fn get<'py>(py: Python<'py>, problem: &mut rust::Problem, name: &str)
 }
 
 /// Sets the targets of the cost called `name` at all knots.
-pub(super) fn set(problem: &mut rust::Problem, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
-    let rows = problem.horizon() + 1;
-    match shape_of(problem, name)? {
-        [n, 0] => found(name, problem.set_references(name, &matrix("values", values, [rows, n])?)),
-        [n, m] => found(name, problem.set_references(name, &tensor("values", values, [rows, n, m])?)),
+pub(super) fn set(
+    recorder: &Recorder,
+    problem: &mut rust::Problem,
+    name: &str,
+    values: &Bound<'_, PyAny>,
+) -> PyResult<()> {
+    let (rows, shape) = (problem.horizon() + 1, shape_of(problem, name)?);
+    let mut write = |values: &[f64]| {
+        recorder.note(|| Call::SetReferences { name: name.to_owned(), values: kept(values) });
+        found(name, problem.set_references(name, values))
+    };
+    match shape {
+        [n, 0] => write(&matrix("values", values, [rows, n])?),
+        [n, m] => write(&tensor("values", values, [rows, n, m])?),
     }
 }
 
 /// Sets the weights of the cost called `name` at all knots.
-pub(super) fn set_weights(problem: &mut rust::Problem, name: &str, weights: &Bound<'_, PyAny>) -> PyResult<()> {
+pub(super) fn set_weights(
+    recorder: &Recorder,
+    problem: &mut rust::Problem,
+    name: &str,
+    weights: &Bound<'_, PyAny>,
+) -> PyResult<()> {
     let weights = vector("weight", weights, problem.horizon() + 1)?;
+    recorder.note(|| Call::SetWeights { name: name.to_owned(), weights: kept(&weights) });
     found(name, problem.set_weights(name, &weights))
 }
 
 /// Sets the weights of the entries of the cost called `name` at all knots.
-pub(super) fn set_entry_weights(problem: &mut rust::Problem, name: &str, weights: &Bound<'_, PyAny>) -> PyResult<()> {
+pub(super) fn set_entry_weights(
+    recorder: &Recorder,
+    problem: &mut rust::Problem,
+    name: &str,
+    weights: &Bound<'_, PyAny>,
+) -> PyResult<()> {
     let columns = weights.getattr("shape").and_then(|shape| shape.get_item(1)?.extract::<usize>()).unwrap_or(1);
     let weights = matrix("weights", weights, [problem.horizon() + 1, columns])?;
+    recorder.note(|| Call::SetEntryWeights { name: name.to_owned(), weights: kept(&weights) });
     found(name, problem.set_entry_weights(name, &weights))
 }
 

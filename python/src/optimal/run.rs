@@ -2,11 +2,13 @@
 
 use super::evaluation::{controls, solution as give};
 use super::problem::{Problem, lock};
+use super::record::{address, kept};
 use crate::arrays::matrix;
 use crate::exceptions::problem_error;
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
 use pyo3::prelude::*;
+use rust::record::{Call, Recorded};
 use std::sync::Mutex;
 
 /// The output that a user wants after each iteration of a solve.
@@ -31,12 +33,20 @@ impl Observer<'_> {
     }
 }
 
-/// Runs a solve, from the warm start (xs, us) if a warm start is given. Other Python threads can run meanwhile.
-pub(super) fn run<'py, S: Send>(
+/// The trajectory from which a solve starts.
+pub(super) enum Start<'a, 'py> {
+    /// A warm start (xs, us).
+    From([&'a Bound<'py, PyAny>; 2]),
+    /// The last trajectory, by the given call.
+    Last(Call),
+}
+
+/// Runs a solve, and records it if there is a record. Other Python threads can run meanwhile.
+pub(super) fn run<'py, S: Send + Recorded>(
     py: Python<'py>,
     problem: &Py<Problem>,
     solver: &Mutex<S>,
-    warm_start: Option<[&Bound<'_, PyAny>; 2]>,
+    start: Start<'_, '_>,
     observer: Observer<'py>,
     solve: impl for<'a> FnOnce(
         &'a mut S,
@@ -47,9 +57,10 @@ pub(super) fn run<'py, S: Send>(
     + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut inner = lock("problem", &problem.get().inner)?;
+    let (recorder, recorded) = (&problem.get().recorder, address(solver));
     let mut solver = lock("solver", solver)?;
     let (mut x, mut u) = (vec![], vec![]);
-    if let Some([xs, us]) = warm_start {
+    if let Start::From([xs, us]) = start {
         x = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
         u = controls(&inner, us)?;
     }
@@ -57,7 +68,11 @@ pub(super) fn run<'py, S: Send>(
     let failed = || problem.get().has_failed();
     let signals = Signals::new(signals::LONG);
     let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
-    let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
+    let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions).map(drop));
+    recorder.note_tick(recorded, result.is_ok().then_some(&*solver), || match start {
+        Start::From(_) => Call::Solve { xs: kept(&x), us: kept(&u) },
+        Start::Last(call) => call,
+    });
     let raised = problem.get().raise(); // called in every case: it also clears the stored error
     let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
     if let Some(observer) = observer.filter(|_| closes) {
@@ -66,5 +81,6 @@ pub(super) fn run<'py, S: Send>(
     signals.finish()?;
     raised?;
     by_observer.map_or(Ok(()), Err)?;
-    give(py, problem, inner, result.map_err(problem_error)?)
+    result.map_err(problem_error)?;
+    give(py, problem, inner, solver.solution())
 }

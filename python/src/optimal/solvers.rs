@@ -4,7 +4,8 @@ use super::evaluation::solution as give;
 use super::outcomes::{give_outcome, multipliers_by_knot};
 use super::policy::Policy;
 use super::problem::{Problem, lock};
-use super::run::{Observer, run};
+use super::record::{address, kept};
+use super::run::{Observer, Start, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
@@ -15,6 +16,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMapping, PyMappingProxy};
+use rust::record::Call;
 use std::sync::Mutex;
 
 /// Defines a solver class. The macro writes the methods that all solvers have. The constructor and the methods of only
@@ -24,8 +26,8 @@ macro_rules! solver {
         $(#[$doc])*
         #[pyclass(frozen, module = "condyle.optimal")]
         pub(crate) struct $class {
-            problem: Py<Problem>,
-            solver: Mutex<rust::$class>,
+            pub(super) problem: Py<Problem>,
+            pub(super) solver: Mutex<rust::$class>,
             /// The settings that the user set; `inner` are the settings of the inner solver, if there is one.
             settings: Py<PyDict>,
             inner: Py<PyDict>,
@@ -61,7 +63,7 @@ macro_rules! solver {
                 progress: bool,
             ) -> PyResult<Bound<'py, PyAny>> {
                 let observer = Observer { callback, verbose, progress };
-                let start = Some([xs, us]);
+                let start = Start::From([xs, us]);
                 run(py, &self.problem, &self.solver, start, observer, |solver, problem, [xs, us], interruptions| {
                     solver.solve_with(problem, xs, us, interruptions)
                 })
@@ -164,6 +166,8 @@ macro_rules! solver {
             /// Raises `ProblemError` if the model does not exist.
             fn shift(&self, last: usize) -> PyResult<()> {
                 let mut problem = lock("problem", &self.problem.get().inner)?;
+                let recorded = address(&self.solver);
+                self.problem.get().recorder.note_of(recorded, || Call::Shift { last });
                 let mut solver = lock("solver", &self.solver)?;
                 problem.shift(last).map_err(problem_error)?;
                 self.problem.get().describe_shift()?;
@@ -263,7 +267,8 @@ macro_rules! plain_solver {
                     progress: bool,
                 ) -> PyResult<Bound<'py, PyAny>> {
                     let observer = Observer { callback, verbose, progress };
-                    run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| {
+                    let start = Start::Last(Call::Resume);
+                    run(py, &self.problem, &self.solver, start, observer, |solver, problem, _, interruptions| {
                         solver.resume_with(problem, interruptions)
                     })
                 }
@@ -342,11 +347,13 @@ Fddp, set_fddp, show_fddp {
             _ => {}
         }
         let observer = Observer { callback, verbose, progress };
-        run(py, &self.problem, &self.solver, None, observer, |solver, problem, _, interruptions| match to_full_step {
-            true => {
-                let most = most.unwrap_or(solver.settings.max_iterations);
-                solver.resume_to_full_step_with(problem, most, interruptions)
-            }
+        let most = match most {
+            Some(most) => most,
+            None => lock("solver", &self.solver)?.settings.max_iterations,
+        };
+        let start = Start::Last(if to_full_step { Call::ResumeToFullStep { most } } else { Call::Resume });
+        run(py, &self.problem, &self.solver, start, observer, |solver, problem, _, interruptions| match to_full_step {
+            true => solver.resume_to_full_step_with(problem, most, interruptions),
             false => solver.resume_with(problem, interruptions),
         })
     }
@@ -354,7 +361,7 @@ Fddp, set_fddp, show_fddp {
 }
 
 /// Copies the given settings.
-fn kept(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyDict>> {
+fn copied(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyDict>> {
     Ok(settings.map_or_else(|| Ok(PyDict::new(py)), |settings| settings.copy())?.unbind())
 }
 
@@ -371,8 +378,8 @@ macro_rules! construct {
                 let mut solver = rust::$class::new(&*lock("problem", &problem.get().inner)?);
                 $set(&mut solver.settings, settings)?;
                 solver.settings.check().map_err(problem_error)?;
-                let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);
-                Ok(Self { problem, solver, settings, inner: kept(py, None)? })
+                let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), copied(py, settings)?);
+                Ok(Self { problem, solver, settings, inner: copied(py, None)? })
             }
         }
     )*};
@@ -478,6 +485,10 @@ AugmentedLagrangian, set_constraints, show_constraints {
         let mut problem = lock("problem", &self.problem.get().inner)?;
         let mut solver = lock("solver", &self.solver)?;
         let values = multipliers_by_knot(&mut problem, name, values)?;
+        self.problem.get().recorder.note_of(address(&self.solver), || Call::SetMultipliers {
+            name: name.to_owned(),
+            values: values.iter().map(|y| kept(y)).collect(),
+        });
         solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
     }
 }
@@ -495,7 +506,7 @@ impl AugmentedLagrangian {
         solver.inner.check().map_err(problem_error)?;
         set_constraints(&mut solver.settings, settings)?;
         let (problem, solver) = (problem.unbind(), Mutex::new(solver));
-        Ok(Self { problem, solver, settings: kept(py, settings)?, inner: kept(py, inner)? })
+        Ok(Self { problem, solver, settings: copied(py, settings)?, inner: copied(py, inner)? })
     }
 }
 
@@ -584,7 +595,8 @@ InteriorPoint, set_interior_point, show_interior_point {
     #[pyo3(signature = (sweeps=2))]
     fn tick<'py>(&self, py: Python<'py>, sweeps: usize) -> PyResult<Bound<'py, PyAny>> {
         let quiet = Observer { callback: None, verbose: false, progress: false };
-        run(py, &self.problem, &self.solver, None, quiet, |solver, problem, _, interruptions| {
+        let start = Start::Last(Call::Tick { sweeps });
+        run(py, &self.problem, &self.solver, start, quiet, |solver, problem, _, interruptions| {
             solver.tick_with(problem, sweeps, interruptions)
         })
     }
@@ -610,6 +622,10 @@ InteriorPoint, set_interior_point, show_interior_point {
         let mut problem = lock("problem", &self.problem.get().inner)?;
         let mut solver = lock("solver", &self.solver)?;
         let values = multipliers_by_knot(&mut problem, name, values)?;
+        self.problem.get().recorder.note_of(address(&self.solver), || Call::SetMultipliers {
+            name: name.to_owned(),
+            values: values.iter().map(|y| kept(y)).collect(),
+        });
         solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
     }
 }

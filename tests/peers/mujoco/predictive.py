@@ -1,7 +1,7 @@
 """Model predictive control of robots with legs: the gait, the references, and a tick with each solver."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -165,6 +165,8 @@ class Predictive:
         """Velocity forwards and to the left (m/s), and rate of turning (rad/s)."""
         self.seconds: list[float] = []
         """Durations of the ticks, with references (s)."""
+        self.before_solve: Callable[[Fddp | InteriorPoint], object] = lambda solver: None
+        """Function that is called with each new solver before its first solve."""
         self._data, self._x = condyle.Data(model), np.r_[q, np.zeros(model.nv)]
         self._lifted = self._placed = self._places(q)
         """Positions at which the feet left the ground, and at which they were last on the ground."""
@@ -218,6 +220,10 @@ class Predictive:
             limits.append(Limit("effort", Residual.control(np.zeros(len(still))), -self._effort, self._effort))
             return ContactDynamics(self.model, contacts, DT, costs, limits=limits)
         costs += [Cost(f"{foot} grips", 0.05, cone) for foot, cone in cones.items()]
+        return self._bounded(contacts, costs)
+
+    def _bounded(self, contacts: dict[str, ContactConstraint], costs: list[Cost]) -> ContactDynamics:
+        """Returns a model of knots for `Fddp`, with bounds on the efforts."""
         return ContactDynamics(self.model, contacts, DT, costs, lower=-self._effort, upper=self._effort)
 
     def _observe(self, x: Array, t: float) -> None:
@@ -283,9 +289,11 @@ class Predictive:
             self.solver = InteriorPoint(self.problem, tolerance=1e-4)
         else:
             self.solver = Fddp(self.problem, max_iterations=100, tolerance=1e-3)
+        self.before_solve(self.solver)
         plan = self.solver.solve(xs, us)
         if self.rule == "fddp1":
             self.solver = Fddp(self.problem, max_iterations=1, tolerance=0.0)
+            self.before_solve(self.solver)
             plan = self.solver.solve(plan.xs, plan.us)
         self.solver.publish(self.policy, 0.0)
         return plan

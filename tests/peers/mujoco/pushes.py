@@ -9,7 +9,7 @@ pitch rate and times belong to a run without a push.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import product
 from typing import NamedTuple, get_args
@@ -18,6 +18,8 @@ import numpy as np
 from predictive import RATE, Gait, Joint, Predictive, Robot, Solver
 from scenes import urdf
 from world import Array, World
+
+import condyle
 
 QUADRUPED = Robot(
     feet=("FL_foot", "FR_foot", "RL_foot", "RR_foot"),
@@ -106,17 +108,19 @@ def run(
     push: Push | None = None,
     rate: float | None = None,
     gait: Gait | None = None,
+    make: Callable[[condyle.Model, Robot, Solver, float | None], Predictive] = Predictive,
 ) -> Run:
     """Simulates a robot that starts from a stand and walks, until it falls or the time is over.
 
     rate: rate of the ticks (Hz); with None, a tick for each knot.
     gait: gait of the robot; with None, its own.
+    make: function that makes the controller.
     """
     robot = ROBOTS[name] if gait is None else ROBOTS[name]._replace(gait=gait)
     world = World(text_of(name), robot.feet, robot.size)
     q = robot.standing(world.model)
     world.set_state(q, np.zeros(world.model.nv))
-    control = Predictive(world.model, robot, solver, rate)
+    control = make(world.model, robot, solver, rate)
     control.start(np.concatenate(world.state()))
     velocities, fallen, ticks, rate = [], False, 0, rate or RATE
     for i in range(round(seconds / world.dt)):

@@ -7,6 +7,8 @@ use super::horizon::HorizonTerms;
 use super::residuals::target::Target;
 use crate::{ActionModel, Error, Problem};
 use condyle_dynamics::Model;
+#[cfg(feature = "serde")]
+use std::sync::Arc;
 
 /// Cost term of a robot's knots, which may be changed between solves. If a change does not fit the robot or the
 /// residual, the call returns an error and has no effect.
@@ -164,5 +166,27 @@ impl Problem {
             }
         }
         Ok(found)
+    }
+
+    /// Sets separate costs for knot t, or the costs of the terminal knot for t = N. Returns whether the knot has a
+    /// robot.
+    ///
+    /// # Errors
+    /// [`Error::Size`] if t > N, [`Error::Cost`] for a cost term that does not fit the robot.
+    #[cfg(feature = "serde")]
+    pub(crate) fn set_costs(&mut self, t: usize, costs: Vec<Cost>) -> Result<bool, Error> {
+        Error::check_size("knot", t, self.horizon())?;
+        let action = match self.knot_models().get(t) {
+            Some(&index) => self.chosen(index),
+            None => Some(self.action_mut(t)),
+        };
+        let Some(terms) = action.and_then(terms_of) else { return Ok(false) };
+        terms.set_costs(t, costs).map(|()| true)
+    }
+
+    /// Returns the robot of the terminal knot, if it has one.
+    #[cfg(feature = "serde")]
+    pub(crate) fn robot(&mut self) -> Option<Arc<Model>> {
+        Some(robot_of(self.action_mut(self.horizon()))?.model.clone())
     }
 }

@@ -3,10 +3,13 @@
 use super::{Problem, lock};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::optimal::own::{Fault, faults};
+use crate::optimal::record::Recorder;
 use crate::optimal::references;
+use crate::optimal::residuals::take_written;
 use crate::optimal::robot_action::{Boxed, Described};
 use condyle::optimal as rust;
 use pyo3::prelude::*;
+use rust::record::Call;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -37,7 +40,57 @@ impl Problem {
             moved: AtomicUsize::new(0),
             space,
             is_outdated: AtomicBool::new(false),
+            recorder: Recorder::default(),
         })
+    }
+
+    /// Creates a robot's problem from its data.
+    pub(in crate::optimal) fn from_data(data: rust::robot::RobotProblem) -> PyResult<Self> {
+        let robot = Arc::new(data.model);
+        let knots = data.knots.into_iter().chain([data.terminal]);
+        let all = knots.map(|knot| Described { robot: robot.clone(), knot }.boxed()).collect::<PyResult<Vec<_>>>()?;
+        let objects = all.iter().map(|_| None).collect();
+        Self::make(data.x0, all, data.knot_models, (objects, vec![]), Fault::default())
+    }
+
+    /// Returns the data of a robot's problem, with the current initial state, weights and models of its knots.
+    pub(in crate::optimal) fn data(&self) -> PyResult<rust::robot::RobotProblem> {
+        self.describe()?;
+        let problem = lock("problem", &self.inner)?;
+        let described = lock("problem", &self.described)?;
+        let models = described.len() - 1;
+        let wrong = |k: usize, what: &str| {
+            let name = if k < models { format!("models[{k}]") } else { "terminal".to_owned() };
+            ProblemError::new_err(format!("{name}: {what}"))
+        };
+        let bytes = |robot: &condyle::Model| {
+            postcard::to_allocvec(robot).map_err(|error| ProblemError::new_err(error.to_string()))
+        };
+        let mut knots = Vec::new();
+        let mut first: Option<&Arc<condyle::Model>> = None;
+        let (knot_models, added) = Self::separate_durations(&problem, &described);
+        for (k, described) in described.iter().enumerate() {
+            let Some(Described { robot, knot }) = described.as_deref() else {
+                return Err(wrong(k, "expected an action of a robot, which alone can be JSON"));
+            };
+            let other = first.get_or_insert(robot);
+            if !Arc::ptr_eq(other, robot) && bytes(other)? != bytes(robot)? {
+                return Err(wrong(k, "expected the robot of the first model, found another one"));
+            }
+            if !take_written(&mut knot.clone()).is_empty() {
+                return Err(wrong(k, "it has a residual that is written in Python, which JSON has not"));
+            }
+            knots.push(knot.clone());
+        }
+        let terminal = knots.pop().expect("the terminal one is there");
+        for (k, dt) in added {
+            let mut knot: rust::robot::Knot = knots[k].clone();
+            knot.dynamics.set_dt(dt);
+            knots.push(knot);
+        }
+        let model = first.expect("the terminal one is there");
+        let x0 = problem.x0().to_vec();
+        Ok(rust::robot::RobotProblem { model: (**model).clone(), x0, knots, knot_models, terminal })
     }
 
     /// Replaces the model of a knot, and its description.
@@ -53,6 +106,9 @@ impl Problem {
         let horizon = problem.horizon();
         if knot >= horizon {
             return Err(ProblemError::new_err(format!("knot {knot}: expected 0 to {}", horizon - 1)));
+        }
+        if let Some(new) = &new {
+            self.recorder.note(|| Call::SetKnot { knot, model: Box::new(new.knot.clone()) });
         }
         problem.set_knot(knot, action).map_err(problem_error)?;
         let (k, mut described) = (problem.knot_models()[knot], lock("problem", &self.described)?);
