@@ -84,7 +84,7 @@ class Ours:
             method(**given)
         referred = clock()
         if divided:
-            self.solver.prepare()
+            self.solver.prepare(**arguments)
         prepared = clock()
         [(set_x0, given)] = parts["set_x0"]
         if divided:

@@ -3,7 +3,7 @@
 
     .venv/pinocchio/bin/python benches/peers/mpc_record.py ROBOT RULE FILE [--ticks N]
 
-The robot and its controller are those of `tests/peers/mujoco/pushes.py`, without a push. With the rule `tick2`, each
+Robot and controller come from `tests/peers/mujoco/pushes.py`; no push acts. With the rule `tick2`, each
 tick is `tick(2)` of `InteriorPoint`. With the rule `fddp1`, it is one iteration of `Fddp`. Then efforts and cones are
 costs of the parts beyond their bounds, and all residuals exist in Crocoddyl. The URDF of the robot is written next to
 the record.

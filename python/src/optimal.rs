@@ -13,6 +13,7 @@ mod own;
 mod policy;
 mod problem;
 mod record;
+mod recorder;
 mod references;
 mod residuals;
 mod robot_action;

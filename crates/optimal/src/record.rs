@@ -1,5 +1,5 @@
-//! Records of a controller: all calls that change its problem or its solver, and the result of each tick. A replay makes
-//! the same calls on a new problem, and compares the results to the last bit.
+//! Records of a controller: all calls that change its problem or its solver, and the result of each tick. A replay
+//! makes the same calls on a new problem, and compares the results to the last bit.
 #![allow(non_snake_case)] // names follow the literature: K
 
 mod calls;
@@ -195,7 +195,7 @@ impl Record {
     pub fn push_tick(&mut self, call: Call, solver: &impl Recorded) {
         let settings = solver.settings();
         if *self.settings.as_ref().unwrap_or(&self.solver) != settings {
-            self.pending.push(Call::Configure { settings: settings.clone() });
+            self.pending.push(Call::Configure { settings: Box::new(settings.clone()) });
             self.settings = Some(settings);
         }
         self.pending.push(call);

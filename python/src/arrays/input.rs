@@ -98,6 +98,19 @@ pub(crate) fn at_once<'py, D: Dimension>(value: &Bound<'py, PyAny>, shape: &[usi
     }
 }
 
+/// Reads an argument for a call that keeps the interpreter's lock and runs no Python code before it has used the numbers.
+/// Allocates nothing if the argument is a float64 array in C order.
+pub(crate) fn in_place<'py, D: Dimension>(
+    argument: &str,
+    value: &Bound<'py, PyAny>,
+    shape: &[usize],
+) -> PyResult<InPlace<'py, D>> {
+    match at_once(value, shape) {
+        Some(numbers) => Ok(numbers),
+        None => InPlace::read(argument, value, shape),
+    }
+}
+
 /// Reads a vector argument of `length` numbers.
 pub(crate) fn vector<'py>(argument: &str, value: &Bound<'py, PyAny>, length: usize) -> PyResult<Input<'py, Ix1>> {
     input(argument, value, &[length])

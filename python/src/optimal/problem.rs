@@ -7,16 +7,17 @@ use super::costs::Cost;
 use super::evaluation::{by_knot, controls, evaluate, gaps};
 use super::models::{boxed, residuals};
 use super::own::{Fault, faults};
-use super::record::{Recorder, kept};
+use super::recorder::{Recorder, kept};
 use super::references;
 use super::robot_action::{Described, WrittenAt, change, knot_of};
 use super::sweep::give;
-use crate::arrays::{matrix, numbers, output, vector};
+use crate::arrays::{in_place, matrix, numbers, output, vector};
 use crate::constrained::{aim, gains};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
+use numpy::Ix1;
 use pyo3::exceptions::{PyKeyError, PyRuntimeError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
@@ -210,7 +211,7 @@ impl Problem {
     /// Raises `ProblemError` for a number that is not finite, and for a rotation whose length is not 1 (up to 1e-3).
     fn set_x0(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
-        let x0 = vector("x0", x0, problem.nx())?;
+        let x0 = in_place::<Ix1>("x0", x0, &[problem.nx()])?;
         self.recorder.note(|| Call::SetX0 { x0: kept(&x0) });
         problem.set_x0(&x0).map_err(problem_error)
     }
@@ -308,7 +309,7 @@ impl Problem {
             kp,
             kd,
         };
-        self.recorder.note(|| Call::SetContact { contact: contact.to_owned(), change: change.clone() });
+        self.recorder.note(|| Call::SetContact { contact: contact.to_owned(), change: Box::new(change.clone()) });
         let change = |to: &mut condyle::ContactConstraint| change.apply(to);
         if !lock("problem", &self.inner)?.change_contacts(contact, change).map_err(problem_error)? {
             return Err(PyKeyError::new_err(format!("no knot has a contact '{contact}'")));

@@ -1,6 +1,7 @@
 //! Records of a controller's calls, and their replay.
 
 use super::problem::{Problem, lock};
+use super::recorder::{Shared, address};
 use super::settings::{show_constraints, show_fddp, show_interior_point};
 use super::solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
 use crate::arrays::{Give, class, output};
@@ -10,50 +11,10 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use rust::record::{Call, Numbers, Recorded, SolverSettings};
+use rust::record::{Call, Recorded, SolverSettings};
 use rust::robot::{Residual, RobotProblem};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-
-type Shared = Arc<Mutex<rust::record::Record>>;
-
-/// The record of a problem's calls, if there is one, and the address of the recorded solver.
-#[derive(Default)]
-pub(super) struct Recorder(Mutex<Option<(usize, Shared)>>);
-
-/// Returns the address by which a solver is recognised.
-pub(super) fn address<S>(solver: &Mutex<S>) -> usize {
-    std::ptr::from_ref(solver) as usize
-}
-
-impl Recorder {
-    fn with(&self, solver: Option<usize>, f: impl FnOnce(&mut rust::record::Record)) {
-        let slot = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((recorded, record)) = &*slot
-            && solver.is_none_or(|solver| solver == *recorded)
-        {
-            f(&mut record.lock().unwrap_or_else(PoisonError::into_inner));
-        }
-    }
-
-    /// Records a call on the problem.
-    pub(super) fn note(&self, call: impl FnOnce() -> Call) {
-        self.with(None, |record| record.push(call()));
-    }
-
-    /// Records a call on a solver that does not solve.
-    pub(super) fn note_of(&self, solver: usize, call: impl FnOnce() -> Call) {
-        self.with(Some(solver), |record| record.push(call()));
-    }
-
-    /// Records a call that solves, and its result. Without a result, the call has failed.
-    pub(super) fn note_tick(&self, solver: usize, result: Option<&impl Recorded>, call: impl FnOnce() -> Call) {
-        self.with(Some(solver), |record| match result {
-            Some(result) => record.push_tick(call(), result),
-            None => record.push(call()),
-        });
-    }
-}
 
 /// A record of a controller: all calls that change its problem or its solver, from the first `solve` on, and the result
 /// of each tick. A replay makes the same calls on a new problem and gives the same results, bit for bit.
@@ -106,8 +67,7 @@ impl Record {
         let start = problem.get().data()?;
         let settings = lock("solver", solver)?.settings();
         let record = Self::from_inner(rust::record::Record::new(start, settings), Some(problem.clone_ref(py)))?;
-        let slot = &problem.get().recorder.0;
-        *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some((address(solver), record.inner.clone()));
+        problem.get().recorder.begin(address(solver), &record.inner);
         Ok(record)
     }
 }
@@ -130,10 +90,8 @@ impl Record {
     /// Ends the record. Later calls are not recorded.
     fn stop(&self) {
         let problem = self.problem.lock().unwrap_or_else(PoisonError::into_inner).take();
-        let Some(problem) = problem else { return };
-        let mut slot = problem.get().recorder.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if slot.as_ref().is_some_and(|(_, record)| Arc::ptr_eq(record, &self.inner)) {
-            *slot = None;
+        if let Some(problem) = problem {
+            problem.get().recorder.end(&self.inner);
         }
     }
 
@@ -324,7 +282,7 @@ impl<'py> Given<'_, 'py> {
                 "shift"
             }
             Call::Configure { settings } => {
-                let (settings, inner) = match settings {
+                let (settings, inner) = match &**settings {
                     SolverSettings::Fddp { settings } => (show_fddp(settings, py)?, None),
                     SolverSettings::InteriorPoint { settings } => (show_interior_point(settings, py)?, None),
                     SolverSettings::AugmentedLagrangian { settings, inner } => {
@@ -367,9 +325,4 @@ impl<'py> Given<'_, 'py> {
         };
         Ok((name, to))
     }
-}
-
-/// Copies numbers for a record.
-pub(super) fn kept(numbers: &[f64]) -> Numbers {
-    numbers.to_vec().into()
 }

@@ -1,10 +1,11 @@
 //! References of a whole horizon: targets and weights of one cost at all knots.
 
-use super::record::{Recorder, kept};
+use super::recorder::{Recorder, kept};
 use super::robot_action::{Described, change};
-use crate::arrays::{matrix, output, tensor, vector};
+use crate::arrays::{in_place, matrix, output, vector};
 use crate::exceptions::problem_error;
 use condyle::optimal as rust;
+use numpy::{Ix2, Ix3};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use rust::record::Call;
@@ -64,8 +65,8 @@ pub(super) fn set(
         found(name, problem.set_references(name, values))
     };
     match shape {
-        [n, 0] => write(&matrix("values", values, [rows, n])?),
-        [n, m] => write(&tensor("values", values, [rows, n, m])?),
+        [n, 0] => write(&in_place::<Ix2>("values", values, &[rows, n])?),
+        [n, m] => write(&in_place::<Ix3>("values", values, &[rows, n, m])?),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::evaluation::{controls, solution as give};
 use super::problem::{Problem, lock};
-use super::record::{address, kept};
+use super::recorder::{address, kept};
 use crate::arrays::matrix;
 use crate::exceptions::problem_error;
 use crate::signals::{self, Interruptions, Signals};

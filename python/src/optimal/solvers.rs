@@ -4,7 +4,7 @@ use super::evaluation::solution as give;
 use super::outcomes::{give_outcome, multipliers_by_knot};
 use super::policy::Policy;
 use super::problem::{Problem, lock};
-use super::record::{address, kept};
+use super::recorder::{address, kept};
 use super::run::{Observer, Start, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,

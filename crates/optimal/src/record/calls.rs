@@ -51,7 +51,7 @@ pub enum Call {
         /// Name of the contact.
         contact: String,
         /// Changes of the contact.
-        change: ContactChange,
+        change: Box<ContactChange>,
     },
     /// Replacement of the costs of one knot.
     SetCosts {
@@ -82,7 +82,7 @@ pub enum Call {
     /// Change of the solver's settings.
     Configure {
         /// All settings.
-        settings: SolverSettings,
+        settings: Box<SolverSettings>,
     },
     /// Call of the solver's `set_multipliers`.
     SetMultipliers {

@@ -4,8 +4,8 @@ use core::ops::Deref;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Array of numbers, which is stored as text: the bytes of its numbers (IEEE 754, least significant byte first) in base64.
-/// Two arrays are equal if their bits are equal.
+/// Array of numbers, which is stored as text: the bytes of its numbers (IEEE 754, least significant byte first) in
+/// base64. Two arrays are equal if their bits are equal.
 #[derive(Debug, Clone, Default)]
 pub struct Numbers(Vec<f64>);
 

@@ -30,7 +30,7 @@ fn standing(limited: bool) -> RobotProblem {
                 kd: 50.0,
                 ..ContactConstraint::point(frame)
             };
-            Contact::new(*foot, at)
+            Contact::new(foot, at)
         };
         let contacts = feet.iter().map(point).collect();
         let step = Integrator::SemiImplicitEuler;
@@ -77,7 +77,7 @@ fn recorded(solver: SolverSettings) -> Record {
             3 => make(Call::SetEntryWeights { name: "state".into(), weights: vec![0.5; 36 * (KNOTS + 1)].into() }),
             4 => {
                 let change = ContactChange { kp: Some((20.0, None)), kd: Some(40.0), ..ContactChange::default() };
-                make(Call::SetContact { contact: "LF_foot".into(), change });
+                make(Call::SetContact { contact: "LF_foot".into(), change: Box::new(change) });
             }
             5 => make(Call::SetKnot { knot: 0, model: Box::new(data.knots[0].clone()) }),
             6 => make(Call::SetDuration { knot: 1, dt: 0.03 }),

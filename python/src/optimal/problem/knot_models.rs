@@ -3,7 +3,7 @@
 use super::{Problem, lock};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::optimal::own::{Fault, faults};
-use crate::optimal::record::Recorder;
+use crate::optimal::recorder::Recorder;
 use crate::optimal::references;
 use crate::optimal::residuals::take_written;
 use crate::optimal::robot_action::{Boxed, Described};
