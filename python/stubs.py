@@ -116,7 +116,8 @@ ARGUMENTS = {
     "int": """
         Schedule.model Schedule.switch.model
         count facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
-        sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
+        sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states
+        Record.__getitem__.key""",
     "float": """
         bias damping delta dt elapsed
         eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re

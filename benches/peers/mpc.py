@@ -11,8 +11,9 @@ The rule `fddp1` is one iteration of `Fddp`, where all limits are costs. For thi
 from the same warm start with the same references. Only its `solve` is timed, not the change of its references.
 
 The program compares states, controls and gains of both libraries after each tick. Errors are relative to 1 + the
-largest number of the tick. The last line for a robot is the time of `policy(t, x)`, which another thread calls at 1 kHz
-on another core while ticks are solved.
+largest number of the tick. They are as large as an error of Pinocchio: at a rotation of 0.001 rad in a knot, its
+`Jexp6` is wrong by 1e-9 (at 0.0001 rad by 4e-7), and Condyle's Jacobian by 1e-16. The time of `policy(t, x)` is
+measured while ticks are solved: another thread calls it at 1 kHz on another core.
 """
 
 import argparse
@@ -33,8 +34,10 @@ from condyle.optimal import Record
 
 HERE = Path(__file__).parent
 RECORDER = HERE.parents[1] / ".venv" / "pinocchio" / "bin" / "python"
-SAME = 1e-8
-"""Tolerance of the iterates, relative to 1 + the largest number of a tick."""
+SAME = (1e-8, 1e-8, 1e-6)
+"""Tolerances of the median errors of states, controls and gains. The gains have numbers of several hundred."""
+LARGEST = 1e-6
+"""Tolerance of all errors."""
 
 
 def error(ours, theirs):
@@ -49,10 +52,10 @@ def resumed(plan):
 
 
 def compare(ours, theirs):
-    """Makes all ticks in both libraries. Returns the largest errors of states, controls and gains, the warm starts with
-    their regularisations, and the number of ticks whose step differs."""
+    """Makes all ticks in both libraries. Returns the errors of states, controls and gains, the warm starts with their
+    regularisations, and the number of ticks whose step differs. The errors are medians and largest errors."""
     ours.begin()
-    errors, starts, steps = np.zeros(3), [], 0
+    errors, starts, steps = [], [], 0
     for k in range(1, len(ours.ticks)):
         regularisation = resumed(ours.solver.solution)
         solve, arguments = ours.give(k)
@@ -65,8 +68,8 @@ def compare(ours, theirs):
         starts.append((xs, us, regularisation))
         steps += plan.trace[0].step != theirs.solver.stepLength
         both = [(plan.xs, theirs.solver.xs), (plan.us, theirs.solver.us), (plan.K, [-K for K in theirs.solver.K])]
-        errors = np.maximum(errors, [error(a, np.array(list(b))) for a, b in both])
-    return errors.tolist(), starts, steps
+        errors.append([error(a, np.array(list(b))) for a, b in both])
+    return [np.median(errors, axis=0).tolist(), np.max(errors, axis=0).tolist()], starts, steps
 
 
 def time_theirs(theirs, ours, starts):
@@ -77,6 +80,13 @@ def time_theirs(theirs, ours, starts):
             getattr(theirs, name)(**given)
         durations.append(theirs.iterate(xs, us, regularisation))
     return durations
+
+
+def agrees(result):
+    """Returns whether the replay has the same bits, and the iterates of both libraries agree."""
+    medians, largest = result.get("errors", [[0.0], [0.0]])
+    near = all(error <= most for error, most in zip(medians, SAME, strict=False)) and max(largest) <= LARGEST
+    return result["difference"] is None and near and not result.get("steps", 0)
 
 
 def milliseconds(durations):
@@ -126,8 +136,10 @@ def line(result):
     text = f"{result['robot']} {result['rule']}: "
     text += "same bits" if result["difference"] is None else f"DIFFERENT {result['difference']}"
     if "errors" in result:
-        verdict = "same" if max(result["errors"]) <= SAME and not result["steps"] else "DIFFERENT"
-        text += ", iterates {} (xs {:.1e}, us {:.1e}, K {:.1e})".format(verdict, *result["errors"])
+        medians, largest = result["errors"]
+        verdict = "same" if agrees(result) else "DIFFERENT"
+        text += ", iterates {}: median xs {:.1e}, us {:.1e}, K {:.1e}".format(verdict, *medians)
+        text += ", largest {:.1e}, {:.1e}, {:.1e}".format(*largest)
     if "ms" in result:
         cells = (f"{name} {median:.3f} (p99 {p99:.3f})" for name, (median, p99) in result["ms"].items() if p99 > 0.001)
         text += f"; ms of {result['ticks']} ticks: " + ", ".join(cells)
@@ -159,7 +171,7 @@ def main():
         for robot in options.robots or ["go2", "g1"]:
             for rule in [options.rule] if options.rule else ["tick2", "fddp1"]:
                 result = measure(robot, rule, folder, options)
-                good &= result["difference"] is None and max(result.get("errors", [0.0])) <= SAME
+                good &= agrees(result)
                 print(json.dumps(result) if options.json else line(result), flush=True)
     sys.exit(not good)
 

@@ -44,10 +44,10 @@ class Ours:
         self.record = record
         self.ticks = [record[k].calls for k in range(len(record))]
 
-    def begin(self):
-        """Starts anew: makes a problem, a solver and a policy, and solves the first tick."""
+    def begin(self, policy=None):
+        """Starts anew: makes a problem, a solver and, unless it is given, a policy, and solves the first tick."""
         self.problem, self.solver = self.record.start()
-        self.policy = Policy(self.problem)
+        self.policy = policy or Policy(self.problem)
         self.bound = [[(name, self.method(name), arguments) for name, arguments in calls] for calls in self.ticks]
         for _, method, arguments in self.bound[0]:
             method(**arguments)
@@ -114,31 +114,23 @@ class Ours:
         def feedback():
             if cpu is not None:
                 os.sched_setaffinity(threading.get_native_id(), {cpu})
-            x = self.record[0].xs[0]
-            due = time.perf_counter()
+            x, due = self.record[0].xs[0], time.perf_counter()
             while not over.is_set():
                 begin = time.perf_counter()
-                u = self.policy(begin - start, x)
+                u = policy(begin - start, x)
                 durations.append(time.perf_counter() - begin)
                 assert np.isfinite(u).all()
                 due += STEP
                 time.sleep(max(0.0, due - time.perf_counter()))
 
-        thread = threading.Thread(target=feedback)
-        start = time.perf_counter()
         self.begin()
-        self.solver.publish(self.policy, 0.0)
+        policy, thread, start = self.policy, threading.Thread(target=feedback), time.perf_counter()
+        self.solver.publish(policy, 0.0)
         thread.start()
         while time.perf_counter() - start < seconds:
             for k in range(1, len(self.ticks)):
                 self.tick(k)
-            self.begin_again()
+            self.begin(policy)
         over.set()
         thread.join()
         return durations
-
-    def begin_again(self):
-        """Starts anew, with the same policy."""
-        policy = self.policy
-        self.begin()
-        self.policy = policy

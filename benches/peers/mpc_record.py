@@ -32,7 +32,7 @@ class Hinged(Predictive):
         costs, foot = super()._swing(k), self.feet[k]
         level = Residual.frame_rotation(self.model, foot, np.eye(3))
         upright = Activation.weighted([1.0, 1.0, 0.0])  # Crocoddyl has no residual for the tilt alone
-        return [costs[0], *(Cost(cost.name, 1e3, level, upright) for cost in costs[1:])]
+        return [costs[0], *(Cost(f"{foot} tilts", 1e3, level, upright) for _ in costs[1:])]
 
     def _bounded(self, contacts, costs):
         inside = Activation.barrier(-self._effort, self._effort)
@@ -49,8 +49,8 @@ def main():
     options = parser.parse_args()
     records = []
 
-    def make(model, robot, rule):
-        control = (Hinged if rule == "fddp1" else Predictive)(model, robot, rule)
+    def make(model, robot, rule, rate):
+        control = (Hinged if rule == "fddp1" else Predictive)(model, robot, rule, rate)
         control.before_solve = lambda solver: records.append(Record(solver))
         return control
 

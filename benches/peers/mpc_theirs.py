@@ -59,9 +59,13 @@ class Theirs:
         model = self.knot(self.spec["knots"][k])
         return model, model.createData()
 
+    def frame(self, name):
+        """Returns the index of a link's frame. A joint may have the same name."""
+        return self.model.getFrameId(name, pin.FrameType.BODY)
+
     def residual(self, named, nu):
         kind, numbers = only(named)
-        frame = self.model.getFrameId(numbers["frame"]["name"]) if "frame" in numbers else None
+        frame = self.frame(numbers["frame"]["name"]) if "frame" in numbers else None
         if kind == "state":
             return crocoddyl.ResidualModelState(self.state, np.array(numbers["reference"]), nu)
         if kind == "control":
@@ -71,7 +75,7 @@ class Theirs:
         if kind == "frame_rotation":
             target = np.column_stack([vector(numbers["target"][axis]) for axis in "xyz"])
             return crocoddyl.ResidualModelFrameRotation(self.state, frame, target, nu)
-        cone, contact = numbers["cone"], self.model.getFrameId(numbers["contact"])
+        cone, contact = numbers["cone"], self.frame(numbers["contact"])
         friction = cone.get("friction", cone)
         least, most = friction["least"], friction["greatest"] or np.inf
         pyramid = (friction["facets"], friction["inner"], least, most)
@@ -107,7 +111,7 @@ class Theirs:
         contacts = crocoddyl.ContactModelMultiple(self.state, nu)
         for contact in numbers["contacts"]:
             name, given = contact["name"], contact["constraint"]
-            frame, gains = self.model.getFrameId(name), np.array([given["kp"], given["kd"]])
+            frame, gains = self.frame(name), np.array([given["kp"], given["kd"]])
             target, axes = placement(given["target"]["placement"]), AXES[given["reference"]]
             if given["kind"] == "point":
                 made = crocoddyl.ContactModel3D(self.state, frame, target.translation, axes, nu, gains)
