@@ -22,6 +22,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = "1"  # set before Crocoddyl is loaded: on one core, threads would wait for each other
@@ -101,19 +102,20 @@ def measure(robot, rule, folder, options):
         recorder = [str(options.recorder), str(HERE / "mpc_record.py"), robot, rule, str(file)]
         subprocess.run(recorder, check=True, stdout=sys.stderr)
     record = Record.load(file)
-    ours, result = Ours(record), {"robot": robot, "rule": rule, "difference": record.replay()}
+    clock = time.thread_time if options.busy else time.perf_counter
+    ours, result = Ours(record, clock), {"robot": robot, "rule": rule, "difference": record.replay()}
     start = json.loads(record.start()[0].to_json())
     result |= {"knots": len(start["knot_models"]), "recorded": len(record)}
     rounds, times = max(1, round(options.ticks / (len(record) - 1))), []
     theirs, peer = None, []
     if rule == "fddp1":
         urdf = file.with_suffix(".urdf").read_text(encoding="utf-8")
-        theirs = Theirs(start, urdf)
+        theirs = Theirs(start, urdf, clock)
         result["errors"], starts, result["steps"] = compare(ours, theirs)
     for k in range(rounds if options.ticks else 0):
         times += ours.run()
         if theirs is not None and k < max(1, rounds // 5):
-            peer += time_theirs(Theirs(start, urdf), ours, starts)
+            peer += time_theirs(Theirs(start, urdf, clock), ours, starts)
     if times:
         parts = np.array(times)
         result["ticks"] = len(times)
@@ -156,6 +158,9 @@ def main():
     parser.add_argument("--ticks", type=int, default=10_000, help="number of timed ticks; 0 for none")
     parser.add_argument("--seconds", type=float, default=10.0, help="duration of the calls of a policy (s)")
     parser.add_argument("--rule", choices=["tick2", "fddp1"], help="one rule of a tick; both unless given")
+    parser.add_argument(
+        "--busy", action="store_true", help="count only the time of this thread, if others use the core"
+    )
     parser.add_argument("--records", type=Path, help="a folder for the records, which are kept and used again")
     parser.add_argument("--recorder", type=Path, default=RECORDER, help="the interpreter that has MuJoCo")
     parser.add_argument("--json", action="store_true", help="a line of JSON for each result")

@@ -40,8 +40,8 @@ class Times(NamedTuple):
 class Ours:
     """Replay of a record."""
 
-    def __init__(self, record):
-        self.record = record
+    def __init__(self, record, clock=time.perf_counter):
+        self.record, self.clock = record, clock
         self.ticks = [record[k].calls for k in range(len(record))]
 
     def begin(self, policy=None):
@@ -75,7 +75,7 @@ class Ours:
         # not every solver can divide a tick
         divided = name == "tick" and hasattr(self.solver, "prepare")
         parts = {name: [(method, given) for own, method, given in before if own == name] for name, _, _ in before}
-        clock = time.perf_counter
+        clock = self.clock
         begin = clock()
         for method, given in parts["shift"]:
             method(**given)

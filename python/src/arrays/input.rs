@@ -98,8 +98,8 @@ pub(crate) fn at_once<'py, D: Dimension>(value: &Bound<'py, PyAny>, shape: &[usi
     }
 }
 
-/// Reads an argument for a call that keeps the interpreter's lock and runs no Python code before it has used the numbers.
-/// Allocates nothing if the argument is a float64 array in C order.
+/// Reads an argument for a call that keeps the interpreter's lock, and runs no Python code before it has used the
+/// numbers. Allocates nothing if the argument is a float64 array in C order.
 pub(crate) fn in_place<'py, D: Dimension>(
     argument: &str,
     value: &Bound<'py, PyAny>,
