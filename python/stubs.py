@@ -286,8 +286,10 @@ RESULTS = {
     "None": """
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
-        AugmentedLagrangian.publish AugmentedLagrangian.set_multipliers AugmentedLagrangian.shift
-        Cholesky.factorize ConstraintSet.set_target Fddp.publish Fddp.shift InteriorPoint.publish
+        AugmentedLagrangian.configure AugmentedLagrangian.publish AugmentedLagrangian.reset
+        AugmentedLagrangian.set_multipliers AugmentedLagrangian.shift
+        Cholesky.factorize ConstraintSet.set_target Fddp.configure Fddp.prepare Fddp.publish Fddp.reset Fddp.shift
+        InteriorPoint.configure InteriorPoint.prepare InteriorPoint.publish InteriorPoint.reset
         InteriorPoint.set_multipliers InteriorPoint.shift Ltdl.factorize
         Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
         ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
@@ -329,8 +331,8 @@ RESULTS = {
     "Ground | None": "Simulation.ground",
     "GroundContacts": "Simulation.contacts",
     "Solution": """
-        AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve InteriorPoint.resume
-        InteriorPoint.solve InteriorPoint.tick""",
+        AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.feedback Fddp.resume Fddp.solve
+        InteriorPoint.feedback InteriorPoint.resume InteriorPoint.solve InteriorPoint.tick""",
     "RecordedTick": "Record.__getitem__",
     "Difference | None": "Record.replay",
     "tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]": "Record.start",

@@ -28,7 +28,6 @@ from ._types import (
     Control,
     CoriolisDerivatives,
     Coupling,
-    Difference,
     EnergyDerivatives,
     Evaluation,
     Frame,
@@ -44,7 +43,6 @@ from ._types import (
     ModelWarning,
     Outcome,
     PassiveDerivatives,
-    RecordedTick,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
@@ -97,9 +95,7 @@ __all__ = [
     "Policy",
     "Problem",
     "ProblemError",
-    "Record",
     "Residual",
-    "Schedule",
     "Simulation",
     "Sweep",
     "Task",
@@ -2841,18 +2837,12 @@ class AugmentedLagrangian:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> AugmentedLagrangian: ...
-    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
-        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
-        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
-        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+    def configure(self, **settings: float) -> None:
+        """Changes settings by name, for the next `solve` or other call: `solver.configure(tolerance=1e-4)`.
 
-        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+        settings: settings of this solver; the others stay. This is the same as an assignment to `settings`.
 
-        x: the measured state, nx numbers.
-        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
-            knot continues.
-
-        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+        Raises `ProblemError` for an invalid number; then no setting changes.
         """
 
     def publish(self, policy: Policy, start: float = 0.0) -> None:
@@ -2864,6 +2854,17 @@ class AugmentedLagrangian:
 
         Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
         the solution was not.
+        """
+
+    def reset(self, x0: ArrayLike) -> None:
+        """Forgets the last solution, and starts anew from a state: the recovery after the status "not_finite".
+
+        The new trajectory has the state at all knots, the controls that hold it still, and no gains or
+        multipliers; `resume` starts from it.
+
+        x0: the state, nx numbers; it becomes the initial state of the problem.
+
+        Raises `ProblemError` as `Problem.set_x0` does.
         """
 
     def resume(
@@ -2878,29 +2879,6 @@ class AugmentedLagrangian:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
-        """
-
-    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
-        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
-        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
-        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
-
-        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
-        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
-        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
-        name keep their multipliers. After the end of the last solution, states and controls follow as in
-        `shift`.
-
-        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
-        A knot whose model changes has the costs and limits that its new model has for all knots, until
-        `set_references` is called.
-
-        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
-            horizon, at least 0.
-        knot_models: the index of the model of each knot, N indices.
-        durations: the duration (s) of each knot, N numbers, 0 for an impact.
-
-        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def set_multipliers(self, name: str, values: ArrayLike) -> None:
@@ -3198,18 +3176,39 @@ class Fddp:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> Fddp: ...
-    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
-        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
-        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
-        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+    def configure(self, **settings: float | str | None) -> None:
+        """Changes settings by name, for the next `solve` or other call: `solver.configure(tolerance=1e-4)`.
 
-        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+        settings: settings of this solver; the others stay. This is the same as an assignment to `settings`.
 
-        x: the measured state, nx numbers.
-        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
-            knot continues.
+        Raises `ProblemError` for an invalid number; then no setting changes.
+        """
 
-        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+    def feedback(self, x0: ArrayLike, most: int = 1) -> Solution:
+        """Sets the initial state to the measured state, and completes the prepared iteration with its gap and rollouts.
+        Returns a `Solution`.
+
+        For each state, the result is the result of `problem.set_x0(x0)` and `resume(stop="full_step", most=most)`, to
+        the bit, because the sweep does not contain the initial state. `time_budget` applies to this call alone;
+        `timings` contain both. Other threads can run meanwhile.
+
+        x0: the measured state, nx numbers.
+        most: the maximum number of iterations, at least 1. If the step is shorter than 1, whole iterations follow the
+            prepared one, until a step of length 1.
+
+        Raises `ProblemError` if nothing is prepared, and as `Problem.set_x0` does; then the preparation is kept. Raises
+        exceptions raised by an `Action`.
+        """
+
+    def prepare(self) -> None:
+        """Makes the first half of an iteration before the state arrives: derivatives and sweep along the trajectory of the
+        last solution. `feedback` makes the second half.
+
+        In each period, call `shift`, set references, call `prepare`, and then wait for the state. The prediction is the
+        first state of the shifted solution; it becomes `problem.x0`. Do not change the problem until `feedback`. A
+        direction that is not found is reported by `feedback`. Other threads can run meanwhile.
+
+        Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
         """
 
     def publish(self, policy: Policy, start: float = 0.0) -> None:
@@ -3221,6 +3220,17 @@ class Fddp:
 
         Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
         the solution was not.
+        """
+
+    def reset(self, x0: ArrayLike) -> None:
+        """Forgets the last solution, and starts anew from a state: the recovery after the status "not_finite".
+
+        The new trajectory has the state at all knots, the controls that hold it still, and no gains or
+        multipliers; `resume` starts from it.
+
+        x0: the state, nx numbers; it becomes the initial state of the problem.
+
+        Raises `ProblemError` as `Problem.set_x0` does.
         """
 
     def resume(
@@ -3248,29 +3258,6 @@ class Fddp:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
-        """
-
-    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
-        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
-        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
-        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
-
-        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
-        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
-        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
-        name keep their multipliers. After the end of the last solution, states and controls follow as in
-        `shift`.
-
-        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
-        A knot whose model changes has the costs and limits that its new model has for all knots, until
-        `set_references` is called.
-
-        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
-            horizon, at least 0.
-        knot_models: the index of the model of each knot, N indices.
-        durations: the duration (s) of each knot, N numbers, 0 for an impact.
-
-        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def shift(self, last: int) -> None:
@@ -3538,18 +3525,40 @@ class InteriorPoint:
 
     @staticmethod
     def _make(problem: Problem, inner: dict[str, Any] | None, settings: dict[str, Any]) -> InteriorPoint: ...
-    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
-        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
-        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
-        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+    def configure(self, **settings: float | None) -> None:
+        """Changes settings by name, for the next `solve` or other call: `solver.configure(tolerance=1e-4)`.
 
-        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+        settings: settings of this solver; the others stay. This is the same as an assignment to `settings`.
 
-        x: the measured state, nx numbers.
-        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
-            knot continues.
+        Raises `ProblemError` for an invalid number; then no setting changes.
+        """
 
-        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+    def feedback(self, x0: ArrayLike) -> Solution:
+        """Sets the initial state to the measured state, and completes the prepared tick. Returns a `Solution`.
+
+        If the state equals the prediction, the result is the result of `problem.set_x0(x0)` and `tick`, to the bit.
+        Elsewhere, the linearisation remains the one along the prediction, and the difference enters the last step. If
+        the difference is so large that other limits become active, the sweeps are repeated. `time_budget` applies to
+        this call alone; `timings` contain both. Other threads can run meanwhile.
+
+        x0: the measured state, nx numbers.
+
+        Raises `ProblemError` if nothing is prepared, and as `Problem.set_x0` does; then the preparation is kept. Raises
+        exceptions raised by an `Action`.
+        """
+
+    def prepare(self, sweeps: int = 2) -> None:
+        """Makes the part of a tick that does not depend on the measured state, before the state arrives: the
+        linearisation along the last trajectory, all steps but the last one, and the last sweep. `feedback` makes the
+        rest.
+
+        In each period, call `shift`, set references, call `prepare`, and then wait for the state. The prediction is the
+        first state of the shifted solution; it becomes `problem.x0`. Do not change the problem until `feedback`, which
+        also reports a failed sweep. Other threads can run meanwhile. `time_budget` does not apply.
+
+        sweeps: the maximum number of steps, at least 1, as for `tick`.
+
+        Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
         """
 
     def publish(self, policy: Policy, start: float = 0.0) -> None:
@@ -3561,6 +3570,17 @@ class InteriorPoint:
 
         Raises `ProblemError` for knots without duration, of an `Action`, and if the problem was shifted and
         the solution was not.
+        """
+
+    def reset(self, x0: ArrayLike) -> None:
+        """Forgets the last solution, and starts anew from a state: the recovery after the status "not_finite".
+
+        The new trajectory has the state at all knots, the controls that hold it still, and no gains or
+        multipliers; `resume` starts from it.
+
+        x0: the state, nx numbers; it becomes the initial state of the problem.
+
+        Raises `ProblemError` as `Problem.set_x0` does.
         """
 
     def resume(
@@ -3575,29 +3595,6 @@ class InteriorPoint:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
-        """
-
-    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
-        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
-        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
-        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
-
-        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
-        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
-        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
-        name keep their multipliers. After the end of the last solution, states and controls follow as in
-        `shift`.
-
-        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
-        A knot whose model changes has the costs and limits that its new model has for all knots, until
-        `set_references` is called.
-
-        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
-            horizon, at least 0.
-        knot_models: the index of the model of each knot, N indices.
-        durations: the duration (s) of each knot, N numbers, 0 for an impact.
-
-        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def set_multipliers(self, name: str, values: ArrayLike) -> None:
@@ -3920,19 +3917,6 @@ class Problem:
         Raises `ProblemError` if the model does not fit.
         """
 
-    def set_knots(self, knot_models: Sequence[int], durations: ArrayLike) -> None:
-        """Sets the models and durations of all knots, before the first solve. Later, `retime` of a solver also moves its
-        solution.
-
-        knot_models: the index of the model of each knot, N indices.
-        durations: the duration (s) of each knot, N numbers, 0 for an impact.
-
-        A knot whose model changes has the costs and limits that its new model has for all knots.
-
-        Raises `ProblemError` for an unknown model, for a duration that is not above 0 or not 0 at an impact, and for a
-        new duration of an action that does not belong to a robot. Then nothing changes.
-        """
-
     def set_references(self, name: str, values: ArrayLike) -> None:
         """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
         each period, between solves.
@@ -3972,69 +3956,6 @@ class Problem:
         Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
         different robots.
         """
-
-@final
-class Record:
-    """A record of a controller: all calls that change its problem or its solver, from the first `solve` on, and the result
-    of each tick. A replay makes the same calls on a new problem and gives the same results, bit for bit.
-
-    A record begins when it is made, before the first `solve`, and ends with `stop`. It contains the problem and the
-    settings at the beginning. Each call that solves (`solve`, `resume` or `tick`) ends a tick. `record[k]` returns tick
-    k as a `RecordedTick`: its calls with their arguments, states, controls and status. Recording copies the arguments
-    and results, about 20 kB in each tick of a quadruped with 25 knots.
-
-    Results have the same bits only on processors with the same vector extensions. A solve that its `time_budget`, a
-    callback or a signal ends early depends on the time, so its replay may differ.
-
-    solver: a solver of a robot's problem, which has not solved yet. Only calls of this solver are recorded.
-
-    Raises `ProblemError` if the problem cannot be written as JSON (see `Problem.to_json`).
-
-    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Record, Residual
-    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
-    >>> knot = FreeDynamics(arm, 0.02, [Cost("effort", 1.0, Residual.control(np.zeros(7)))])
-    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [Cost("rest", 1.0, Residual.state(x0))]))
-    >>> solver = Fddp(problem, max_iterations=2)
-    >>> record = Record(solver)
-    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7)))
-    >>> solver.shift(0)
-    >>> problem.set_x0(x0 + 0.01)
-    >>> solution = solver.resume()
-    >>> record.stop()
-    >>> [name for name, arguments in record[1].calls], record.replay()
-    (['shift', 'set_x0', 'resume'], None)
-    """
-
-    def __new__(cls, solver: AugmentedLagrangian | Fddp | InteriorPoint) -> Record: ...
-    def __getitem__(self, key: int, /) -> RecordedTick: ...
-    def __len__(self, /) -> int: ...
-    @staticmethod
-    def load(path: _Path) -> Record:
-        """Reads a record from a file that `save` has written.
-
-        Raises `OSError` if the file cannot be read, and `ProblemError` if it contains no record, or a record of another
-        version.
-        """
-
-    def replay(self) -> Difference | None:
-        """Makes all calls on a new problem, and compares the results with the record. Returns the first `Difference`, or
-        None if all bits are the same. Other threads can run meanwhile.
-
-        Raises `ProblemError` if a call that solves fails, for example because the record began after the first solve.
-        """
-
-    def save(self, path: _Path) -> None:
-        """Writes the record to a file, as JSON. Arrays are written as base64 of their bytes, so that no bit is lost.
-
-        Raises `OSError` if the file cannot be written, and `ProblemError` if a model has a residual that is written in
-        Python.
-        """
-
-    def start(self) -> tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]:
-        """Returns a new problem and a new solver, as they were at the beginning of the record."""
-
-    def stop(self) -> None:
-        """Ends the record. Later calls are not recorded."""
 
 @final
 class Residual:
@@ -4220,71 +4141,6 @@ class Residual:
     @staticmethod
     def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
         """Returns the rows r = A w of a wrench cone, for a rigid contact's wrench w."""
-
-@final
-class Schedule:
-    """The models of a horizon in time: from each switching time on, knots have another model. A trot for example switches
-    between models that differ in their contacts.
-
-    `knots(t, count)` returns the models and durations of a horizon that begins at any time t, for `retime` of a solver.
-    Knots begin at times that do not depend on t, and no knot contains a switching time. The time between two switches
-    is divided into equal knots, whose duration is as near to the spacing as possible. Only the first knot of a horizon
-    differs: it begins at t. It takes the rest of the present knot, together with the next knot if the rest is at most
-    half the spacing and no switch follows. So later knots remain the same when the horizon moves. The number of knots
-    is constant, and the end of the horizon moves.
-
-    spacing: the duration of a knot (s).
-    model: the index of the model before the first switch.
-
-    Raises `ProblemError` if the spacing is not above 0.
-
-    >>> from condyle.optimal import Schedule
-    >>> schedule = Schedule(0.02, 0)
-    >>> schedule.switch(0.05, 1)
-    >>> schedule.switch(0.10, 0)
-    >>> models, durations = schedule.knots(0.015, 5)
-    >>> models, durations.round(6).tolist()
-    ([0, 0, 1, 1, 0], [0.015, 0.02, 0.025, 0.025, 0.02])
-    """
-
-    def __new__(cls, spacing: float, model: int = 0) -> Schedule: ...
-    @property
-    def spacing(self) -> float:
-        """The duration of a knot (s)."""
-
-    @property
-    def switches(self) -> list[tuple[float, int]]:
-        """The switches that are not forgotten: times (s), each with the model from this time on."""
-
-    @staticmethod
-    def _from_text(text: str) -> Schedule: ...
-    def forget(self, t: float) -> None:
-        """Forgets the switches before the present phase, so that the schedule does not grow.
-
-        t: a time (s) in the present phase.
-        """
-
-    def knots(self, t: float, count: int) -> tuple[list[int], _Array]:
-        """Returns the models and durations of the knots of a horizon: a list of indices and an array (s).
-
-        t: the time (s) at which the horizon begins.
-        count: the number of knots.
-
-        Raises `ProblemError` if t is not finite.
-        """
-
-    def model(self, t: float) -> int:
-        """Returns the index of the model at the time t (s)."""
-
-    def switch(self, t: float, model: int) -> None:
-        """Adds a switch. Switches at or after t are removed: a contact that occurs earlier than planned is a switch now,
-        followed by the new switches.
-
-        t: the time (s) from which on knots have the model.
-        model: the index of the model.
-
-        Raises `ProblemError` if t is not finite.
-        """
 
 @final
 class Sweep:

@@ -664,6 +664,13 @@ class _Solution(NamedTuple):
     """The records of the iterations, one for each iteration."""
     timings: Timings
     """The durations of the phases of the solve."""
+    fallback: Literal["rolled_out", "held_still"] | None = None
+    """The trajectory that replaced the trajectory of the last solution; None if that was continued.
+
+    "rolled_out": a rollout of the last plan from x̂₀ with its gains. It replaces a plan with gaps above 10 (rad, m,
+    rad/s, m/s), and it is the plan after a tick whose sweep failed. "held_still": x̂₀ at all knots, and the controls
+    that hold it still. They replace a plan that is not finite, or that costs far more than the last solution.
+    """
 
 
 class PlanPoint(NamedTuple):
@@ -716,6 +723,16 @@ class Solution(_Solution):
     _source: Any = None
     _evaluation: Evaluation | None = None
     _times: _Array | None = None
+
+    @property
+    def executable(self) -> bool:
+        """Whether a controller may execute the plan: the status is not "not_finite", and all states, controls and gains
+        are finite. The plan may still have gaps (`gap`), or violate limits (`outcome.worst`).
+
+        If the plan is not executable, continue with the last one that was, and `reset` the solver.
+        """
+        arrays = [self.xs, *self.us, *self.K]
+        return self.status != "not_finite" and all(bool(np.isfinite(numbers).all()) for numbers in arrays)
 
     def at(self, t: float) -> PlanPoint:
         """Returns the plan at the time t (s) after the beginning of knot 0, as a `PlanPoint`.

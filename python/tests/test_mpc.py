@@ -36,7 +36,8 @@ COSTS = [
 ]
 END = FreeDynamics(QUADRUPED, None, [Cost("state", 1.0, Residual.state(STAND), Activation.weighted(0.1 * WEIGHTS))])
 CONES = {foot: Residual.friction_cone(foot, FrictionCone(0.5, least=5.0)) for foot in FEET}
-RULES = ("tick", "full_step")
+RULES = ("tick", "full_step", "tick in parts", "full_step in parts")
+"""Rules of a tick; "in parts": with `prepare` and `feedback`."""
 NEAR = 0.1
 """Largest difference to the efforts of a loop without a fault, 3 ticks after the fault, relative to the limits."""
 FAULTS: dict[str, Callable[[Any], Any]] = {
@@ -98,7 +99,8 @@ def loop(rule: str, fault: Callable[[Any], Any] | None = None, seconds: float = 
     measured state x by fault(x), for one period. If fault(x) is None, the tick does not take place.
     """
     problem = standing(effort=True)
-    solver: Any = InteriorPoint(problem) if rule == "tick" else Fddp(problem, max_iterations=100)
+    is_tick, in_parts = rule.startswith("tick"), rule.endswith("in parts")
+    solver: Any = InteriorPoint(problem) if is_tick else Fddp(problem, max_iterations=100)
     policy = Policy(problem)
     solver.solve(*guess(problem))
     solver.publish(policy, 0.0)
@@ -112,12 +114,17 @@ def loop(rule: str, fault: Callable[[Any], Any] | None = None, seconds: float = 
         for _ in range(period - shifted):  # also for ticks that did not take place
             solver.shift(0)
         shifted = period
+        if in_parts:
+            solver.prepare(*([2] if is_tick else []))
         try:
-            problem.set_x0(x)
+            if in_parts:
+                plan = solver.feedback(x, *([] if is_tick else [3]))
+            else:
+                problem.set_x0(x)
+                plan = solver.tick(2) if is_tick else solver.resume(stop="full_step", most=3)
         except ProblemError as error:
             plans[PERIOD * period] = str(error)
             return
-        plan = solver.tick(2) if rule == "tick" else solver.resume(stop="full_step", most=3)
         plans[PERIOD * period] = plan
         solver.publish(policy, t)
 
@@ -157,8 +164,85 @@ def test_a_fault_is_over_after_three_ticks(rule: str, name: str) -> None:
         assert largest[1] > 1.2 * largest[0]  # the fault had an effect
     for ms in range(AT + PERIOD, 1000, PERIOD):
         assert found.plans[ms].status in ("converged", "full_step", "max_iterations")
+        assert found.plans[ms].executable
     for ms in range(AT + 3 * PERIOD, 1000, PERIOD):
         difference = np.abs(found.plans[ms].us[0] - expected.plans[ms].us[0]) / EFFORT
         assert difference.max() <= NEAR, ms
     np.testing.assert_allclose(found.q[:7], expected.q[:7], atol=0.01)
     np.testing.assert_allclose(found.q[2], STAND[2], atol=0.01)
+
+
+def test_feedback_completes_a_preparation() -> None:
+    """Checks the errors of `prepare` and `feedback` without a solution, without a preparation, and for wrong states."""
+    for rule in ("fddp", "interior point"):
+        problem = standing()
+        solver: Any = Fddp(problem) if rule == "fddp" else InteriorPoint(problem)
+        with pytest.raises(ProblemError, match="no solution to go on from"):
+            solver.prepare()
+        solver.solve(*guess(problem))
+        with pytest.raises(ProblemError, match="nothing is prepared"):
+            solver.feedback(STAND)
+        solver.shift(0)
+        predicted = solver.solution.xs[0]
+        solver.prepare()
+        np.testing.assert_array_equal(problem.x0, predicted)
+        with pytest.raises(ValueError, match="x0"):
+            solver.feedback(STAND[:-1])
+        with pytest.raises(ProblemError, match="not finite"):
+            solver.feedback(np.full_like(STAND, np.nan))
+        ours = solver.feedback(predicted)
+        assert ours.executable and ours.fallback is None
+    with pytest.raises(ValueError, match="most: expected at least 1"):
+        Fddp(problem).feedback(STAND, most=0)
+
+
+@pytest.mark.parametrize("push", [0.0, 0.5])
+def test_feedback_of_fddp_equals_a_whole_iteration(push: float) -> None:
+    """Compares `prepare` and `feedback` with `resume(stop="full_step")`, for a state that the plan predicts, and for
+    another one.
+    """
+    plans = []
+    for in_parts in (False, True):
+        problem = standing()
+        solver = Fddp(problem)
+        solver.solve(*guess(problem))
+        solver.shift(0)
+        found = solver.solution
+        assert found is not None
+        x = found.xs[0].copy()
+        x[20] += push
+        if in_parts:
+            solver.prepare()
+            plans.append(solver.feedback(x, most=2))
+        else:
+            problem.set_x0(x)
+            plans.append(solver.resume(stop="full_step", most=2))
+    np.testing.assert_array_equal(plans[0].xs, plans[1].xs)
+    np.testing.assert_array_equal(plans[0].K, plans[1].K)
+    assert plans[0].status == plans[1].status and plans[0].cost == plans[1].cost
+
+
+def test_a_solver_is_configured_and_reset() -> None:
+    """Changes settings of a solver, and starts it anew from another state."""
+    problem, pushed = standing(), STAND.copy()
+    pushed[20] += 0.1
+    for solver in (Fddp(problem), InteriorPoint(problem)):
+        solver.configure(max_iterations=1, tolerance=1e-3)
+        assert solver.settings["max_iterations"] == 1 and solver.settings["tolerance"] == 1e-3
+        with pytest.raises(ProblemError):
+            solver.configure(tolerance=-1.0)
+        with pytest.raises(ValueError, match="there is no setting 'tolerances'"):
+            solver.configure(tolerances=1.0)
+        assert solver.settings["tolerance"] == 1e-3
+        xs, us = guess(problem)
+        solver.solve(xs, us + 20.0)
+        solver.configure(max_iterations=100)
+        solver.reset(pushed)
+        begun = solver.solution
+        assert begun is not None and begun.executable and begun.fallback == "held_still"
+        np.testing.assert_array_equal(problem.x0, pushed)
+        np.testing.assert_array_equal(begun.xs, np.tile(pushed, (KNOTS + 1, 1)))
+        assert not np.any(begun.K)
+        assert solver.resume().status == "converged"
+        with pytest.raises(ProblemError, match="not finite"):
+            solver.reset(np.full_like(STAND, np.nan))

@@ -54,6 +54,10 @@ pub enum Error {
     #[error("resume: there is no solution to go on from; call solve first")]
     NothingToResume,
 
+    /// A call of `feedback` has no prepared iteration: `prepare` was not called, or another call has used its result.
+    #[error("feedback: nothing is prepared; call prepare first, for each feedback")]
+    NothingPrepared,
+
     /// A dimension of one knot's action model differs from the dimension that the problem or the solver expects.
     #[error("knot {knot}: expected {name} = {expected}, found {found}")]
     Dimension {

@@ -99,9 +99,9 @@ pub use problem::{
     PathConstraint, Problem, Schedule, Unicycle,
 };
 pub use solvers::{
-    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fddp, InteriorPoint, InteriorPointSettings, Iteration,
-    LimitRows, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution, StateSpace,
-    Status, Timings, Verdict, Violation, ViolationKind,
+    AugmentedLagrangian, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,
+    Iteration, LimitRows, Observer, Outcome, PlanPoint, Policy, PolicyPoint, PolicyPublisher, Settings, Solution,
+    StateSpace, Status, Timings, Verdict, Violation, ViolationKind,
 };
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

@@ -365,9 +365,13 @@ fn count_of_constrained_solves(change: fn(Limit) -> Limit) {
                 solver.tick(&mut problem, 2).unwrap();
                 solver.resume(&mut problem).unwrap();
             });
-            [solve, tick]
+            let parts = allocations(|| {
+                solver.prepare(&mut problem, 2).unwrap();
+                solver.feedback(&mut problem, &x0).unwrap();
+            });
+            [solve, tick, parts]
         });
-        assert_eq!(counts, [0, 0], "{threads} threads");
+        assert_eq!(counts, [0; 3], "{threads} threads");
     }
     solver.settings.threads = 1;
     solver.solve(&mut problem, &xs, &us).unwrap();
@@ -387,6 +391,42 @@ fn count_of_constrained_solves(change: fn(Limit) -> Limit) {
         solver.tick(&mut problem, 2).unwrap();
     });
     assert_eq!(count, 0);
+    // At the second of these shifts, the knot without limits leaves the horizon. There are then more rows than ever,
+    // also for the copy before the third shift.
+    for (shift, push) in [0.0, 0.1, 0.0, 0.0, 0.5].into_iter().enumerate() {
+        let mut next = solver.solution().x(1).to_vec();
+        next[8] += push;
+        let count = allocations(|| {
+            problem.shift(0).unwrap();
+            solver.shift(&mut problem).unwrap();
+            solver.prepare(&mut problem, 2).unwrap();
+            solver.feedback(&mut problem, &next).unwrap();
+        });
+        let plan = solver.solution();
+        assert!(plan.is_executable() && plan.fallback.is_none(), "{push} {:?}", plan.fallback);
+        assert!(count == 0 || shift == 1 || shift == 2, "{count} {push}");
+    }
+}
+
+/// Checks that iterations in two halves allocate nothing, while the horizon moves.
+#[test]
+fn halves_of_iterations_allocate_nothing() {
+    let mut problem = cartpole(&[0.0, 0.2, 0.0, 0.0], 40, 1);
+    let mut solver = Fddp::new(&problem);
+    solver.solve(&mut problem, &[0.0, 0.2, 0.0, 0.0].repeat(41), &[0.0; 40]).unwrap();
+    let mut x = [0.0, 0.2, 0.0, 0.0];
+    for tick in 0..10 {
+        let count = allocations(|| {
+            problem.shift(0).unwrap();
+            solver.shift(&mut problem).unwrap();
+            x.copy_from_slice(solver.solution().x(0));
+            x[3] += if tick == 5 { 0.3 } else { 0.0 };
+            solver.prepare(&mut problem).unwrap();
+            solver.feedback(&mut problem, &x, 3).unwrap();
+        });
+        assert_eq!(count, 0, "tick {tick}");
+        assert!(solver.solution().is_executable());
+    }
 }
 
 /// Counts the allocations of periods shorter than a knot, in which contacts change at times within knots.

@@ -5,6 +5,8 @@ mod budgets;
 mod common;
 #[path = "mpc/policies.rs"]
 mod policies;
+#[path = "mpc/prepared.rs"]
+mod prepared;
 #[cfg(feature = "serde")]
 #[path = "mpc/records.rs"]
 mod records;

@@ -128,6 +128,7 @@ pub(super) fn solution<'py>(
         s.status.name(),
         trace,
         timings,
+        s.fallback.map(rust::Fallback::name),
     ))?;
     // the solution computes accelerations, efforts and forces on request, from this problem and this number of shifts
     solution.setattr("_source", (of.clone_ref(py), of.get().moved()))?;

@@ -386,6 +386,7 @@ impl Problem {
         if own.is_none_or(|own| own.knot.dynamics.dt().is_none()) {
             return Err(ProblemError::new_err(format!("knot {knot}: expected an action of a robot with a duration")));
         }
+        self.recorder.note(|| Call::SetDuration { knot, dt });
         problem.set_duration(knot, dt).map_err(problem_error)
     }
 
@@ -404,6 +405,7 @@ impl Problem {
         let durations = vector("durations", durations, knot_models.len())?;
         self.check_durations(&problem, &knot_models, &durations)?;
         let before = problem.knot_models().to_vec();
+        self.recorder.note(|| Call::SetKnots { knot_models: knot_models.clone(), durations: kept(&durations) });
         problem.set_knots(&knot_models, &durations).map_err(problem_error)?;
         self.describe_knots(0, &before, &knot_models)
     }

@@ -158,7 +158,7 @@ impl Record {
         let index = if k < 0 { k + ticks.len() as isize } else { k };
         let tick = usize::try_from(index).ok().and_then(|k| ticks.get(k));
         let tick = tick.ok_or_else(|| PyIndexError::new_err(format!("tick {k}: the record has {}", ticks.len())))?;
-        let give = Given { py, start: record.problem(), nu: self.nu };
+        let give = Given { py, start: record.problem(), solver: record.solver(), nu: self.nu };
         let calls = tick.calls.iter().map(|call| give.call(call)).collect::<PyResult<Vec<_>>>()?;
         class!(py, "RecordedTick")?.call1((
             PyList::new(py, calls)?,
@@ -181,6 +181,7 @@ impl Record {
 struct Given<'a, 'py> {
     py: Python<'py>,
     start: &'a RobotProblem,
+    solver: &'a SolverSettings,
     nu: Option<usize>,
 }
 
@@ -276,6 +277,34 @@ impl<'py> Given<'_, 'py> {
                 to.set_item("knot", knot)?;
                 to.set_item("dt", dt)?;
                 "set_duration"
+            }
+            Call::SetKnots { knot_models, durations } => {
+                to.set_item("knot_models", knot_models)?;
+                to.set_item("durations", self.array(&[durations.len()], durations)?)?;
+                "set_knots"
+            }
+            Call::Retime { elapsed, knot_models, durations } => {
+                to.set_item("elapsed", elapsed)?;
+                to.set_item("knot_models", knot_models)?;
+                to.set_item("durations", self.array(&[durations.len()], durations)?)?;
+                "retime"
+            }
+            Call::Reset { x0 } => {
+                to.set_item("x0", self.array(&[x0.len()], x0)?)?;
+                "reset"
+            }
+            Call::Prepare { sweeps } => {
+                if matches!(self.solver, SolverSettings::InteriorPoint { .. }) {
+                    to.set_item("sweeps", sweeps)?;
+                }
+                "prepare"
+            }
+            Call::Feedback { x0, most } => {
+                to.set_item("x0", self.array(&[x0.len()], x0)?)?;
+                if matches!(self.solver, SolverSettings::Fddp { .. }) {
+                    to.set_item("most", most)?;
+                }
+                "feedback"
             }
             Call::Shift { last } => {
                 to.set_item("last", last)?;

@@ -12,6 +12,7 @@ use rust::record::{Call, Recorded};
 use std::sync::Mutex;
 
 /// The output that a user wants after each iteration of a solve.
+#[derive(Default)]
 pub(super) struct Observer<'py> {
     pub(super) callback: Option<Bound<'py, PyAny>>,
     pub(super) verbose: bool,
@@ -64,15 +65,29 @@ pub(super) fn run<'py, S: Send + Recorded>(
         x = matrix("xs", xs, [inner.horizon() + 1, inner.nx()])?.to_vec();
         u = controls(&inner, us)?;
     }
-    let (inner, solver, closes) = (&mut *inner, &mut *solver, observer.verbose || observer.progress);
-    let failed = || problem.get().has_failed();
-    let signals = Signals::new(signals::LONG);
-    let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
-    let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions).map(drop));
+    let (inner, solver) = (&mut *inner, &mut *solver);
+    let solved = |interruptions: &mut Interruptions<'_>| solve(solver, inner, [&x, &u], interruptions).map(drop);
+    let result = observe(py, problem, observer, solved);
     recorder.note_tick(recorded, result.is_ok().then_some(&*solver), || match start {
         Start::From(_) => Call::Solve { xs: kept(&x), us: kept(&u) },
         Start::Last(call) => call,
     });
+    result?;
+    give(py, problem, inner, solver.solution())
+}
+
+/// Runs a call of a solver that signals and errors of Python functions may end. Other Python threads can run meanwhile.
+pub(super) fn observe<'py, T: Send>(
+    py: Python<'py>,
+    problem: &Py<Problem>,
+    observer: Observer<'py>,
+    call: impl FnOnce(&mut Interruptions<'_>) -> Result<T, rust::Error> + Send,
+) -> PyResult<T> {
+    let closes = observer.verbose || observer.progress;
+    let failed = || problem.get().has_failed();
+    let signals = Signals::new(signals::LONG);
+    let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
+    let result = py.detach(|| call(&mut interruptions));
     let raised = problem.get().raise(); // called in every case: it also clears the stored error
     let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
     if let Some(observer) = observer.filter(|_| closes) {
@@ -81,6 +96,5 @@ pub(super) fn run<'py, S: Send + Recorded>(
     signals.finish()?;
     raised?;
     by_observer.map_or(Ok(()), Err)?;
-    result.map_err(problem_error)?;
-    give(py, problem, inner, solver.solution())
+    result.map_err(problem_error)
 }

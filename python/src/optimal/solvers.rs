@@ -5,7 +5,7 @@ use super::outcomes::{give_outcome, multipliers_by_knot};
 use super::policy::Policy;
 use super::problem::{Problem, lock};
 use super::recorder::{address, kept};
-use super::run::{Observer, Start, run};
+use super::run::{Observer, Start, observe, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
@@ -115,6 +115,35 @@ macro_rules! solver {
                 changed.check().map_err(problem_error)?;
                 solver.settings = changed;
                 self.settings.bind(given.py()).update(given.as_mapping())
+            }
+
+            /// Changes settings by name, for the next `solve` or other call: `solver.configure(tolerance=1e-4)`.
+            ///
+            /// settings: settings of this solver; the others stay. This is the same as an assignment to `settings`.
+            ///
+            /// Raises `ProblemError` for an invalid number; then no setting changes.
+            #[pyo3(signature = (**settings))]
+            fn configure(&self, settings: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
+                settings.map_or(Ok(()), |settings| self.change_settings(settings.as_mapping()))
+            }
+
+            /// Forgets the last solution, and starts anew from a state: the recovery after the status "not_finite".
+            ///
+            /// The new trajectory has the state at all knots, the controls that hold it still, and no gains or
+            /// multipliers; `resume` starts from it.
+            ///
+            /// x0: the state, nx numbers; it becomes the initial state of the problem.
+            ///
+            /// Raises `ProblemError` as `Problem.set_x0` does.
+            fn reset(&self, x0: &Bound<'_, PyAny>) -> PyResult<()> {
+                let mut problem = lock("problem", &self.problem.get().inner)?;
+                let mut solver = lock("solver", &self.solver)?;
+                let x0 = vector("x0", x0, problem.nx())?;
+                let recorded = address(&self.solver);
+                self.problem.get().recorder.note_of(recorded, || Call::Reset { x0: kept(&x0) });
+                let result = solver.reset(&mut problem, &x0);
+                self.problem.get().raise()?;
+                result.map_err(problem_error)
             }
 
             fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -233,7 +262,12 @@ macro_rules! solver {
                 let mut solver = lock("solver", &self.solver)?;
                 let durations = vector("durations", durations, knot_models.len())?;
                 self.problem.get().check_durations(&problem, &knot_models, &durations)?;
-                let before = problem.knot_models().to_vec();
+                let (recorded, before) = (address(&self.solver), problem.knot_models().to_vec());
+                self.problem.get().recorder.note_of(recorded, || Call::Retime {
+                    elapsed,
+                    knot_models: knot_models.clone(),
+                    durations: kept(&durations),
+                });
                 let passed = solver.retime(&mut problem, elapsed, &knot_models, &durations).map_err(problem_error)?;
                 self.problem.get().describe_knots(passed, &before, &knot_models)?;
                 self.problem.get().raise()?;
@@ -357,6 +391,47 @@ Fddp, set_fddp, show_fddp {
             false => solver.resume_with(problem, interruptions),
         })
     }
+
+    /// Makes the first half of an iteration before the state arrives: derivatives and sweep along the trajectory of the
+    /// last solution. `feedback` makes the second half.
+    ///
+    /// In each period, call `shift`, set references, call `prepare`, and then wait for the state. The prediction is the
+    /// first state of the shifted solution; it becomes `problem.x0`. Do not change the problem until `feedback`. A
+    /// direction that is not found is reported by `feedback`. Other threads can run meanwhile.
+    ///
+    /// Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
+    fn prepare(&self, py: Python<'_>) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let (inner, solver) = (&mut *problem, &mut *solver);
+        self.problem.get().recorder.note_of(address(&self.solver), || Call::Prepare { sweeps: 1 });
+        observe(py, &self.problem, Observer::default(), |signals| solver.prepare_with(inner, signals))
+    }
+
+    /// Sets the initial state to the measured state, and completes the prepared iteration with its gap and rollouts.
+    /// Returns a `Solution`.
+    ///
+    /// For each state, the result is the result of `problem.set_x0(x0)` and `resume(stop="full_step", most=most)`, to
+    /// the bit, because the sweep does not contain the initial state. `time_budget` applies to this call alone;
+    /// `timings` contain both. Other threads can run meanwhile.
+    ///
+    /// x0: the measured state, nx numbers.
+    /// most: the maximum number of iterations, at least 1. If the step is shorter than 1, whole iterations follow the
+    ///     prepared one, until a step of length 1.
+    ///
+    /// Raises `ProblemError` if nothing is prepared, and as `Problem.set_x0` does; then the preparation is kept. Raises
+    /// exceptions raised by an `Action`.
+    #[pyo3(signature = (x0, most=1))]
+    fn feedback<'py>(&self, py: Python<'py>, x0: &Bound<'_, PyAny>, most: usize) -> PyResult<Bound<'py, PyAny>> {
+        if most == 0 {
+            return Err(PyValueError::new_err("most: expected at least 1, found 0"));
+        }
+        let x0 = self.state(x0)?;
+        let start = Start::Last(Call::Feedback { x0: kept(&x0), most });
+        run(py, &self.problem, &self.solver, start, Observer::default(), |solver, problem, _, signals| {
+            solver.feedback_with(problem, &x0, most, signals)
+        })
+    }
 }
 }
 
@@ -365,7 +440,7 @@ fn copied(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Py<P
     Ok(settings.map_or_else(|| Ok(PyDict::new(py)), |settings| settings.copy())?.unbind())
 }
 
-/// Defines the constructor of solvers without an inner solver.
+/// Defines the constructor of solvers without an inner solver, and their reader of states.
 macro_rules! construct {
     ($($class:ident by $set:ident),*) => {$(
         impl $class {
@@ -380,6 +455,12 @@ macro_rules! construct {
                 solver.settings.check().map_err(problem_error)?;
                 let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), copied(py, settings)?);
                 Ok(Self { problem, solver, settings, inner: copied(py, None)? })
+            }
+
+            /// Reads a state of the problem.
+            fn state(&self, x0: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+                let size = lock("problem", &self.problem.get().inner)?.nx();
+                Ok(vector("x0", x0, size)?.to_vec())
             }
         }
     )*};
@@ -594,10 +675,48 @@ InteriorPoint, set_interior_point, show_interior_point {
     /// Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
     #[pyo3(signature = (sweeps=2))]
     fn tick<'py>(&self, py: Python<'py>, sweeps: usize) -> PyResult<Bound<'py, PyAny>> {
-        let quiet = Observer { callback: None, verbose: false, progress: false };
         let start = Start::Last(Call::Tick { sweeps });
-        run(py, &self.problem, &self.solver, start, quiet, |solver, problem, _, interruptions| {
+        run(py, &self.problem, &self.solver, start, Observer::default(), |solver, problem, _, interruptions| {
             solver.tick_with(problem, sweeps, interruptions)
+        })
+    }
+
+    /// Makes the part of a tick that does not depend on the measured state, before the state arrives: the
+    /// linearisation along the last trajectory, all steps but the last one, and the last sweep. `feedback` makes the
+    /// rest.
+    ///
+    /// In each period, call `shift`, set references, call `prepare`, and then wait for the state. The prediction is the
+    /// first state of the shifted solution; it becomes `problem.x0`. Do not change the problem until `feedback`, which
+    /// also reports a failed sweep. Other threads can run meanwhile. `time_budget` does not apply.
+    ///
+    /// sweeps: the maximum number of steps, at least 1, as for `tick`.
+    ///
+    /// Raises `ProblemError` as `resume` does, and exceptions raised by an `Action`.
+    #[pyo3(signature = (sweeps=2))]
+    fn prepare(&self, py: Python<'_>, sweeps: usize) -> PyResult<()> {
+        let mut problem = lock("problem", &self.problem.get().inner)?;
+        let mut solver = lock("solver", &self.solver)?;
+        let (inner, solver) = (&mut *problem, &mut *solver);
+        self.problem.get().recorder.note_of(address(&self.solver), || Call::Prepare { sweeps });
+        observe(py, &self.problem, Observer::default(), |signals| solver.prepare_with(inner, sweeps, signals))
+    }
+
+    /// Sets the initial state to the measured state, and completes the prepared tick. Returns a `Solution`.
+    ///
+    /// If the state equals the prediction, the result is the result of `problem.set_x0(x0)` and `tick`, to the bit.
+    /// Elsewhere, the linearisation remains the one along the prediction, and the difference enters the last step. If
+    /// the difference is so large that other limits may become active, one new sweep replaces the prepared ones.
+    /// `time_budget` applies to this call alone; `timings` contain both. Other threads can run meanwhile.
+    ///
+    /// x0: the measured state, nx numbers.
+    ///
+    /// Raises `ProblemError` if nothing is prepared, and as `Problem.set_x0` does; then the preparation is kept. Raises
+    /// exceptions raised by an `Action`.
+    fn feedback<'py>(&self, py: Python<'py>, x0: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        let x0 = self.state(x0)?;
+        let start = Start::Last(Call::Feedback { x0: kept(&x0), most: 1 });
+        run(py, &self.problem, &self.solver, start, Observer::default(), |solver, problem, _, signals| {
+            solver.feedback_with(problem, &x0, signals)
         })
     }
 

@@ -26,9 +26,11 @@ from condyle.optimal import (
     WrenchCone,
 )
 
-Solver = Literal["tick2", "fddp1", "full_step"]
-"""Rule of a tick: `tick(2)` of `InteriorPoint`, or of `Fddp` one iteration, or iterations until a full step (at most
-3)."""
+Solver = Literal["tick2", "feedback2", "fddp1", "full_step"]
+"""Rule of a tick: `tick(2)` of `InteriorPoint`, or the same as `prepare(2)` before the state arrives and `feedback`
+after it. Or of `Fddp` one iteration, or iterations until a full step (at most 3)."""
+INTERIOR_POINT = ("tick2", "feedback2")
+"""Rules of `InteriorPoint`."""
 
 DT = 0.02
 """Duration of a knot (s)."""
@@ -164,7 +166,7 @@ class Predictive:
         self.command = np.zeros(3)
         """Velocity forwards and to the left (m/s), and rate of turning (rad/s)."""
         self.seconds: list[float] = []
-        """Durations of the ticks, with references (s)."""
+        """Durations of the ticks, with references (s); with `feedback2`, from the state to the new plan."""
         self.before_solve: Callable[[Fddp | InteriorPoint], object] = lambda solver: None
         """Function that is called with each new solver before its first solve."""
         self._data, self._x = condyle.Data(model), np.r_[q, np.zeros(model.nv)]
@@ -215,7 +217,7 @@ class Predictive:
         costs = [self._state(1.0), Cost("effort", self.robot.effort, Residual.control(still))]
         costs += [cost for k in range(len(self.feet)) if k not in touching for cost in self._swing(k)]
         cones = {foot: self._cone(foot) for foot in grips}
-        if self.rule == "tick2":
+        if self.rule in INTERIOR_POINT:
             limits = [Limit(foot, cone) for foot, cone in cones.items()]
             limits.append(Limit("effort", Residual.control(np.zeros(len(still))), -self._effort, self._effort))
             return ContactDynamics(self.model, contacts, DT, costs, limits=limits)
@@ -285,7 +287,7 @@ class Predictive:
         us = self.problem.quasi_static(xs)
         self._observe(x, 0.0)
         self._refer(x, 0.0)
-        if self.rule == "tick2":
+        if self.rule in INTERIOR_POINT:
             self.solver = InteriorPoint(self.problem, tolerance=1e-4)
         else:
             self.solver = Fddp(self.problem, max_iterations=100, tolerance=1e-3)
@@ -301,13 +303,23 @@ class Predictive:
     def tick(self, x: Array, t: float) -> Solution:
         """Renews the plan at the time t (s), for the measured state x."""
         begin = time.perf_counter()
-        self._observe(x, t)
         if self._schedule is None:
             self.solver.shift(self.robot.gait.stance(t + (self.robot.knots - 1) * DT))
         else:
             stances, durations = self._schedule.knots(t, self.robot.knots)
             self.solver.retime(t - self._begin, stances, durations)
             self._begin, self._times = t, np.r_[0.0, np.cumsum(durations)]
+        if self.rule == "feedback2":  # the references belong to the predicted state
+            predicted = self.solver.solution.xs[0]
+            self._observe(predicted, t)
+            self._refer(predicted, t)
+            self.solver.prepare(2)
+            begin = time.perf_counter()
+            plan = self.solver.feedback(x)
+            self.solver.publish(self.policy, t)
+            self.seconds.append(time.perf_counter() - begin)
+            return plan
+        self._observe(x, t)
         self._refer(x, t)
         self.problem.set_x0(x)
         if isinstance(self.solver, InteriorPoint):

@@ -10,6 +10,7 @@ from pushes import ANGLES, BEGIN, ROBOTS, Push, run, survives
 
 LEAST: dict[tuple[str, Solver], dict[float, int]] = {
     ("go2", "tick2"): {12.0: 16, 16.0: 16, 20.0: 16, 24.0: 15, 28.0: 9},
+    ("go2", "feedback2"): {12.0: 16, 16.0: 16, 20.0: 16, 24.0: 15, 28.0: 12},
     ("go2", "full_step"): {12.0: 16, 16.0: 16, 20.0: 14},
     ("g1", "tick2"): {6.0: 15, 12.0: 12},
 }

@@ -74,6 +74,39 @@ pub enum Call {
         /// Duration (s).
         dt: f64,
     },
+    /// Call of [`Problem::set_knots`].
+    SetKnots {
+        /// Index of the model of each knot.
+        knot_models: Vec<usize>,
+        /// Duration of each knot (s).
+        durations: Numbers,
+    },
+    /// Call of the solver's `retime`.
+    Retime {
+        /// Time by which the horizon moves (s).
+        elapsed: f64,
+        /// Index of the model of each knot.
+        knot_models: Vec<usize>,
+        /// Duration of each knot (s).
+        durations: Numbers,
+    },
+    /// Call of the solver's `reset`.
+    Reset {
+        /// State with which the solver starts anew.
+        x0: Numbers,
+    },
+    /// Call of the solver's `prepare`.
+    Prepare {
+        /// Maximum number of steps; [`Fddp`](crate::Fddp) makes one.
+        sweeps: usize,
+    },
+    /// Call of the solver's `feedback`.
+    Feedback {
+        /// Measured state.
+        x0: Numbers,
+        /// Maximum number of iterations; [`InteriorPoint`](crate::InteriorPoint) makes one.
+        most: usize,
+    },
     /// Call of [`Problem::shift`], and then of the solver's `shift`.
     Shift {
         /// Index of the new last knot's model.
@@ -149,7 +182,11 @@ impl AsRef<[f64]> for Numbers {
 impl Call {
     /// Returns whether the call runs the solver, and so ends a tick.
     pub fn solves(&self) -> bool {
-        matches!(self, Self::Solve { .. } | Self::Resume | Self::ResumeToFullStep { .. } | Self::Tick { .. })
+        match self {
+            Self::Solve { .. } | Self::Resume | Self::ResumeToFullStep { .. } => true,
+            Self::Tick { .. } | Self::Feedback { .. } => true,
+            _ => false,
+        }
     }
 
     /// Makes the call.
@@ -178,6 +215,12 @@ impl Call {
                 Error::check_size("knot", *knot, problem.horizon() - 1)?;
                 problem.set_duration(*knot, *dt)
             }
+            Self::SetKnots { knot_models, durations } => problem.set_knots(knot_models, durations),
+            Self::Retime { elapsed, knot_models, durations } => {
+                solver.retime(problem, *elapsed, knot_models, durations)
+            }
+            Self::Reset { x0 } => solver.reset(problem, x0),
+            Self::Prepare { sweeps } => solver.prepare(problem, *sweeps),
             Self::Shift { last } => {
                 problem.shift(*last)?;
                 solver.shift(problem)
@@ -187,9 +230,11 @@ impl Call {
                 Ok(())
             }
             Self::SetMultipliers { name, values } => solver.set_multipliers(problem, name, values),
-            Self::Solve { .. } | Self::Resume | Self::ResumeToFullStep { .. } | Self::Tick { .. } => {
-                solver.run(problem, self)
-            }
+            Self::Solve { .. }
+            | Self::Resume
+            | Self::ResumeToFullStep { .. }
+            | Self::Tick { .. }
+            | Self::Feedback { .. } => solver.run(problem, self),
         }
     }
 }

@@ -140,6 +140,40 @@ impl RecordedSolver {
         }
     }
 
+    /// Moves the horizon of the solver and of the problem.
+    pub(super) fn retime(
+        &mut self,
+        problem: &mut Problem,
+        elapsed: f64,
+        knot_models: &[usize],
+        durations: &[f64],
+    ) -> Result<(), Error> {
+        match self {
+            Self::Fddp(solver) => solver.retime(problem, elapsed, knot_models, durations),
+            Self::InteriorPoint(solver) => solver.retime(problem, elapsed, knot_models, durations),
+            Self::AugmentedLagrangian(solver) => solver.retime(problem, elapsed, knot_models, durations),
+        }
+        .map(drop)
+    }
+
+    /// Starts the solver anew from a state.
+    pub(super) fn reset(&mut self, problem: &mut Problem, x0: &[f64]) -> Result<(), Error> {
+        match self {
+            Self::Fddp(solver) => solver.reset(problem, x0),
+            Self::InteriorPoint(solver) => solver.reset(problem, x0),
+            Self::AugmentedLagrangian(solver) => solver.reset(problem, x0),
+        }
+    }
+
+    /// Prepares an iteration or a tick. Has no effect for the augmented Lagrangian, which has no such call.
+    pub(super) fn prepare(&mut self, problem: &mut Problem, sweeps: usize) -> Result<(), Error> {
+        match self {
+            Self::Fddp(solver) => solver.prepare(problem),
+            Self::InteriorPoint(solver) => solver.prepare(problem, sweeps),
+            Self::AugmentedLagrangian(_) => Ok(()),
+        }
+    }
+
     /// Sets multipliers. Has no effect for FDDP, which has none.
     pub(super) fn set_multipliers(
         &mut self,
@@ -162,6 +196,8 @@ impl RecordedSolver {
             (Self::AugmentedLagrangian(solver), Call::Solve { xs, us }) => solver.solve(problem, xs, us),
             (Self::Fddp(solver), Call::ResumeToFullStep { most }) => solver.resume_to_full_step(problem, *most),
             (Self::InteriorPoint(solver), Call::Tick { sweeps }) => solver.tick(problem, *sweeps),
+            (Self::Fddp(solver), Call::Feedback { x0, most }) => solver.feedback(problem, x0, *most),
+            (Self::InteriorPoint(solver), Call::Feedback { x0, .. }) => solver.feedback(problem, x0),
             (Self::Fddp(solver), _) => solver.resume(problem),
             (Self::InteriorPoint(solver), _) => solver.resume(problem),
             (Self::AugmentedLagrangian(solver), _) => solver.resume(problem),

@@ -304,6 +304,17 @@ impl AugmentedLagrangian {
         Ok(passed)
     }
 
+    /// Forgets the last trajectory, its multipliers and the penalty, and starts anew from the state `x0`, as
+    /// [`Fddp::reset`](crate::Fddp::reset) does; [`resume`](Self::resume) follows. Allocates.
+    ///
+    /// # Errors
+    /// The same errors as [`Fddp::reset`](crate::Fddp::reset).
+    pub fn reset(&mut self, problem: &mut Problem, x0: &[f64]) -> Result<(), Error> {
+        self.solver.reset(problem, &self.inner, x0)?;
+        (self.kept, self.lost) = (Kept::default(), false);
+        Ok(())
+    }
+
     /// Sets the multipliers of the limit `name`, one list for each knot 0 … N, which is empty at a knot without this
     /// limit. The result of [`Outcome::multipliers_of`] has this form. The next [`solve`](Self::solve) or
     /// [`resume`](Self::resume) starts from them. Other limits keep the multipliers of the last solve; without a

@@ -111,8 +111,12 @@ impl Fddp {
     ///
     /// A trajectory is lost if it is not finite, or if its cost exceeds the cost c of the last solution by more than 10
     /// (1 + |c|). A lost trajectory is replaced by x̂₀ at all knots and the controls that hold x̂₀ still, if the
-    /// replacement costs less. If the last solve ran out of time or iterations after a rejected step, the
-    /// regularisation starts at its last value.
+    /// replacement costs less; [`Solution::fallback`] says so. If the last solve ran out of time or iterations after a
+    /// rejected step, the regularisation starts at its last value, otherwise at
+    /// [`regularisation_start`](Settings::regularisation_start).
+    ///
+    /// After a last step of length α < 1, the solution begins at x̄₀ = x̂₀ ⊕ (α − 1) f₀, not at x̂₀: the step keeps the
+    /// fraction 1 − α of the gap f₀ before it.
     ///
     /// # Errors
     /// The same errors as [`solve`](Self::solve).
@@ -155,6 +159,68 @@ impl Fddp {
         mut observer: impl Observer,
     ) -> Result<&Solution, Error> {
         self.run_pass(problem, None, Pass { to_full_step: Some(most.max(1)), ..Pass::default() }, &mut observer)
+    }
+
+    /// Makes the first half of an iteration, before the state arrives: derivatives and sweep along the trajectory of the
+    /// last solve. [`feedback`](Self::feedback) makes the second half. This is the real-time iteration scheme: call
+    /// [`shift`](Self::shift), set references, and `prepare`; then wait for the state.
+    ///
+    /// The prediction is the first state x̄₀ of the trajectory; it becomes the problem's initial state. Until
+    /// `feedback`, the problem must not change. A direction that is not found is reported by `feedback`.
+    ///
+    /// # Errors
+    /// The same errors as [`resume`](Self::resume).
+    pub fn prepare(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        self.prepare_with(problem, |_: &Iteration| {})
+    }
+
+    /// Prepares as [`prepare`](Self::prepare) does. The observer may end the preparation; it receives no iterations.
+    ///
+    /// # Errors
+    /// The same errors as [`resume`](Self::resume).
+    pub fn prepare_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<(), Error> {
+        self.solver.prepare(problem, &self.settings, &mut Watch::new(&mut observer))
+    }
+
+    /// Sets the initial state to the measured state `x0`, and completes the [prepared](Self::prepare) iteration with
+    /// its gap x̂₀ ⊖ x̄₀ and rollouts. If the step is shorter than 1, further whole iterations follow, until a step of
+    /// length 1 or `most` iterations.
+    ///
+    /// The result is, to the bit, the result of [`Problem::set_x0`] and
+    /// [`resume_to_full_step`](Self::resume_to_full_step), wherever `x0` is: the sweep does not contain the initial
+    /// state. The only exception is a lost trajectory (see [`resume`](Self::resume)), which is replaced by the
+    /// prediction held still. The time budget applies to this call alone; [`timings`](Solution::timings) contain both.
+    ///
+    /// # Errors
+    /// [`Error::NothingPrepared`] if `prepare` was not called since the last solve, shift or feedback. The errors of
+    /// [`Problem::set_x0`], for example if a number is not finite; the preparation is then kept.
+    pub fn feedback(&mut self, problem: &mut Problem, x0: &[f64], most: usize) -> Result<&Solution, Error> {
+        self.feedback_with(problem, x0, most, |_: &Iteration| {})
+    }
+
+    /// Makes the second half as [`feedback`](Self::feedback) does, and passes each iteration to `observer`.
+    ///
+    /// # Errors
+    /// The same errors as [`feedback`](Self::feedback).
+    pub fn feedback_with(
+        &mut self,
+        problem: &mut Problem,
+        x0: &[f64],
+        most: usize,
+        mut observer: impl Observer,
+    ) -> Result<&Solution, Error> {
+        self.solver.feedback(problem, &self.settings, x0, most, &mut Watch::new(&mut observer))?;
+        Ok(self.solution())
+    }
+
+    /// Forgets the last trajectory and starts anew from the state `x0`, which becomes the initial state of the problem.
+    /// The new trajectory has `x0` at all knots, the controls that hold it still, and no gains. This is the recovery
+    /// after [`Status::NotFinite`]; [`resume`](Self::resume) or [`prepare`](Self::prepare) follow. Allocates.
+    ///
+    /// # Errors
+    /// The errors of [`Problem::set_x0`]. [`Error::Dimension`] if the problem has other dimensions than the solver.
+    pub fn reset(&mut self, problem: &mut Problem, x0: &[f64]) -> Result<(), Error> {
+        self.solver.reset(problem, &self.settings, x0)
     }
 
     /// Turns the solution into a warm start for a problem that has since been [shifted](Problem::shift) by one knot.

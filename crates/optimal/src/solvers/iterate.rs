@@ -76,6 +76,16 @@ impl Iterate {
         max_abs(&self.gaps)
     }
 
+    /// Computes the gap f₀ = x̂₀ ⊖ x₀ alone; returns the largest gap ‖f‖∞ of all knots.
+    pub(super) fn update_first_gap(&mut self, problem: &Problem) -> f64 {
+        let (x, gap) = (&self.solution.xs[..problem.nx()], &mut self.gaps[..problem.ndx()]);
+        match x == problem.x0() {
+            true => gap.fill(0.0),
+            false => problem.action(0).difference(x, problem.x0(), gap),
+        }
+        max_abs(&self.gaps)
+    }
+
     /// Computes the gaps of a trajectory with the states `xs` and the next states `next`.
     pub(super) fn write_gaps(problem: &Problem, xs: &[f64], next: &[f64], gaps: &mut [f64]) {
         let shape = problem.shape();

@@ -132,6 +132,7 @@ impl SolverLoop {
         problem.check_knots(knot_models, durations)?;
         let passed = self.retiming.record(problem, elapsed, knot_models, durations)?;
         problem.move_knots(passed, knot_models, durations);
+        self.prepared = None;
         self.fit(problem);
         self.resample(problem, settings);
         Ok(passed)

@@ -15,7 +15,8 @@ use std::time::Duration;
 /// lowest cost. An iterate within the bounds on controls is better than a warm start outside the bounds. An iterate has
 /// diverged, and is not a candidate, if its cost exceeds the lowest cost of the solve by more than 1e8·(1 + |lowest|).
 ///
-/// A controller with a period asks whether it may execute the solution, with u = ūₜ + Kₜ (x ⊖ x̄ₜ):
+/// A controller with a period asks whether it may execute the solution, with u = ūₜ + Kₜ (x ⊖ x̄ₜ).
+/// [`Solution::is_executable`] answers it from the numbers:
 /// - after [`Converged`](Self::Converged) and [`FullStep`](Self::FullStep), yes: x̄₀ = x̂₀, and the trajectory satisfies
 ///   the dynamics,
 /// - after [`MaxIterations`](Self::MaxIterations), [`TimeLimit`](Self::TimeLimit),
@@ -23,7 +24,8 @@ use std::time::Duration;
 ///   numbers are finite, but the trajectory may have gaps ([`Solution::gap`]), with x̄₀ ≠ x̂₀. The feedback then acts
 ///   on the deviation from x̄₀. If the trace is empty, no iteration was made, and the gains are the gains of the solve
 ///   before it,
-/// - after [`NotFinite`](Self::NotFinite), no: continue with the previous solution,
+/// - after [`NotFinite`](Self::NotFinite), no: continue with the previous solution, and
+///   [`reset`](crate::Fddp::reset) the solver,
 /// - after [`ConstraintsViolated`](Self::ConstraintsViolated) and [`Infeasible`](Self::Infeasible), only if the
 ///   violation in [`Outcome::worst`](crate::Outcome::worst) is acceptable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,6 +97,30 @@ impl fmt::Display for Status {
             Self::Infeasible => "no trajectory satisfies the constraints",
             Self::NotFinite => "cost or derivatives are not finite",
         })
+    }
+}
+
+/// Trajectory that replaced the trajectory of the last solution, because that trajectory could not be continued.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
+pub enum Fallback {
+    /// Rollout of the last plan from x̂₀ with its gains. It replaces a plan whose gaps exceed 10 (rad, m, rad/s, m/s).
+    /// It is also the plan after a tick whose sweep failed.
+    RolledOut,
+    /// x̂₀ at all knots, and the controls that hold x̂₀ still. They replace a plan that is not finite, or that costs far
+    /// more than the last solution.
+    HeldStill,
+}
+
+impl Fallback {
+    /// Returns the name in files and in Python: `"rolled_out"` or `"held_still"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RolledOut => "rolled_out",
+            Self::HeldStill => "held_still",
+        }
     }
 }
 
@@ -185,6 +211,9 @@ pub struct Solution {
     pub regularisation: f64,
     /// Outcome of the solve.
     pub status: Status,
+    /// Trajectory with which the solve replaced the trajectory of the last solution; `None` if it was continued.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub fallback: Option<Fallback>,
     /// Record of each iteration.
     pub trace: Vec<Iteration>,
     /// Durations of the phases.
@@ -207,6 +236,7 @@ impl Solution {
             feasible: false,
             regularisation: 0.0,
             status: Status::MaxIterations,
+            fallback: None,
             trace: Vec::new(),
             timings: Timings::default(),
             shape,
@@ -233,6 +263,16 @@ impl Solution {
         let horizon = self.shape.horizon();
         assert!(t < horizon, "`t` is {t}, expected less than {horizon}: knot {horizon} has no controls");
         &self.us[self.shape.u(t)]
+    }
+
+    /// Returns whether a controller may execute the plan: the status is not [`Status::NotFinite`], and all states,
+    /// controls and gains are finite. The plan may still have [gaps](Self::gap), or violate limits
+    /// ([`Outcome::worst`](crate::Outcome::worst)). If the plan is not executable, continue with the last one that was,
+    /// and [`reset`](crate::Fddp::reset) the solver.
+    pub fn is_executable(&self) -> bool {
+        let finite = |numbers: &[f64]| numbers.iter().all(|x| x.is_finite());
+        let has_gains = self.K.iter().all(|K| finite(K.as_slice()));
+        self.status != Status::NotFinite && finite(&self.xs) && finite(&self.us) && has_gains
     }
 
     /// Returns the first regularisation of a resumed solve. This is `start`, unless the last solve ran out of time or

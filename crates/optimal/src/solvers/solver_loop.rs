@@ -8,6 +8,7 @@
 
 use super::best::{Best, Merit};
 use super::iterate::Iterate;
+use super::prepared::Prepared;
 use super::retime::Retiming;
 use super::search::{LineSearch, Search, Surroundings};
 use super::settings::{DdpMethod, Settings};
@@ -44,6 +45,8 @@ pub(super) struct SolverLoop {
     pub(super) renewed: bool,
     /// Old plan of a retiming.
     pub(super) retiming: Retiming,
+    /// First half of an iteration, which a state completes.
+    pub(super) prepared: Option<Prepared>,
 }
 
 /// Options of a pass that the calling solver sets, in addition to the settings.
@@ -74,9 +77,10 @@ impl Pass {
 }
 
 /// Variables that one iteration passes to the next.
-struct Progress {
+#[derive(Debug, Clone)]
+pub(super) struct Progress {
     /// Merit of the iterate.
-    merit: Merit,
+    pub(super) merit: Merit,
     /// Whether the iterate before the last accepted step was feasible.
     was_feasible: bool,
     /// Whether this pass has computed gains.
@@ -103,6 +107,7 @@ impl SolverLoop {
             started: false,
             renewed: false,
             retiming: Retiming::default(),
+            prepared: None,
         }
     }
 
@@ -117,6 +122,7 @@ impl SolverLoop {
         warm_start: Option<[&[f64]; 2]>,
     ) -> Result<(), Error> {
         let solution = &mut self.iterate.solution;
+        self.prepared = None;
         if let Some([xs, us]) = warm_start {
             solution.shape().check(problem.shape())?;
             Error::check("xs", xs, solution.xs.len())?;
@@ -132,6 +138,7 @@ impl SolverLoop {
         }
         settings.check()?;
         solution.shape().check(problem.shape())?;
+        solution.fallback = None;
         if self.knots[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.knots) {
             self.sweep = Sweep::new(&self.knots); // `new` was called with a problem without inverse-dynamics form
         }
@@ -154,6 +161,15 @@ impl SolverLoop {
         pass: Pass,
         watch: &mut Watch<'_>,
     ) -> Status {
+        let mut now = self.start_pass(problem, settings, pass);
+        let status = self.make_iterations(problem, settings, pass, &mut now, None, watch);
+        self.clock.end_guarantee();
+        self.finish(problem, settings, now, status);
+        status
+    }
+
+    /// Evaluates the current trajectory, from which a pass starts.
+    pub(super) fn start_pass(&mut self, problem: &mut Problem, settings: &Settings, pass: Pass) -> Progress {
         let solution = &mut self.iterate.solution;
         if self.bounded && settings.project_warm_start {
             solution.project(problem, 0..problem.horizon());
@@ -178,13 +194,7 @@ impl SolverLoop {
         let bounded = !self.bounded || self.iterate.solution.is_bounded(problem);
         let feasible = self.bounded && pass.trusts_start && gap == 0.0 && self.iterate.solution.touches_bounds(problem);
         let merit = Merit { gap, cost, feasible, bounded, steps: 0, regularisation };
-        let mut now = Progress { merit, was_feasible: false, swept: false, swept_best: false };
-        let tolerance = if self.bounded { settings.tolerance_bounded } else { settings.tolerance };
-        let pass = Pass { tolerance: pass.tolerance.or(Some(tolerance)), ..pass };
-        let status = self.make_iterations(problem, settings, pass, &mut now, watch);
-        self.clock.end_guarantee();
-        self.finish(problem, settings, now, status);
-        status
+        Progress { merit, was_feasible: false, swept: false, swept_best: false }
     }
 
     /// Ends a solve: completes its timings, and returns the solution.
@@ -193,26 +203,30 @@ impl SolverLoop {
         &self.iterate.solution
     }
 
-    /// Makes iterations until there is a reason to stop.
-    fn make_iterations(
+    /// Makes iterations until there is a reason to stop. The first iteration has the search direction `direction`, if
+    /// it is given.
+    pub(super) fn make_iterations(
         &mut self,
         problem: &mut Problem,
         settings: &Settings,
         pass: Pass,
         now: &mut Progress,
+        mut direction: Option<Result<(), Status>>,
         watch: &mut Watch<'_>,
     ) -> Status {
         if !(now.merit.cost.is_finite() && now.merit.gap.is_finite()) {
             return Status::NotFinite;
         }
-        let tolerance = pass.tolerance.unwrap_or(settings.tolerance);
+        let usual = if self.bounded { settings.tolerance_bounded } else { settings.tolerance };
+        let tolerance = pass.tolerance.unwrap_or(usual);
         let mut search = Search::default();
         for iteration in 0..pass.most(settings) {
             if search.accepted {
                 now.merit.gap = self.iterate.update_gaps(problem);
             }
             let is_new = search.accepted || iteration == 0;
-            if let Err(status) = self.find_direction(problem, settings, now, is_new, watch) {
+            let known = direction.take();
+            if let Err(status) = known.unwrap_or_else(|| self.find_direction(problem, settings, now, is_new, watch)) {
                 return status;
             }
             let Self { iterate, line_search, best, sweep, clock, .. } = self;
@@ -264,7 +278,7 @@ impl SolverLoop {
     ///
     /// # Errors
     /// The reason to stop, if no direction was found or no time is left.
-    fn find_direction(
+    pub(super) fn find_direction(
         &mut self,
         problem: &mut Problem,
         settings: &Settings,
@@ -387,7 +401,7 @@ impl SolverLoop {
     }
 
     /// Completes the solution at the end of a pass, from the last iterate or a better one.
-    fn finish(&mut self, problem: &mut Problem, settings: &Settings, mut now: Progress, status: Status) {
+    pub(super) fn finish(&mut self, problem: &mut Problem, settings: &Settings, mut now: Progress, status: Status) {
         let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
         now.merit.gap = infinite_if_nan(self.iterate.update_gaps(problem));
         now.merit.cost = infinite_if_nan(self.iterate.solution.cost);

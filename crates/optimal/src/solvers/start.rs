@@ -3,6 +3,7 @@
 
 use super::iterate::Iterate;
 use super::settings::Settings;
+use super::solution::{Fallback, Status};
 use super::solver_loop::SolverLoop;
 use crate::error::Error;
 use crate::lq::{LqKnot, Sweep};
@@ -50,6 +51,7 @@ impl SolverLoop {
         let start_cost = self.iterate.solution.cost;
         let is_finite = start_gap.is_finite() && start_cost.is_finite();
         if is_finite && !(gap.is_finite() && start_cost >= cost) {
+            self.iterate.solution.fallback = Some(Fallback::HeldStill);
             return start_gap;
         }
         (self.iterate.solution.xs, self.iterate.solution.us) = (xs, us);
@@ -62,6 +64,7 @@ impl SolverLoop {
     /// [`Error`] if the numbers of knots, states and controls differ from the numbers of the last problem, shifted
     /// once.
     pub(super) fn shift(&mut self, problem: &mut Problem, settings: &Settings) -> Result<(), Error> {
+        self.prepared = None;
         let Iterate { solution, next, .. } = &mut self.iterate;
         let (old, new) = (solution.shape(), problem.shape());
         let (horizon, ndx) = (new.horizon(), new.ndx);
@@ -100,6 +103,30 @@ impl SolverLoop {
         if next.iter().all(|x| x.is_finite()) {
             solution.xs[end].copy_from_slice(next);
         }
+        Ok(())
+    }
+
+    /// Starts anew from x̂₀ = `x0`: see [`Fddp::reset`](crate::Fddp::reset).
+    ///
+    /// # Errors
+    /// The errors of [`Problem::set_x0`]. [`Error::Dimension`] if the problem has other dimensions than the solver.
+    pub(super) fn reset(&mut self, problem: &mut Problem, settings: &Settings, x0: &[f64]) -> Result<(), Error> {
+        self.iterate.solution.shape().check(problem.shape())?;
+        problem.set_x0(x0)?;
+        let [xs, us] = quasi_static_start(problem)?;
+        let finite_or_zero = |u: f64| if u.is_finite() { u } else { 0.0 };
+        let solution = &mut self.iterate.solution;
+        solution.xs.copy_from_slice(&xs);
+        solution.us.iter_mut().zip(us).for_each(|(to, u)| *to = finite_or_zero(u));
+        if settings.project_warm_start {
+            solution.project(problem, 0..problem.horizon());
+        }
+        solution.K.iter_mut().for_each(|gains| gains.fill(0.0));
+        solution.k.iter_mut().for_each(|k| k.fill(0.0));
+        solution.trace.clear();
+        (solution.cost, solution.gap, solution.feasible) = (f64::INFINITY, f64::INFINITY, false);
+        (solution.status, solution.fallback) = (Status::MaxIterations, Some(Fallback::HeldStill));
+        (self.started, self.renewed, self.prepared) = (true, true, None);
         Ok(())
     }
 }

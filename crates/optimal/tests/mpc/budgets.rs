@@ -17,12 +17,12 @@ const SANE: f64 = 50.0;
 /// Unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1 s. Under a constant control, its state triples in 6
 /// knots. The fields `delay` and `broken` make its derivatives sleep or become NaN.
 #[derive(Clone)]
-struct Unstable {
-    nu: usize,
+pub(super) struct Unstable {
+    pub(super) nu: usize,
     /// Time for which the next call of `calc_diff` sleeps (ms).
-    delay: Arc<AtomicU64>,
+    pub(super) delay: Arc<AtomicU64>,
     /// Whether derivatives are NaN.
-    broken: Arc<AtomicU64>,
+    pub(super) broken: Arc<AtomicU64>,
 }
 
 impl ActionModel for Unstable {

@@ -4,6 +4,7 @@
 mod filter;
 mod iterations;
 mod kkt;
+mod prepared;
 mod restoration;
 mod settings;
 mod slacks;
@@ -12,7 +13,7 @@ mod tick;
 
 use super::outcome::{Outcome, Violation, ViolationKind};
 use super::settings::Settings;
-use super::solution::{Iteration, Solution, Status};
+use super::solution::{Fallback, Iteration, Solution, Status};
 use super::solver_loop::SolverLoop;
 use super::start::{is_lost, quasi_static_start};
 use super::watch::{Observer, Recent, Watch};
@@ -23,6 +24,7 @@ use crate::time::Instant;
 use condyle_linalg::max_abs;
 use filter::Filter;
 use kkt::{Adjoint, Coordinates, Kkt};
+use prepared::PreparedTick;
 pub use settings::InteriorPointSettings;
 use slacks::Slacks;
 use step::{Step, Trial};
@@ -151,6 +153,8 @@ pub struct InteriorPoint {
     outcome: Outcome,
     step: Step,
     trial: Trial,
+    /// Planned state of knot 0, before x̂₀ replaced it.
+    planned: Vec<f64>,
     /// Barrier parameter μ.
     mu: f64,
     /// Residuals of the optimality conditions, measured last.
@@ -161,6 +165,8 @@ pub struct InteriorPoint {
     is_warm: bool,
     /// Whether multipliers were set since the last solve, so that also a new trajectory starts from them.
     is_given: bool,
+    /// First part of a tick, which a state completes.
+    prepared: Option<PreparedTick>,
 }
 
 impl InteriorPoint {
@@ -175,11 +181,13 @@ impl InteriorPoint {
             outcome: Outcome::default(),
             step: Step::new(problem),
             trial: Trial::new(problem),
+            planned: problem.x0().to_vec(),
             mu: 0.0,
             kkt: Kkt::default(),
             finishing: Recent::default(),
             is_warm: false,
             is_given: false,
+            prepared: None,
         }
     }
 
@@ -236,6 +244,7 @@ impl InteriorPoint {
     /// once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         let settings = self.settings.shared()?;
+        self.prepared = None;
         self.solver.shift(problem, &settings)?;
         self.step.reshape(problem);
         self.trial.reshape(problem);
@@ -263,6 +272,7 @@ impl InteriorPoint {
         let passed = self.solver.retime(problem, &settings, elapsed, knot_models, durations)?;
         self.step.reshape(problem);
         self.trial.reshape(problem);
+        self.prepared = None;
         if self.is_warm {
             self.slacks.retime(problem, &self.solver.retiming)?;
         }
@@ -275,7 +285,12 @@ impl InteriorPoint {
     /// used up; one step is always made. The gains belong to the last step.
     ///
     /// The status of the solution is [`Status::MaxIterations`] if all steps were made, and [`Status::Converged`] if the
-    /// quadratic program is solved. The cost of the solution is the cost of the trajectory before the tick.
+    /// quadratic program is solved. The plan begins at x̄₀ = x̂₀. The cost of the solution is the cost of the trajectory
+    /// before the tick.
+    ///
+    /// If a sweep fails, the plan is a rollout of the last plan from x̂₀ with its gains. The status is then
+    /// [`Status::RegularisationLimit`], and [`Solution::fallback`] says so. If the rollout diverges, too, the status is
+    /// [`Status::NotFinite`]: see [`Solution::is_executable`].
     ///
     /// # Errors
     /// The same errors as [`resume`](Self::resume).
@@ -304,6 +319,19 @@ impl InteriorPoint {
         Ok(self.solver.end(&settings, &watch))
     }
 
+    /// Forgets the last trajectory and its multipliers, and starts anew from the state `x0`, as
+    /// [`Fddp::reset`](crate::Fddp::reset) does. This is the recovery after [`Status::NotFinite`];
+    /// [`resume`](Self::resume), [`tick`](Self::tick) or [`prepare`](Self::prepare) follow. Allocates.
+    ///
+    /// # Errors
+    /// The same errors as [`Fddp::reset`](crate::Fddp::reset).
+    pub fn reset(&mut self, problem: &mut Problem, x0: &[f64]) -> Result<(), Error> {
+        let settings = self.settings.shared()?;
+        self.solver.reset(problem, &settings, x0)?;
+        (self.is_warm, self.is_given, self.prepared, self.mu) = (false, false, None, 0.0);
+        Ok(())
+    }
+
     /// Sets the multipliers of the limit `name`, one list for each knot 0 … N, which is empty at a knot without this
     /// limit. The result of [`Outcome::multipliers_of`] has this form. The next [`solve`](Self::solve),
     /// [`resume`](Self::resume) or [`tick`](Self::tick) starts from them. Other limits keep the multipliers of the last
@@ -322,6 +350,7 @@ impl InteriorPoint {
         multipliers: &[impl AsRef<[f64]>],
     ) -> Result<(), Error> {
         let given = problem.check_multipliers(name, multipliers)?;
+        self.prepared = None;
         let rows = self.slacks.len();
         self.slacks.arrange(problem)?;
         if !self.is_warm || self.slacks.len() != rows {
@@ -370,6 +399,7 @@ impl InteriorPoint {
         warm_start: Option<[&[f64]; 2]>,
         watch: &Watch<'_>,
     ) -> Result<f64, Error> {
+        self.prepared = None;
         self.solver.begin(problem, settings, warm_start)?;
         self.is_warm &= warm_start.is_none() || self.is_given;
         self.is_given = false;
@@ -381,7 +411,9 @@ impl InteriorPoint {
         let solution = &mut self.solver.iterate.solution;
         solution.trace.clear();
         solution.trace.reserve(settings.max_iterations.min(1000));
-        solution.xs[..problem.nx()].copy_from_slice(problem.x0());
+        let first = &mut solution.xs[..problem.nx()];
+        self.planned.copy_from_slice(first);
+        first.copy_from_slice(problem.x0());
         self.solver.sweep.keep_values(false);
         self.solver.best.start();
         let last_cost = solution.cost;
@@ -398,11 +430,14 @@ impl InteriorPoint {
         let cost_of_rollout = self.roll_out(problem);
         if is_broken && !is_lost(cost_of_rollout, max_abs(self.trial.gaps()), last_cost) {
             self.accept_trial(cost_of_rollout);
+            self.solver.iterate.solution.fallback = Some(Fallback::RolledOut);
         } else if let Ok([xs, us]) = quasi_static_start(problem) {
             self.trial.set(&xs, &us);
             let start_cost = self.evaluate_trial(problem);
             if start_cost.is_finite() && (is_broken || !(gap.is_finite() && start_cost >= cost)) {
                 self.accept_trial(start_cost);
+                self.planned.copy_from_slice(problem.x0());
+                self.solver.iterate.solution.fallback = Some(Fallback::HeldStill);
                 self.is_warm = false;
             }
         }

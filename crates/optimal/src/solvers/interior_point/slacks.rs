@@ -75,6 +75,8 @@ pub(super) struct Slacks {
     old: (Vec<usize>, [Vec<f64>; 4]),
     /// Numbers of constraints before a retiming.
     old_counts: Vec<usize>,
+    /// Numbers s, z and y before a tick.
+    saved: [Vec<f64>; 4],
 }
 
 /// Residuals of all rows at an iterate.
@@ -221,6 +223,23 @@ impl Slacks {
         let Barrier { s, z: [zl, zu], .. } = &self.barrier;
         for (old, now) in numbers.iter_mut().zip([s, zl, zu, &self.y]) {
             old.clone_from(now);
+        }
+    }
+
+    /// Saves s, z and y. Allocates only if there were never as many rows.
+    pub(super) fn save(&mut self) {
+        let Self { barrier: Barrier { s, z: [zl, zu], .. }, y, saved, .. } = self;
+        for (saved, now) in saved.iter_mut().zip([s, zl, zu, y]) {
+            saved.clone_from(now);
+        }
+    }
+
+    /// Takes back the s, z and y that were saved for the same rows. [`resume`](Self::resume) computes what follows from
+    /// them.
+    pub(super) fn restore(&mut self) {
+        let Self { barrier: Barrier { s, z: [zl, zu], .. }, y, saved, .. } = self;
+        for (saved, now) in saved.iter().zip([s, zl, zu, y]) {
+            now.clone_from(saved);
         }
     }
 

@@ -6,7 +6,7 @@ use crate::lq::{CurvatureFn, DIVERGED, Forward, Hessian, LqKnot, SweepError, Swe
 use crate::problem::{ActionModel, Evaluation, Problem};
 use crate::solvers::iterate::{Iterate, Sum};
 use crate::solvers::settings::Settings;
-use crate::solvers::solution::Solution;
+use crate::solvers::solution::{Solution, Status};
 use crate::solvers::solver_loop::SolverLoop;
 use crate::solvers::watch::Phase;
 use crate::time::Instant;
@@ -125,16 +125,17 @@ impl InteriorPoint {
         sum.value()
     }
 
-    /// Rolls out the trajectory from x̂₀ with its gains, x⁺ = φ(x, ū + K (x ⊖ x̄)), into the trial. Returns its cost,
-    /// which is infinite or NaN if the motion diverges.
+    /// Rolls out the trajectory from x̂₀ with its gains, x⁺ = φ(x, ū + K (x ⊖ x̄)), into the trial. x̄₀ is the planned
+    /// state. Returns the cost, which is infinite or NaN if the motion diverges.
     pub(super) fn roll_out(&mut self, problem: &mut Problem) -> f64 {
-        let Self { solver: SolverLoop { iterate: Iterate { solution, .. }, .. }, trial, .. } = self;
+        let Self { solver: SolverLoop { iterate: Iterate { solution, .. }, .. }, trial, planned, .. } = self;
         let shape = problem.shape().clone();
         let Trial { xs, us, next, gaps, .. } = trial;
         xs[..shape.nx].copy_from_slice(problem.x0());
         for t in 0..shape.horizon() {
             let (x, u, dx) = (&xs[shape.x(t)], &mut us[shape.u(t)], &mut gaps[..shape.ndx]);
-            problem.action(t).difference(&solution.xs[shape.x(t)], x, dx);
+            let nominal = if t == 0 { &planned[..] } else { &solution.xs[shape.x(t)] };
+            problem.action(t).difference(nominal, x, dx);
             u.copy_from_slice(&solution.us[shape.u(t)]);
             add_scaled_product(u, 1.0, View::new(solution.K[t].as_slice(), shape.nu(t)), dx);
             let next = &mut next[shape.x(t)];
@@ -247,14 +248,22 @@ impl InteriorPoint {
         (cost, Measure { theta, cost: cost + of_soft, logarithms })
     }
 
-    /// Moves the trajectory by the combined step, without evaluating it.
-    pub(super) fn apply_sum(&mut self, problem: &Problem) {
+    /// Moves the trajectory by the combined step, without evaluating it. Its first state becomes x̂₀.
+    ///
+    /// # Errors
+    /// [`Status::NotFinite`] if a number of the new trajectory is not finite; then the trajectory does not move.
+    pub(super) fn apply_sum(&mut self, problem: &Problem) -> Result<(), Status> {
         let Self { solver: SolverLoop { iterate, renewed, .. }, trial, step, .. } = self;
         let [dx, du] = &step.sum;
         move_by(problem, &iterate.solution, 1.0, [dx, du], trial);
+        trial.xs[..problem.nx()].copy_from_slice(problem.x0());
+        if !trial.xs.iter().chain(&trial.us).all(|x| x.is_finite()) {
+            return Err(Status::NotFinite);
+        }
         std::mem::swap(&mut trial.xs, &mut iterate.solution.xs);
         std::mem::swap(&mut trial.us, &mut iterate.solution.us);
         *renewed = true;
+        Ok(())
     }
 }
 
