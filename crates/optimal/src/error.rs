@@ -180,7 +180,7 @@ pub enum Error {
     /// A contact does not fit the robot, or conflicts with a contact before it.
     #[error("contact `{name}`: {what}")]
     Contact {
-        /// Name of the contact, or of a quantity that all contacts share.
+        /// Name of the contact.
         name: String,
         /// Description of the fault, including the invalid numbers.
         what: String,
@@ -217,7 +217,7 @@ pub enum Error {
     /// A setting is outside its valid range.
     #[error("setting `{name}` is {value}, but it must be {allowed}")]
     Setting {
-        /// Name of the field of [`Settings`](crate::Settings).
+        /// Name of the field of [`Settings`](crate::Settings), or `damping` or `restitution` of contacts.
         name: &'static str,
         /// Value of the setting.
         value: f64,

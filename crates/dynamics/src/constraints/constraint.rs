@@ -7,7 +7,7 @@ use alloc::borrow::ToOwned;
 use alloc::format;
 use alloc::string::String;
 use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
-use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, same_layout};
+use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, Vec3, same_layout};
 use core::any::Any;
 
 /// Kind of a constraint. The kind determines which motions of a frame the constraint prevents.
@@ -262,18 +262,57 @@ impl ContactConstraint {
         if let Some(what) = self.target.wrong() {
             return wrong(what.to_owned());
         }
-        if !self.axes.is_rotation() {
-            return wrong("its axes are no rotation: expected three unit vectors at right angles".to_owned());
+        if let Some(what) = wrong_axes(&self.axes) {
+            return wrong(what);
         }
         if matches!(self.kind, ConstraintKind::Point | ConstraintKind::Rigid) && self.axes != Mat3::identity() {
             return wrong("its axes must be the identity: only lines and planes have axes of their own".to_owned());
         }
-        let what = |c: &Self| (c.frame, c.other, c.kind, c.axes);
-        let same = |c: &Self| what(c) == what(self);
-        if let Some(twin) = before.iter().position(same) {
+        if let Some(twin) = before.iter().position(|c| c.repeats(self)) {
             return wrong(format!("it holds frame `{}` as constraint {twin} does already", frame.name));
         }
         Ok(bodies)
+    }
+
+    /// Returns whether both constraints hold the same frame to the same other frame in the same way: both hold a point
+    /// or a whole frame, or a point along the same directions. A [`ConstraintSet`](crate::ConstraintSet) refuses such
+    /// constraints.
+    ///
+    /// ```
+    /// use condyle_dynamics::{ContactConstraint, Mat3, Vec3};
+    /// let up = ContactConstraint::line(3);
+    /// let turned = Mat3 { x: Vec3::new(0.0, 1.0, 0.0), y: Vec3::new(1.0, 0.0, 0.0), z: Vec3::new(0.0, 0.0, -1.0) };
+    /// assert!(up.repeats(&ContactConstraint { axes: turned, ..up }));
+    /// assert!(!up.repeats(&ContactConstraint::plane(3)));
+    /// ```
+    pub fn repeats(&self, other: &Self) -> bool {
+        let held = |c: &Self| (c.frame, c.other, c.kind);
+        let parallel = |a: Vec3<f64>, b: Vec3<f64>| a.cross(b).norm_squared() < SAME_DIRECTION * SAME_DIRECTION;
+        let (a, b, aligned) = (&self.axes, &other.axes, self.reference == other.reference);
+        held(self) == held(other)
+            && match self.kind {
+                ConstraintKind::Line => aligned && parallel(a.z, b.z),
+                ConstraintKind::Plane => aligned && parallel(a.y, b.y),
+                ConstraintKind::Point | ConstraintKind::Rigid => true,
+            }
+    }
+}
+
+/// Largest sine of the angle between two directions that count as the same. It is larger than the errors of axes that a
+/// file gives with six digits, and an angle at which forces along both directions are useless.
+const SAME_DIRECTION: f64 = 1e-5;
+
+/// Returns an error message if the axes of a constraint are no rotation.
+fn wrong_axes(axes: &Mat3<f64>) -> Option<String> {
+    let error = axes.rotation_error();
+    if axes.is_rotation() {
+        None
+    } else if !error.is_finite() {
+        Some("its axes are not finite".to_owned())
+    } else if (Mat3 { z: -axes.z, ..*axes }).is_rotation() {
+        Some("its axes are left-handed: expected e₁ × e₂ = e₃, found −e₃".to_owned())
+    } else {
+        Some(format!("its axes are no unit vectors at right angles: the largest deviation is {error:.1e}"))
     }
 }
 

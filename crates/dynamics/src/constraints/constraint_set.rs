@@ -89,7 +89,8 @@ impl<S: Scalar> ConstraintSet<S> {
     /// # Errors
     /// Returns [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a
     /// reference frame is `World`, or a gain is negative or not finite. The same error is returned if a target or its
-    /// rotation is invalid, `axes` are invalid for the kind, or two constraints are equal.
+    /// rotation is invalid, `axes` are invalid for the kind, or one constraint
+    /// [repeats](ContactConstraint::repeats) another.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));

@@ -5,8 +5,8 @@ use crate::common;
 use common::contacts::{cases, random_constraint};
 use common::{State, Worst, all_models, dual, lift, moved, normal, rng};
 use condyle_dynamics::{
-    Act, ConstraintKind, ConstraintSet, ContactConstraint, Data, Error, Force, Inertia, Joint, Model, ModelBuilder,
-    Motion, ProximalSettings, ReferenceFrame, Se3, Sym3, Target, Vec3, WORLD, aba, constrained_dynamics,
+    Act, ConstraintKind, ConstraintSet, ContactConstraint, Data, Error, Force, Inertia, Joint, Mat3, Model,
+    ModelBuilder, Motion, ProximalSettings, ReferenceFrame, Se3, Sym3, Target, Vec3, WORLD, aba, constrained_dynamics,
     constrained_dynamics_derivatives, crba, forward_accelerations, forward_kinematics, forward_velocities,
     impulse_dynamics, impulse_dynamics_derivatives, lie, minv, rnea, robots,
 };
@@ -338,6 +338,12 @@ fn what_cannot_be_is_refused() {
     let model = robots::quadruped();
     let [foot, trunk] = ["LF_foot", "trunk"].map(|name| model.frame(name).unwrap());
     let (point, none) = (ContactConstraint::point(foot), model.frames().len());
+    let (line, plane) = (ContactConstraint::line(foot), ContactConstraint::plane(foot));
+    let axes = |diagonal: &[f64; 3]| {
+        let [x, y, z] = *diagonal;
+        Mat3 { x: Vec3::new(x, 0.0, 0.0), y: Vec3::new(0.0, y, 0.0), z: Vec3::new(0.0, 0.0, z) }
+    };
+    const LEFT: &str = "its axes are left-handed: expected e₁ × e₂ = e₃, found −e₃";
     let refused = |constraints: &[ContactConstraint]| match ConstraintSet::<f64>::new(&model, constraints) {
         Err(error @ Error::Constraint { .. }) => error.to_string(),
         other => panic!("{other:?}"),
@@ -375,10 +381,46 @@ fn what_cannot_be_is_refused() {
             refused(&[point, ContactConstraint::point(trunk), point]),
             "constraint 2: it holds frame `LF_foot` as constraint 0 does already".to_owned(),
         ),
+        (refused(&[ContactConstraint { axes: axes(&[1.0, 1.0, -1.0]), ..line }]), format!("constraint 0: {LEFT}")),
+        (
+            refused(&[ContactConstraint { axes: axes(&[1.0, 1.0, f64::NAN]), ..plane }]),
+            "constraint 0: its axes are not finite".to_owned(),
+        ),
+        (
+            refused(&[ContactConstraint { axes: axes(&[1.0, 1.0, 2.0]), ..line }]),
+            "constraint 0: its axes are no unit vectors at right angles: the largest deviation is 1.0e0".to_owned(),
+        ),
+        (
+            refused(&[ContactConstraint { axes: axes(&[1.0, -1.0, -1.0]), ..point }]),
+            "constraint 0: its axes must be the identity: only lines and planes have axes of their own".to_owned(),
+        ),
     ];
     for (found, expected) in cases {
         assert_eq!(found, expected);
     }
+}
+
+/// Two constraints of one frame are refused if they hold it in the same way, whatever their axes are called.
+#[test]
+fn a_frame_is_held_once() {
+    let model = robots::quadruped();
+    let foot = model.frame("LF_foot").unwrap();
+    let [line, plane] = [ContactConstraint::line(foot), ContactConstraint::plane(foot)];
+    let [point, rigid] = [ContactConstraint::point(foot), ContactConstraint::rigid(foot)];
+    let (x, y, z) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0), Vec3::new(0.0, 0.0, 1.0));
+    let along = |x, y, z, c| ContactConstraint { axes: Mat3 { x, y, z }, ..c };
+    let world = |c| ContactConstraint { reference: ReferenceFrame::LocalWorldAligned, ..c };
+    let refused = |a, b| match ConstraintSet::<f64>::new(&model, &[a, b]) {
+        Ok(_) => false,
+        Err(error) => {
+            assert_eq!(error.to_string(), "constraint 1: it holds frame `LF_foot` as constraint 0 does already");
+            true
+        }
+    };
+    let same = [(line, along(x, -y, -z, line)), (plane, along(z, -y, x, plane)), (point, world(point))];
+    assert!(same.into_iter().all(|(a, b)| refused(a, b) && refused(b, a)));
+    let other = [(line, along(y, z, x, line)), (plane, along(y, z, x, plane)), (line, world(line)), (line, plane)];
+    assert!(!other.into_iter().chain([(point, rigid)]).any(|(a, b)| refused(a, b)));
 }
 
 /// A point whose axes have different gains is held like three lines, each with its own gain.

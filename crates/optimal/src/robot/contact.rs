@@ -1,5 +1,6 @@
 //! Contacts of a knot, each with a name, and the check that the contacts are not singular together.
 
+use super::dependent_contacts::dependent;
 use crate::Error;
 use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings};
 use condyle_spatial::Scalar;
@@ -74,11 +75,11 @@ pub(super) fn check_contacts(model: &Model, contacts: &[Contact], damping: f64) 
     ConstraintSet::<f64>::check_all(model, &constraints).map_err(|error| named(contacts, error))
 }
 
-/// Returns an error if two contacts have the same name or are singular together. Also if the damping is negative or not
-/// finite.
+/// Returns an error if two contacts have the same name, hold a frame in the same way, or are singular together. Also if
+/// the damping is negative or not finite.
 fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(), Error> {
     if !(damping >= 0.0 && damping.is_finite()) {
-        return Err(Error::Contact { name: "damping".to_owned(), what: format!("μ is {damping}, not at least 0") });
+        return Err(Error::Setting { name: "damping", value: damping, allowed: "at least 0" });
     }
     for (k, contact) in contacts.iter().enumerate() {
         let wrong = |what: String| Err(Error::Contact { name: contact.name.clone(), what });
@@ -89,23 +90,13 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
         let Some(frame) = model.frames().get(c.frame) else {
             return wrong(format!("there is no frame {}; the robot has {}", c.frame, model.frames().len()));
         };
-        if c.other.is_some() {
-            continue; // a closed loop between two bodies is not checked
+        if let Some(twin) = before.iter().find(|other| other.constraint.repeats(c)) {
+            return wrong(format!("it holds frame `{}` as contact `{}` does already", frame.name, twin.name));
         }
-        // Two contacts on one body are singular: two points have six rows, of which only five are independent, because
-        // points on a line do not prevent the rotation about this line. With damping, the contacts share the forces.
-        // Constraints with one or two directions may be independent, so they are accepted.
-        let directions = |c: &ContactConstraint| c.kind.rows() < 3;
-        let same = |other: &&Contact| {
-            other.constraint.other.is_none()
-                && !(directions(c) || directions(&other.constraint))
-                && model.frames().get(other.constraint.frame).is_some_and(|f| f.body == frame.body)
-        };
-        if let Some(twin) = before.iter().find(same).filter(|_| damping == 0.0) {
+        if let Some(others) = dependent(model, before, c).filter(|_| damping == 0.0) {
             let what = format!(
-                "it is on body `{}`, as contact `{}`: together they are singular without damping",
+                "it is on body `{}`, as {others}: together they are singular without damping",
                 model.bodies()[frame.body].name,
-                twin.name
             );
             return wrong(what);
         }

@@ -57,6 +57,7 @@ mod contact;
 mod continuous;
 mod cost_access;
 mod costs;
+mod dependent_contacts;
 mod dynamics;
 mod horizon;
 mod integrators;

@@ -118,7 +118,7 @@ fn what_is_wrong_in_a_file_is_said() {
         let Dynamics::Impulse { contacts, .. } = &mut data.knots[2].dynamics else { unreachable!("it is an impact") };
         contacts[0].constraint.axes.x.x = 2.0;
     };
-    assert!(built(&bent).contains("its axes are no rotation"));
+    assert!(built(&bent).contains("its axes are no unit vectors at right angles"));
     assert!(built(&|data| data.knot_models[1] = 7).contains("there is no action model 7"));
     assert_eq!(
         built(&|data| data.knots[0] = Knot::new(Dynamics::Terminal, vec![])),

@@ -13,6 +13,7 @@ mod inverse;
 mod limits;
 mod motion;
 mod own;
+mod together;
 
 use condyle_dynamics::{
     ContactConstraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,
@@ -418,7 +419,7 @@ fn what_does_not_fit_is_refused_by_name() {
         "cost `grip`: a wrench cone needs a rigid contact, of 6 rows; this one has 3"
     );
     let bounce = ImpulseDynamics::instant(model.clone(), &contacts, 2.0, 0.0, vec![]).unwrap_err();
-    assert_eq!(bounce.to_string(), "contact `restitution`: ε is 2, not from 0 to 1");
+    assert_eq!(bounce.to_string(), "setting `restitution` is 2, but it must be from 0 to 1");
     let drives = Actuation::matrix(&model, DMatrix::zeros(3, 2)).unwrap_err();
     assert_eq!(drives.to_string(), format!("actuation: its map is 3 × 2, expected {} rows", model.nv()));
     let end = FreeDynamics::terminal(model.clone(), term(cone("left", 0.7))).map(|_| ()).unwrap_err();

@@ -49,8 +49,10 @@ impl ContactAcceleration {
     /// Creates the dynamics of a robot in contact, with an actuation and the damping μ.
     ///
     /// # Errors
-    /// - [`Error::Contact`] for a contact that does not fit the robot, or has the name of another contact. Without
-    ///   damping, also for a contact that is singular with another contact on the same body.
+    /// - [`Error::Contact`] for a contact that does not fit the robot, has the name of another contact, or holds a
+    ///   frame as another contact does. Without damping, also for a contact that is singular with other contacts on the
+    ///   same body, such as a line in the plane of another contact.
+    /// - [`Error::Setting`] for a damping below 0.
     /// - [`Error::Cost`] for a cost term that does not fit the robot.
     /// - [`Error::Actuation`] for the actuation of another robot, or a robot with joints that move no mass.
     pub fn new(

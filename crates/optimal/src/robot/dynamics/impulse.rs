@@ -42,9 +42,10 @@ impl ImpulseDynamics {
     /// Creates the knot of an impact at which `contacts` begin.
     ///
     /// # Errors
-    /// - [`Error::Contact`] for a contact that does not fit the robot, or has the name of another contact. Without
-    ///   damping, also for a contact that is singular with another contact on the same body. Also for a restitution
-    ///   outside 0 to 1.
+    /// - [`Error::Contact`] for a contact that does not fit the robot, has the name of another contact, or holds a
+    ///   frame as another contact does. Without damping, also for a contact that is singular with other contacts on the
+    ///   same body, such as a line in the plane of another contact.
+    /// - [`Error::Setting`] for a restitution outside 0 to 1 or a damping below 0.
     /// - [`Error::Cost`] for a cost term that does not fit the robot.
     /// - [`Error::Actuation`] for a robot with joints that move no mass.
     pub fn instant(
@@ -55,8 +56,7 @@ impl ImpulseDynamics {
         costs: Vec<Cost>,
     ) -> Result<Self, Error> {
         if !(0.0..=1.0).contains(&restitution) {
-            let what = format!("ε is {restitution}, not from 0 to 1");
-            return Err(Error::Contact { name: "restitution".to_owned(), what });
+            return Err(Error::Setting { name: "restitution", value: restitution, allowed: "from 0 to 1" });
         }
         check_contacts(&model, contacts, damping)?;
         let capabilities = Capabilities { impulse: true, contacts: rows_of(contacts), ..Capabilities::default() };
