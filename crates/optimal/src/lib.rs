@@ -95,8 +95,8 @@ pub use lq::{
 };
 pub use nalgebra;
 pub use problem::{
-    ActionModel, AutoDiff, AutoDiffConstraint, Constrained, GenericAction, GenericConstraint, GroupModel, Lqr, NumDiff,
-    PathConstraint, Problem, Schedule, Unicycle,
+    ActionModel, AutoDiff, AutoDiffConstraint, Constrained, ControlRate, GenericAction, GenericConstraint, GroupModel,
+    Lqr, NumDiff, PathConstraint, Problem, Schedule, Unicycle,
 };
 pub use solvers::{
     AugmentedLagrangian, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,

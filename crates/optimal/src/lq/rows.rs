@@ -179,6 +179,39 @@ impl ConstraintRows {
         self.groups.push(Group { rows: first..self.rows.len(), forms, weights: at..self.numbers.len() });
     }
 
+    /// Appends the rows of `from` with `count` additional zero columns before column `at`.
+    pub(crate) fn append_widened(&mut self, from: &ConstraintRows, at: usize, count: usize) {
+        let (rows, forms) = (self.rows.len(), self.forms.len());
+        for Row { run, c, lower, upper } in &from.rows {
+            let run = self.store_widened(run.first, &from.numbers[run.start..run.end], at, count);
+            self.rows.push(Row { run, c: *c, lower: *lower, upper: *upper });
+        }
+        for run in &from.forms {
+            let run = self.store_widened(run.first, &from.numbers[run.start..run.end], at, count);
+            self.forms.push(run);
+        }
+        for group in &from.groups {
+            let start = self.numbers.len();
+            self.numbers.extend_from_slice(&from.numbers[group.weights.clone()]);
+            let moved = |range: &Range<usize>, by: usize| range.start + by..range.end + by;
+            let (rows, forms) = (moved(&group.rows, rows), moved(&group.forms, forms));
+            self.groups.push(Group { rows, forms, weights: start..self.numbers.len() });
+        }
+    }
+
+    /// Stores a run with `count` zero columns before column `at`.
+    fn store_widened(&mut self, first: usize, entries: &[f64], at: usize, count: usize) -> Run {
+        let start = self.numbers.len();
+        let before = at.saturating_sub(first).min(entries.len());
+        self.numbers.extend_from_slice(&entries[..before]);
+        if 0 < before && before < entries.len() {
+            self.numbers.resize(self.numbers.len() + count, 0.0);
+        }
+        self.numbers.extend_from_slice(&entries[before..]);
+        let first = if before == 0 && !entries.is_empty() { first + count } else { first };
+        Run { first, start, end: self.numbers.len() }
+    }
+
     /// Stores a run without the zeros at its ends.
     fn store(&mut self, first: usize, entries: &[f64]) -> Run {
         let from = entries.iter().position(|x| *x != 0.0).unwrap_or(0);

@@ -280,6 +280,13 @@ pub(crate) fn innermost(action: &mut dyn ActionModel) -> Option<&mut dyn KnotGro
     action.knot_group_mut()
 }
 
+/// Returns the number of entries of a state of the innermost wrapped action. They are the first entries of a state of
+/// the action.
+pub(crate) fn innermost_nx(action: &mut dyn ActionModel) -> usize {
+    let nx = action.nx();
+    action.inner_mut().map_or(nx, innermost_nx)
+}
+
 /// Computes the values of a group, knot by knot.
 #[track_caller]
 fn calc_each<A: ActionModel + ?Sized>(

@@ -144,7 +144,8 @@ impl Problem {
             if is_impact {
                 let mut next = x.to_vec();
                 action.calc(t, x, u, &mut next);
-                motion.velocity_change = (model.nq()..x.len()).map(|k| next[k] - x[k]).collect();
+                let end = model.nq() + model.nv();
+                motion.velocity_change = (model.nq()..end).map(|k| next[k] - x[k]).collect();
             }
         }
         let nothing = motion.acceleration.is_empty() && !motion.is_impact();

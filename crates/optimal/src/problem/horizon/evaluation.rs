@@ -4,7 +4,7 @@ use super::Problem;
 use crate::error::{Error, assert_length};
 use crate::lq::{Gains, KnotFeedback, LqKnot};
 use crate::problem::action::ActionModel;
-use crate::problem::group::{Evaluation, Results, evaluate, innermost};
+use crate::problem::group::{Evaluation, Results, evaluate, innermost, innermost_nx};
 use crate::problem::shape::Shape;
 use crate::problem::threads::Knots;
 use std::ops::{ControlFlow, Range};
@@ -201,8 +201,9 @@ impl Problem {
     pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         assert_length("x", x.len(), self.nx());
         assert_length("u", u.len(), self.nu(t));
+        let nx = innermost_nx(self.action_mut(t));
         if let Some(group) = innermost(self.action_mut(t)) {
-            group.show_outputs(t, x, u, show);
+            group.show_outputs(t, &x[..nx], u, show);
         }
     }
 
