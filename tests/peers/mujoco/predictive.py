@@ -32,6 +32,10 @@ after it. Or of `Fddp` one iteration, or iterations until a full step (at most 3
 INTERIOR_POINT = ("tick2", "feedback2")
 """Rules of `InteriorPoint`."""
 
+Landing = Literal["level", "below", "touch"]
+"""Rule for ground of unknown height. A swing ends at the mean height of the feet on the ground (`level`), or `DEPTH`
+below it (`below`). With `touch`, a swinging foot that already bears load is a contact from then on."""
+
 DT = 0.02
 """Duration of a knot (s)."""
 RATE = 50.0
@@ -44,6 +48,10 @@ END = 0.1
 """Weight of the terminal state, relative to the other knots."""
 HEIGHT = 0.06
 """Height of a swing (m)."""
+DEPTH = 0.02
+"""Depth below the ground at which swings end with the rule `below` (m)."""
+LOADED = 0.05
+"""Fraction of the robot's weight that a foot on the ground bears at least."""
 
 
 class Gait(NamedTuple):
@@ -154,10 +162,17 @@ def turned(angle: Array | float, vector: Array) -> Array:
 class Predictive:
     """Controller of a walk or a trot: a plan, which a tick renews, and the plan's feedback."""
 
-    def __init__(self, model: condyle.Model, robot: Robot, solver: Solver = "tick2", rate: float | None = None) -> None:
+    def __init__(
+        self,
+        model: condyle.Model,
+        robot: Robot,
+        solver: Solver = "tick2",
+        rate: float | None = None,
+        landing: Landing = "level",
+    ) -> None:
         """rate: rate of the ticks (Hz), which is independent of the knots. With None, each tick shifts the horizon by a
         knot."""
-        self.model, self.robot, self.rule, self.feet = model, robot, solver, list(robot.feet)
+        self.model, self.robot, self.rule, self.landing, self.feet = model, robot, solver, landing, list(robot.feet)
         self._schedule = None if rate is None else robot.gait.schedule()
         self._times = DT * np.arange(robot.knots + 1)
         """Times at which the knots begin, after the beginning of the horizon (s)."""
@@ -180,6 +195,9 @@ class Predictive:
         self._stances = [tuple(every), *(tuple(k for k in every if k not in group) for group in robot.gait.groups)]
         """Feet on the ground: all of them, or while one of the groups swings."""
         self._knots = [self._knot(touching) for touching in self._stances]
+        self._touching: dict[tuple[int, ...], ContactDynamics] = {}
+        """Models of stances that the gait does not plan."""
+        self._least = LOADED * 9.81 * model.total_mass
 
     def _places(self, q: Array) -> Array:
         places = [condyle.frame_placement(self.model, self._data, q, foot)[:3, 3] for foot in self.feet]
@@ -272,7 +290,23 @@ class Predictive:
                 forward = (done - np.sin(2.0 * np.pi * done) / (2.0 * np.pi))[:, None]
                 target = start + forward * (end - start)
                 target[:, 2] += HEIGHT * np.sin(np.pi * done) ** 2
+                if self.landing == "below":
+                    target[:, 2] -= DEPTH * np.maximum(2.0 * done - 1.0, 0.0)
                 self.problem.set_references(f"{foot} swings", target)
+
+    def _touch(self, loads: Array, t: float) -> None:
+        """Plans contact until the end of the swing for feet that bear load in its second half."""
+        group, done = self.robot.gait.swinging(t)
+        early = (
+            [] if group is None or done < 0.5 else [k for k in self.robot.gait.groups[group] if loads[k] > self._least]
+        )
+        if group is None or not early:
+            return
+        stance = tuple(sorted([*self._stances[1 + group], *early]))
+        if stance not in self._touching:
+            self._touching[stance] = self._knot(stance)
+        for k in range(round((1.0 - done) * self.robot.gait.swing / DT)):
+            self.problem.set_knot(k, self._touching[stance])
 
     def start(self, x: Array) -> Solution:
         """Solves the first problem, from the state x at the time 0."""
@@ -300,8 +334,8 @@ class Predictive:
         self.solver.publish(self.policy, 0.0)
         return plan
 
-    def tick(self, x: Array, t: float) -> Solution:
-        """Renews the plan at the time t (s), for the measured state x."""
+    def tick(self, x: Array, t: float, loads: Array | None = None) -> Solution:
+        """Renews the plan at the time t (s), for the measured state x and the vertical forces on the feet (N)."""
         begin = time.perf_counter()
         if self._schedule is None:
             self.solver.shift(self.robot.gait.stance(t + (self.robot.knots - 1) * DT))
@@ -320,6 +354,8 @@ class Predictive:
             self.seconds.append(time.perf_counter() - begin)
             return plan
         self._observe(x, t)
+        if self.landing == "touch" and loads is not None:
+            self._touch(loads, t)
         self._refer(x, t)
         self.problem.set_x0(x)
         if isinstance(self.solver, InteriorPoint):

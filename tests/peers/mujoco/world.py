@@ -46,8 +46,8 @@ def bare(urdf: str) -> ET.Element:
 
 
 class World:
-    """Robot on level ground in MuJoCo. Soles are boxes below the frames of the feet; point feet are balls around their
-    frames."""
+    """Robot in MuJoCo, on ground that is level until `set_ground` changes it. Soles are boxes below the frames of the
+    feet; point feet are balls around their frames."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class World:
         spec.option.impratio = 10.0
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         contact = {"friction": [friction, 0.005, 1e-4], "solref": STIFFNESS, "condim": 3}
-        for foot in feet:
+        for k, foot in enumerate(feet):
             frame = self.model.frames[self.model.frame(foot)]
             shape = {"type": mujoco.mjtGeom.mjGEOM_SPHERE, "size": [size, 0.0, 0.0], "pos": frame.placement[:3, 3]}
             if not isinstance(size, float):
@@ -76,11 +76,13 @@ class World:
                 middle = frame.placement @ [0.0, 0.0, 0.5 * THICKNESS, 1.0]
                 shape = {"type": mujoco.mjtGeom.mjGEOM_BOX, "size": half, "pos": middle[:3], "quat": quat}
             body = spec.body(self.model.body_names[frame.body])
-            body.add_geom(name=foot, contype=1, conaffinity=0, mass=0.0, **shape, **contact)
+            body.add_geom(name=foot, contype=1 << k, conaffinity=0, mass=0.0, **shape, **contact)
         if isinstance(size, float):
             self.ground = -size  # the plan assumes that the centres of the balls are at height 0
-        plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "pos": [0.0, 0.0, self.ground]}
-        spec.worldbody.add_geom(name="ground", contype=0, conaffinity=1, **plane, **contact)
+        plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}
+        for k, foot in enumerate(feet):  # each foot has its own ground, which can move
+            ground = spec.worldbody.add_body(name=f"ground of {foot}", mocap=True, pos=[0.0, 0.0, self.ground])
+            ground.add_geom(name=f"ground of {foot}", contype=0, conaffinity=1 << k, **plane, **contact)
         self.mj = spec.compile()
         self.data = mujoco.MjData(self.mj)
         named = zip(self.model.names[1:], self.model.idx_qs[1:], self.model.idx_vs[1:], self.model.nqs[1:], strict=True)
@@ -116,6 +118,11 @@ class World:
         qpos[self._theirs[0]], qvel[self._theirs[1]] = q[self._ours[0]], v[self._ours[1]]
         mujoco.mj_forward(self.mj, self.data)
 
+    def set_ground(self, foot: str, height: float) -> None:
+        """Sets the height of the ground below one foot (m), while the foot is in the air. At 0 the ground is level. The
+        other feet keep their ground, so that no foot meets an edge."""
+        self.data.mocap_pos[self.mj.body(f"ground of {foot}").mocapid[0], 2] = self.ground + height
+
     def generalized(self, tau: Array) -> Array:
         """Returns the efforts of Condyle's joints in MuJoCo's order."""
         out = np.zeros(self.mj.nv)
@@ -137,8 +144,7 @@ class World:
             contact = self.data.contact[k]
             mujoco.mj_contactForce(self.mj, self.data, k, force)
             names = [self.mj.geom(geom).name for geom in contact.geom]
-            sign = 1.0 if names[0] == "ground" else -1.0  # the contact force acts on the contact's second geom
-            out[self.feet.index(next(name for name in names if name != "ground"))] += (
-                sign * contact.frame.reshape(3, 3).T @ force[:3]
-            )
+            sign = -1.0 if names[0] in self.feet else 1.0  # the contact force acts on the contact's second geom
+            foot = next(k for k, foot in enumerate(self.feet) if foot in names)
+            out[foot] += sign * contact.frame.reshape(3, 3).T @ force[:3]
         return out
