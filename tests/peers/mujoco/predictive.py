@@ -32,9 +32,10 @@ after it. Or of `Fddp` one iteration, or iterations until a full step (at most 3
 INTERIOR_POINT = ("tick2", "feedback2")
 """Rules of `InteriorPoint`."""
 
-Landing = Literal["level", "below", "touch"]
+Landing = Literal["level", "below", "touch", "spring"]
 """Rule for ground of unknown height. A swing ends at the mean height of the feet on the ground (`level`), or `DEPTH`
-below it (`below`). With `touch`, a swinging foot that already bears load is a contact from then on."""
+below it (`below`). With `touch`, a swinging foot that already bears load is a contact from then on. With `spring`,
+contacts that begin later have the gain `STIFFNESS` towards that height."""
 
 DT = 0.02
 """Duration of a knot (s)."""
@@ -50,6 +51,8 @@ HEIGHT = 0.06
 """Height of a swing (m)."""
 DEPTH = 0.02
 """Depth below the ground at which swings end with the rule `below` (m)."""
+STIFFNESS = 400.0
+"""Gain kp of contacts along the vertical with the rule `spring` (1/s²)."""
 LOADED = 0.05
 """Fraction of the robot's weight that a foot on the ground bears at least."""
 
@@ -279,6 +282,12 @@ class Predictive:
         states[:, 3:7] = np.c_[0.0 * s, 0.0 * s, np.sin(half), np.cos(half)]
         states[:, nq : nq + 6] = vx, vy, 0.0, 0.0, 0.0, wz
         self.problem.set_references("state", states)
+        if self.landing == "spring":
+            places = self._places(x[:nq])
+            for k, foot in enumerate(self.feet):
+                target = np.eye(4)
+                target[2, 3] = places[k, 2] if k in self._stances[gait.stance(t)] else level
+                self.problem.set_contact(foot, placement=target, kp=[0.0, 0.0, STIFFNESS, 0.0, 0.0, 0.0])
         phases = [gait.swinging(t + ahead) for ahead in s]
         for k, foot in enumerate(self.feet):
             airborne = np.array([group is not None and k in gait.groups[group] for group, _ in phases[:-1]])
