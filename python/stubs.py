@@ -48,7 +48,7 @@ ALIASES = {
     "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
     "_Axes": 'Literal["world", "local"] | tuple[Literal["frame"], str]',
     "_Action": "FreeDynamics | ContactDynamics | ImpulseDynamics | FreeInverseDynamics | ContactInverseDynamics"
-    " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction",
+    " | Lqr | Unicycle | Action | DifferentialAction | ConstrainedAction | ControlRate",
 }
 
 # The functions of `condyle.pinocchio`.
@@ -87,7 +87,7 @@ ARGUMENTS = {
         Plan.controls corners durations normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
         InteriorPoint.set_multipliers.values Problem.set_references.values
-        Problem.set_contact.kp Problem.set_entry_weights.weights""",
+        Problem.set_contact.kp Problem.set_entry_weights.weights ControlRate.weights""",
     "float | ArrayLike": "Problem.set_weight.weight",
     'Literal["full_step"]': "stop",
     "int | None": "_casadi_hold_knot.t",

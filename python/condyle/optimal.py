@@ -20,7 +20,8 @@ differ only in costs.
 You can define your own actions by the next state and the cost (`Action`), by accelerations (`DifferentialAction`), by ẋ
 (`ode_action`), or by CasADi expressions (`condyle.casadi.action`). You can also define residuals of a robot
 (`Residual.own`) and constraints (`ConstrainedAction`). Derivatives that you do not provide are still exact if your
-functions accept numbers that carry their derivatives.
+functions accept numbers that carry their derivatives. `ControlRate` adds a cost of the change of the controls from knot
+to knot to an action of any kind.
 
 The feedback is u = ū + α k + K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign. The iterates are the same as in
 Crocoddyl.
@@ -34,6 +35,7 @@ from ._condyle import (
     ConstrainedAction,
     ContactDynamics,
     ContactInverseDynamics,
+    ControlRate,
     Cost,
     DifferentialAction,
     Fddp,
@@ -78,6 +80,7 @@ __all__ = [
     "ConstraintRows",
     "ContactDynamics",
     "ContactInverseDynamics",
+    "ControlRate",
     "Cost",
     "Difference",
     "DifferentialAction",

@@ -118,9 +118,9 @@ mod _condyle {
     use model::{Model, model_from_bytes};
     #[pymodule_export]
     use optimal::{
-        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics, Cost,
-        DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics, InteriorPoint,
-        Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sweep, Unicycle, WrenchCone,
+        Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,
+        ControlRate, Cost, DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics,
+        InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sweep, Unicycle, WrenchCone,
     };
     #[pymodule_export]
     use regressors::{

@@ -28,7 +28,7 @@ pub(crate) use alone::{Alone, alone};
 pub(crate) use cones::{FrictionCone, WrenchCone};
 pub(crate) use costs::{Activation, Cost, Limit};
 pub(crate) use inverse::{ContactInverseDynamics, FreeInverseDynamics};
-pub(crate) use own::{Action, ConstrainedAction, DifferentialAction, Lqr, Unicycle};
+pub(crate) use own::{Action, ConstrainedAction, ControlRate, DifferentialAction, Lqr, Unicycle};
 pub(crate) use policy::Policy;
 pub(crate) use problem::{Problem, lock};
 pub(crate) use record::Record;

@@ -19,6 +19,7 @@
 //!   [`tick`](InteriorPoint::tick) makes a fixed number of sweeps, for model-predictive control.
 //! - [`AugmentedLagrangian`] imposes the same constraints by repeated solves with [`Fddp`].
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
+//! - [`ControlRate`] adds a cost, and limits, of the change of the controls from knot to knot to any action.
 //! - [`AutoDiff`] turns dynamics and a cost that are generic over the scalar type into an action with exact derivatives
 //!   by dual numbers. [`AutoDiffConstraint`] does the same for a path constraint, [`robot::OwnResidual::autodiff`] for
 //!   a robot's residual.

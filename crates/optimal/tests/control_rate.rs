@@ -106,9 +106,9 @@ fn a_limit_of_the_change_is_kept() {
     };
     let (xs, us) = (vec![0.0; 3 * (KNOTS + 1)], vec![0.0; KNOTS]);
     let mut solved = problem();
-    let inside = InteriorPoint::new(&mut solved).solve(&mut solved, &xs, &us).unwrap().clone();
+    let inside = InteriorPoint::new(&solved).solve(&mut solved, &xs, &us).unwrap().clone();
     let mut solved = problem();
-    let outside = AugmentedLagrangian::new(&mut solved).solve(&mut solved, &xs, &us).unwrap().clone();
+    let outside = AugmentedLagrangian::new(&solved).solve(&mut solved, &xs, &us).unwrap().clone();
     for solution in [inside, outside] {
         assert_eq!(solution.status, Status::Converged);
         let fastest = |t: usize| 0.5 + limit * (t + 1) as f64;
@@ -195,7 +195,7 @@ fn derivatives_of_a_robot_are_those_of_differences() {
 }
 
 /// A pushed quadruped stands again. With the cost, its efforts change less from knot to knot, also with active friction
-/// cones; without weights, they are those of the robot alone.
+/// cones. Without weights, it has the cost of the robot alone.
 #[test]
 fn efforts_of_a_pushed_robot_change_less() {
     let count = 15;
@@ -204,7 +204,7 @@ fn efforts_of_a_pushed_robot_change_less() {
         (x[20], x[19]) = (0.6, 0.3); // m/s
         let start = [x, still.clone()].concat();
         let mut problem = Problem::new(start.clone(), vec![Box::new(knot)], vec![0; count], Box::new(end)).unwrap();
-        let mut solver = InteriorPoint::new(&mut problem);
+        let mut solver = InteriorPoint::new(&problem);
         let solution = solver.solve(&mut problem, &start.repeat(count + 1), &still.repeat(count)).unwrap().clone();
         assert_eq!(solution.status, Status::Converged);
         let forces = problem.motion(&solution, 2).unwrap().contacts.len();
@@ -222,7 +222,7 @@ fn efforts_of_a_pushed_robot_change_less() {
     let robot = knot.action_mut::<ContactDynamics>().unwrap().clone();
     let terminal = end.action_mut::<FreeDynamics>().unwrap().clone();
     let mut alone = Problem::new(x.clone(), vec![Box::new(robot)], vec![0; count], Box::new(terminal)).unwrap();
-    let mut solver = InteriorPoint::new(&mut alone);
+    let mut solver = InteriorPoint::new(&alone);
     let expected = solver.solve(&mut alone, &x.repeat(count + 1), &still.repeat(count)).unwrap();
     let error = (solved(0.0).1 - expected.cost).abs();
     assert!(error < ACTIVE * expected.cost, "{error}");

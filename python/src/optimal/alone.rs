@@ -1,7 +1,7 @@
 //! A single knot of a problem.
 
 use super::models::{boxed, residuals};
-use super::own::{Action, ConstrainedAction, DifferentialAction, Fault, Lqr, Unicycle};
+use super::own::{Action, ConstrainedAction, ControlRate, DifferentialAction, Fault, Lqr, Unicycle};
 use super::problem::{Problem, lock};
 use super::robot_action::Described;
 use crate::exceptions::{ProblemError, problem_error};
@@ -56,6 +56,10 @@ fn action_alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
     }
     if let Ok(constrained) = of.cast::<ConstrainedAction>() {
         return action_alone(constrained.get().action.bind(of.py()), t);
+    }
+    if of.is_instance_of::<ControlRate>() {
+        let what = "action: a ControlRate is no function of CasADi: use its action, and add the cost in CasADi";
+        return Err(ProblemError::new_err(what));
     }
     if of.is_instance_of::<Action>() || of.is_instance_of::<DifferentialAction>() || !residuals(of).is_empty() {
         let found = of.get_type().name()?;

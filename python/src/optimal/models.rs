@@ -2,7 +2,7 @@
 
 use super::actions::{ContactDynamics, FreeDynamics, ImpulseDynamics};
 use super::inverse::{ContactInverseDynamics, FreeInverseDynamics};
-use super::own::{Action, ConstrainedAction, DifferentialAction, Fault, Lqr, Unicycle};
+use super::own::{Action, ConstrainedAction, ControlRate, DifferentialAction, Fault, Lqr, Unicycle};
 use super::robot_action::Boxed;
 use condyle::optimal as rust;
 use pyo3::exceptions::PyTypeError;
@@ -25,6 +25,9 @@ pub(super) fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> 
     } else if let Ok(constrained) = model.cast::<ConstrainedAction>() {
         let constrained = constrained.get();
         constrained.boxed(boxed(constrained.action.bind(model.py()), terminal, fault)?.action, fault)
+    } else if let Ok(rate) = model.cast::<ControlRate>() {
+        let rate = rate.get();
+        rate.boxed(boxed(rate.action.bind(model.py()), terminal, fault)?.action)?
     } else if let Ok(action) = model.cast::<Action>() {
         action.get().boxed(terminal, fault)
     } else if let Ok(action) = model.cast::<DifferentialAction>() {

@@ -37,7 +37,8 @@ pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuar
 ///
 /// x0: the initial state, nx numbers.
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `FreeInverseDynamics`,
-///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
+///     `ContactInverseDynamics`, `Action`, `DifferentialAction`, `ConstrainedAction`, `ControlRate`, `Lqr`,
+///     `Unicycle`.
 /// knot_models: for each knot, the index of the knot's model; None if knot t has model t. Consecutive knots are
 ///     computed as a group in two cases: they have the same model, or their models belong to one robot and differ only
 ///     in costs and limits.
@@ -117,8 +118,8 @@ impl Problem {
     /// Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
     /// infinite bound is written as null.
     ///
-    /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
-    /// different robots.
+    /// Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate`, or if
+    /// knots belong to different robots.
     fn to_json(&self) -> PyResult<String> {
         serde_json::to_string(&self.data()?).map_err(|error| ProblemError::new_err(error.to_string()))
     }

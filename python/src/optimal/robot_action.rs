@@ -178,7 +178,7 @@ pub(super) struct Boxed {
 }
 
 /// Returns the action of type A in model k of a problem, or in the terminal model if k is `None`. The action may be
-/// inside a constrained action.
+/// inside a constrained action or a control rate.
 pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
     fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
         match k {
@@ -189,11 +189,20 @@ pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usiz
     if find::<A>(problem, k).is_some() {
         return find(problem, k);
     }
-    let mut around = find::<rust::Constrained>(problem, k)?;
-    while around.action_mut::<A>().is_none() {
-        around = around.action_mut()?;
+    /// Returns the action of type A that an action wraps.
+    fn inner<A: ActionModel>(around: &mut dyn ActionModel) -> Option<&mut A> {
+        let action = around.inner_mut()?;
+        let any: &dyn Any = action;
+        if !any.is::<A>() {
+            return inner(action);
+        }
+        let any: &mut dyn Any = action;
+        any.downcast_mut()
     }
-    around.action_mut()
+    if find::<rust::ControlRate>(problem, k).is_some() {
+        return inner(find::<rust::ControlRate>(problem, k)?);
+    }
+    inner(find::<rust::Constrained>(problem, k)?)
 }
 
 /// Changes a robot's action in a problem, which `inside` finds. Returns `None` if the action does not belong to a

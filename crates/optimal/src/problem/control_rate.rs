@@ -26,8 +26,8 @@ use std::any::Any;
 /// A weight w/Δt per knot of Δt seconds is the weight w of the squared rate u̇². [`limited`](Self::limited) also limits
 /// the change of the controls.
 ///
-/// A sweep does not use the structure of A and B of the wrapped action, so it takes longer than for the larger state
-/// alone: for a quadruped in contact about TIMES times, for one iteration of [`Fddp`](crate::Fddp) TIMES times.
+/// The state is larger, and a sweep does not use the structure of A and B of the wrapped action. For a quadruped in
+/// contact, an iteration takes about 1.8 times as long.
 ///
 /// ```
 /// use condyle_optimal::{ControlRate, Fddp, LqKnot, Lqr, Problem};

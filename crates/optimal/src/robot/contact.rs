@@ -93,7 +93,9 @@ fn check_together(model: &Model, contacts: &[Contact], damping: f64) -> Result<(
         if let Some(twin) = before.iter().find(|other| other.constraint.repeats(c)) {
             return wrong(format!("it holds frame `{}` as contact `{}` does already", frame.name, twin.name));
         }
-        if let Some(others) = dependent(model, before, c).filter(|_| damping == 0.0) {
+        if let Some(others) =
+            dependent(model, before.iter().map(|other| (&*other.name, &other.constraint)), c).filter(|_| damping == 0.0)
+        {
             let what = format!(
                 "it is on body `{}`, as {others}: together they are singular without damping",
                 model.bodies()[frame.body].name,

@@ -1,6 +1,5 @@
 //! Check that the contacts of one body are not singular together.
 
-use super::contact::Contact;
 use condyle_dynamics::lie;
 use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Model, ReferenceFrame, Vec3};
 
@@ -11,17 +10,21 @@ use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Model, Referenc
 /// points are dependent, because points on a line do not prevent the rotation about this line. Directions of the world
 /// are turned into the body by a rotation that has no special property. So rows that depend on each other only in
 /// special states are not found. A loop between two moving bodies is not checked.
-pub(super) fn dependent(model: &Model, before: &[Contact], contact: &ContactConstraint) -> Option<String> {
+pub(super) fn dependent<'c>(
+    model: &Model,
+    before: impl Iterator<Item = (&'c str, &'c ContactConstraint)>,
+    contact: &ContactConstraint,
+) -> Option<String> {
     let body = |c: &ContactConstraint| {
         let on_world = c.other.is_none_or(|other| model.frames().get(other).is_some_and(|f| f.body == 0));
         model.frames().get(c.frame).filter(|_| on_world).map(|frame| frame.body)
     };
     let here = body(contact)?;
-    let others: Vec<&Contact> = before.iter().filter(|other| body(&other.constraint) == Some(here)).collect();
-    let holds = |set: &[&Contact]| {
+    let others: Vec<_> = before.filter(|(_, other)| body(other) == Some(here)).collect();
+    let holds = |set: &[(&str, &ContactConstraint)]| {
         let mut rows = Vec::new();
-        for other in set {
-            add_wrenches(model, &other.constraint, &mut rows);
+        for (_, other) in set {
+            add_wrenches(model, other, &mut rows);
         }
         add_wrenches(model, contact, &mut rows)
     };
@@ -29,9 +32,9 @@ pub(super) fn dependent(model: &Model, before: &[Contact], contact: &ContactCons
         return None;
     }
     if let Some(one) = others.iter().find(|other| holds(&[**other])) {
-        return Some(format!("contact `{}`", one.name));
+        return Some(format!("contact `{}`", one.0));
     }
-    let names: Vec<_> = others.iter().map(|other| format!("`{}`", other.name)).collect();
+    let names: Vec<_> = others.iter().map(|other| format!("`{}`", other.0)).collect();
     Some(format!("contacts {}", names.join(", ")))
 }
 

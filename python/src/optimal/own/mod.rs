@@ -3,6 +3,7 @@
 mod action;
 mod automatic;
 mod constrained;
+mod control_rate;
 mod differential;
 mod expansion;
 mod functions;
@@ -13,6 +14,7 @@ mod space;
 pub(crate) use action::Action;
 pub(super) use automatic::Way;
 pub(crate) use constrained::ConstrainedAction;
+pub(crate) use control_rate::ControlRate;
 pub(crate) use differential::DifferentialAction;
 pub(super) use functions::{Fault, Functions};
 pub(super) use lqr::write;

@@ -6,7 +6,7 @@ use crate::optimal::own::{Fault, faults};
 use crate::optimal::recorder::Recorder;
 use crate::optimal::references;
 use crate::optimal::residuals::take_written;
-use crate::optimal::robot_action::{Boxed, Described};
+use crate::optimal::robot_action::{Boxed, Described, change};
 use condyle::optimal as rust;
 use pyo3::prelude::*;
 use rust::record::Call;
@@ -24,9 +24,10 @@ impl Problem {
     ) -> PyResult<Self> {
         let (mut actions, described): (Vec<_>, _) = all.into_iter().map(|b| (b.action, b.described)).unzip();
         let end = actions.pop().expect("the terminal one is there");
-        let problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
+        let mut problem = rust::Problem::new(x0, actions, knot_models, end).map_err(problem_error)?;
         let described: Vec<Option<Arc<Described>>> = described;
-        let space = described.last().and_then(Option::as_ref).and_then(|_| rust::StateSpace::new(&problem).ok());
+        let of_robot = change!(&mut problem, None, |_robot| ()).is_some();
+        let space = if of_robot { rust::StateSpace::new(&problem).ok() } else { None };
         let faults = described.iter().flatten().flat_map(|described| faults(&described.knot)).collect();
         let (inner, described) = (Mutex::new(problem), Mutex::new(described));
         let (objects, written, faults) = (Mutex::new(objects), Mutex::new(written), Mutex::new(faults));
