@@ -161,8 +161,8 @@ impl Fddp {
         self.run_pass(problem, None, Pass { to_full_step: Some(most.max(1)), ..Pass::default() }, &mut observer)
     }
 
-    /// Makes the first half of an iteration, before the state arrives: derivatives and sweep along the trajectory of the
-    /// last solve. [`feedback`](Self::feedback) makes the second half. This is the real-time iteration scheme: call
+    /// Makes the first half of an iteration, before the state arrives: derivatives and sweep along the trajectory of
+    /// the last solve. [`feedback`](Self::feedback) makes the second half. This is the real-time iteration scheme: call
     /// [`shift`](Self::shift), set references, and `prepare`; then wait for the state.
     ///
     /// The prediction is the first state x̄₀ of the trajectory; it becomes the problem's initial state. Until

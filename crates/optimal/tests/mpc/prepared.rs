@@ -271,6 +271,28 @@ fn each_feedback_needs_its_own_preparation() {
     );
 }
 
+/// Checks budgets that are always too short: a feedback still makes one iteration, or one step.
+#[test]
+fn a_feedback_without_time_makes_one_iteration() {
+    let mut problem = problems(Bounds::Limits).remove(1);
+    let xs = problem.x0().repeat(HORIZON + 1);
+    let us = problem.quasi_static(&xs).unwrap();
+    let (mut fddp, mut interior) = (Fddp::new(&problem), InteriorPoint::new(&problem));
+    fddp.solve(&mut problem, &xs, &us).unwrap();
+    interior.solve(&mut problem, &xs, &us).unwrap();
+    let budget = Some(std::time::Duration::from_nanos(1));
+    (fddp.settings.time_budget, interior.settings.time_budget) = (budget, budget);
+    for push in [0.0, 0.05, 0.2] {
+        let x = pushed(&problem, &xs[..problem.nx()], push);
+        fddp.prepare(&mut problem).unwrap();
+        assert_eq!(fddp.feedback(&mut problem, &x, 3).unwrap().trace.len(), 1);
+        assert!(fddp.solution().timings.overrun > std::time::Duration::ZERO);
+        interior.prepare(&mut problem, 2).unwrap();
+        let plan = interior.feedback(&mut problem, &x).unwrap();
+        assert!(plan.x(0) == x && plan.is_executable() && plan.fallback.is_none());
+    }
+}
+
 /// Creates an unstable pendulum, whose derivatives can be broken, and an interior point that has solved it.
 fn pendulum() -> (Unstable, Problem, InteriorPoint) {
     let plant = Unstable { nu: 1, delay: Arc::default(), broken: Arc::default() };
