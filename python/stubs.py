@@ -104,6 +104,7 @@ ARGUMENTS = {
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": """
+        ArmMpc.frame Foot.point.frame Foot.sole.frame
         _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
         text FrictionContact.frame Task.frame""",
     "str | int": """
@@ -119,13 +120,29 @@ ARGUMENTS = {
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states
         Record.__getitem__.key""",
     "float": """
+        ArmMpc.knot WholeBodyMpc.knot
+        Foot.point.friction Foot.sole.friction ArmMpc.horizon ArmMpc.latency Foot.point.radius Gait.bound.swing
+        Gait.bound.double Gait.pace.swing Gait.pace.double Gait.step.swing Gait.step.double Gait.table.period
+        Gait.trot.swing Gait.trot.double Gait.walk.swing Gait.walk.double WholeBodyMpc.horizon
+        WholeBodyMpc.latency WholeBodyMpc.swing_height WholeBodyMpc.command.vx WholeBodyMpc.command.vy
+        WholeBodyMpc.command.wz WholeBodyMpc.terrain.height
         bias damping delta dt elapsed
         eps1 eps1eps2 eps2 epsilon gain greatest kd kp kv least mu offset passive pitch ratio re
         regularisation
         restitution s smoothing spacing start t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force now then yaw_friction FrictionContact.friction""",
-    "float | None": "DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings",
+    "float | None": """
+        DifferentialAction.dt FreeDynamics.dt InteriorPoint.settings ArmMpc.budget WholeBodyMpc.budget
+        WholeBodyMpc.command.height WholeBodyMpc.prepare.t""",
+    "Weights | None": "WholeBodyMpc.weights",
+    "ArmWeights | None": "ArmMpc.weights",
+    "PlanLimits | None": "ArmMpc.limits WholeBodyMpc.limits",
+    "Sequence[Foot]": "WholeBodyMpc.feet",
+    "Gait": "WholeBodyMpc.gait WholeBodyMpc.set_gait.gait",
+    "Sequence[tuple[str, float, float]]": "Gait.table.swings",
+    "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
+    "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
     "list[tuple[int, Residual]]": " ".join(
@@ -165,7 +182,7 @@ ARGUMENTS = {
     "None": "mod",
     "FrictionCone": "friction Residual.friction_cone.cone",
     "WrenchCone": "Residual.wrench_cone.cone",
-    "_Size": "WrenchCone.size Residual.center_of_pressure.size",
+    "_Size": "Foot.sole.size WrenchCone.size Residual.center_of_pressure.size",
     "Activation": "activation",
     "Residual": "residual",
     "Sequence[tuple[Sphere, Sphere]]": "Residual.distances.pairs",
@@ -226,12 +243,15 @@ SETTABLE = {  # properties that can be assigned, with the type of the value
     "Fddp.settings": "Mapping[str, Any]",
 }
 
-SIGNATURES = {"Policy.__call__": "($self, t, x)"}  # of methods whose signatures the interpreter does not report
+SIGNATURES = dict.fromkeys(
+    ["JointPolicy.__call__", "Policy.__call__"], "($self, t, x)"
+)  # of methods whose signatures the interpreter does not report
 
 RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
+        JointPolicy.__call__ WholeBodyMpc.forces
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         FreeInverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
         Policy.__call__ Problem._between Problem.references
@@ -260,7 +280,7 @@ RESULTS = {
         distance kinetic_energy mechanical_energy potential_energy
         FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation
         Schedule.spacing Task.weight""",
-    "float | None": "FrictionContact.yaw_friction Joint.pitch Policy.end",
+    "float | None": "FrictionContact.yaw_friction Joint.pitch JointPolicy.end Policy.end",
     "tuple[float, float]": "Plan.span",
     "Data": "_SpelledData._ours",
     "int": """
@@ -271,6 +291,7 @@ RESULTS = {
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
     "str": """
+        Foot.frame
         Model.name Model.to_json Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame
         Task.kind""",
     "str | None": "Task.frame",
@@ -284,6 +305,8 @@ RESULTS = {
     "Command": "WholeBodyController.command WholeBodyController.step",
     "KktResiduals": "WholeBodyController.kkt_residuals",
     "None": """
+        ArmMpc.reset JointPolicy.release JointPolicy.stop WholeBodyMpc.command WholeBodyMpc.prepare WholeBodyMpc.reset
+        WholeBodyMpc.set_gait WholeBodyMpc.terrain
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
         AugmentedLagrangian.configure AugmentedLagrangian.publish AugmentedLagrangian.reset
@@ -297,6 +320,9 @@ RESULTS = {
         Problem.set_knots Problem.set_references Problem.set_weight Problem.set_x0 Record.save Record.stop
         Schedule.forget Schedule.switch Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
+    "Report": "ArmMpc.report WholeBodyMpc.report",
+    "JointPolicy": "ArmMpc.policy ArmMpc.update WholeBodyMpc.policy WholeBodyMpc.update",
+    'Literal["plan", "open_loop", "damping"]': "JointPolicy.source",
     "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
@@ -311,6 +337,7 @@ RESULTS = {
     "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__ Simulation.__reduce__",
     "HyperDual": "HyperDual",
     "Model": """
+        ArmMpc.model WholeBodyMpc.model
         _SpelledModel.ours Model.__copy__ Model.__deepcopy__ Model.append Model.from_pinocchio Model.lock
         Model.with_armature Model.with_damping Model.with_frame Model.with_friction Model.with_gravity
         Model.with_inertias Model.with_limits Model.with_mimic
@@ -528,7 +555,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
     # `_spelling` is not in `others`, because most of its classes (`SE3`, `Model`) have the names of Condyle's classes.
-    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")
+    imports = sorted([*imports, "from ._spelling import Force, Motion, ReferenceFrame"])
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
 """{inspect.getdoc(module)}"""
@@ -556,9 +583,9 @@ from typing_extensions import disjoint_base
 def main() -> None:
     """Writes the stub file, or compares the text with the existing file."""
     sys.path.pop(0)  # the folder of the sources, where the module is not built
-    from condyle import _condyle, _inertia, _types, _wholebody
+    from condyle import _condyle, _inertia, _mpc, _types, _wholebody
 
-    text = stub(_condyle, _types, [_inertia, _wholebody])
+    text = stub(_condyle, _types, [_inertia, _mpc, _wholebody])
     if sys.argv[1:] != ["--check"]:
         FILE.write_text(text, encoding="utf-8")
     elif FILE.read_text(encoding="utf-8") != text:

@@ -18,7 +18,15 @@ LARGEST = 70
 """Maximum number of names on the first page of the crate `condyle`: modules, types, traits, functions and constants
 together."""
 INTERNAL = re.compile(r"\b(SameLayout|FusedF64|LaneDual|Lanes|Rename|NotALane|SimdToken)\b")
-CRATES = ["condyle", "condyle_dynamics", "condyle_model", "condyle_optimal", "condyle_spatial", "condyle_wholebody"]
+CRATES = [
+    "condyle",
+    "condyle_dynamics",
+    "condyle_model",
+    "condyle_mpc",
+    "condyle_optimal",
+    "condyle_spatial",
+    "condyle_wholebody",
+]
 REEXPORTED = {"nalgebra", "num_dual", "rand"}
 """Names of other projects' crates that Condyle re-exports as modules."""
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
 from ._inertia import Inertia
+from ._mpc import ArmWeights, PlanLimits, Report, Weights
 from ._spelling import Force, Motion, ReferenceFrame
 from ._types import (
     AbaDerivatives,
@@ -28,6 +29,7 @@ from ._types import (
     Control,
     CoriolisDerivatives,
     Coupling,
+    Difference,
     EnergyDerivatives,
     Evaluation,
     Frame,
@@ -43,6 +45,7 @@ from ._types import (
     ModelWarning,
     Outcome,
     PassiveDerivatives,
+    RecordedTick,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
@@ -61,6 +64,7 @@ __all__ = [
     "WORLD",
     "Action",
     "Activation",
+    "ArmMpc",
     "AugmentedLagrangian",
     "BodyId",
     "Cholesky",
@@ -76,14 +80,17 @@ __all__ = [
     "DivideConquer",
     "Error",
     "Fddp",
+    "Foot",
     "FreeDynamics",
     "FreeInverseDynamics",
     "FrictionCone",
     "FrictionContact",
+    "Gait",
     "HyperDual",
     "ImpulseDynamics",
     "InteriorPoint",
     "Joint",
+    "JointPolicy",
     "Limit",
     "Lqr",
     "Ltdl",
@@ -96,12 +103,15 @@ __all__ = [
     "Policy",
     "Problem",
     "ProblemError",
+    "Record",
     "Residual",
+    "Schedule",
     "Simulation",
     "Sweep",
     "Task",
     "Unicycle",
     "WholeBodyController",
+    "WholeBodyMpc",
     "WrenchCone",
     "_SpelledData",
     "_SpelledModel",
@@ -2655,6 +2665,304 @@ def _model_from_bytes(data: bytes) -> Model:
     """Creates the model from the bytes of a pickle."""
 
 @final
+class ArmMpc:
+    """A model predictive controller of an arm with a fixed base. A frame of the arm follows poses in time, and the plan
+    keeps the limits of positions, velocities and efforts. A `JointPolicy` follows the plan at a higher rate.
+
+    `path` is a function that returns the pose of the frame (4, 4) at a time (s), or a pose that does not change. It is
+    called for each knot of the horizon.
+
+    model: the robot.
+    frame: the name of the frame.
+    horizon, knot: the durations of the horizon and of a knot (s).
+    weights: `ArmWeights`; None for the defaults.
+    limits: `PlanLimits`; None for all limits of the model.
+    sweeps: the number of sweeps in a tick.
+    budget: the time budget of a tick (s); None without a budget. One sweep is always made.
+    latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
+    threads: the number of threads of a tick.
+
+    Raises `ControllerError` for a number outside its range, and `ProblemError` for a frame that does not exist.
+
+    >>> from condyle.mpc import ArmMpc
+    >>> arm = condyle.robots.arm7()
+    >>> x = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+    >>> pose = condyle.frame_placement(arm, condyle.Data(arm), x[:7], "tool")
+    >>> mpc = ArmMpc(arm, "tool")
+    >>> mpc.reset(x, pose)
+    >>> mpc.update(0.02, x, pose)(0.021, x).shape
+    (7,)
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        frame: str,
+        *,
+        horizon: float = 0.5,
+        knot: float = 0.02,
+        weights: ArmWeights | None | None = None,
+        limits: PlanLimits | None | None = None,
+        sweeps: int = 2,
+        budget: float | None | None = None,
+        latency: float = 0.0,
+        threads: int = 1,
+    ) -> ArmMpc: ...
+    @property
+    def model(self) -> Model:
+        """The robot."""
+
+    @property
+    def report(self) -> Report:
+        """The `Report` of the last tick."""
+
+    def policy(self) -> JointPolicy:
+        """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
+
+    def reset(self, x: ArrayLike, path: ArrayLike | Callable[[float], ArrayLike], t: float = 0.0) -> None:
+        """Begins anew in a state, whose joints are the posture from which the arm deviates as little as the path allows.
+
+        x: the state (q, v); path: the pose of the frame as a function of time, or a pose (4, 4); t: the time (s).
+
+        Raises `ControllerError` for a number that is not finite.
+        """
+
+    def update(self, t: float, x: ArrayLike, path: ArrayLike | Callable[[float], ArrayLike]) -> JointPolicy:
+        """Renews the plan for a measured state, and returns a new `JointPolicy` that follows the latest plan. The first
+        call is a `reset`. A state that is not finite leaves the plan as it is: see `report`.
+
+        t: the time of the measurement (s); x: the state (q, v); path: the pose of the frame as a function of time, or a
+        pose (4, 4).
+
+        Raises `ControllerError` if t is before the last call.
+        """
+
+@final
+class Foot:
+    """A foot of a walking robot: `Foot.point` or `Foot.sole`.
+
+    >>> condyle.mpc.Foot.point("LF_foot", friction=0.6, radius=0.02).frame
+    'LF_foot'
+    """
+
+    @property
+    def frame(self) -> str:
+        """The name of the frame."""
+
+    @staticmethod
+    def point(frame: str, friction: float, radius: float) -> Foot:
+        """Returns a foot that is a ball around the origin of a frame.
+
+        frame: the name of the frame; friction: the coefficient of friction that the controller may use; radius: the
+        radius of the ball (m).
+
+        Raises `ControllerError` for a number outside its range.
+        """
+
+    @staticmethod
+    def sole(frame: str, friction: float, size: _Size) -> Foot:
+        """Returns a foot that is a rectangle in the plane z = 0 of a frame.
+
+        frame: the name of the frame, whose origin is in the middle of the sole; friction: the coefficient of friction
+        that the controller may use; size: the side lengths along the axes x and y of the frame (m).
+
+        Raises `ControllerError` for a number outside its range.
+        """
+
+@final
+class Gait:
+    """A gait of a walking robot: which feet are in the air, and when. The swings repeat after a period.
+
+    The positions of the feet in the stand tell which feet are in front and which are on the left.
+
+    >>> condyle.mpc.Gait.trot(swing=0.24, double=0.04)
+    Gait.trot(swing=0.24, double=0.04)
+    """
+
+    @staticmethod
+    def bound(swing: float = 0.2, double: float = 0.06) -> Gait:
+        """Returns the gait in which the front and the rear pair of four feet swing in turn; for the arguments see `trot`."""
+
+    @staticmethod
+    def pace(swing: float = 0.2, double: float = 0.06) -> Gait:
+        """Returns the gait in which the left and the right pair of four feet swing in turn; for the arguments see `trot`."""
+
+    @staticmethod
+    def stand() -> Gait:
+        """Returns the gait in which all feet stay on the ground."""
+
+    @staticmethod
+    def step(swing: float = 0.36, double: float = 0.08) -> Gait:
+        """Returns the gait in which the feet swing one by one from left to right, as a biped steps; for the arguments see
+        `trot`.
+        """
+
+    @staticmethod
+    def table(period: float, swings: Sequence[tuple[str, float, float]]) -> Gait:
+        """Returns a gait from a table.
+
+        period: the time after which the swings repeat (s); swings: tuples (frame, begin, end) with the name of a foot's
+        frame, and the times at which the foot leaves the ground and lands (s), both within the period.
+        """
+
+    @staticmethod
+    def trot(swing: float = 0.24, double: float = 0.04) -> Gait:
+        """Returns the gait in which diagonal pairs of four feet swing in turn.
+
+        swing: the duration of a swing (s); double: the time between two swings, with all feet on the ground (s).
+        """
+
+    @staticmethod
+    def walk(swing: float = 0.24, double: float = 0.04) -> Gait:
+        """Returns the gait in which four feet swing one by one: rear left, front left, rear right, front right; for
+        the arguments see `trot`.
+        """
+
+@final
+class JointPolicy:
+    """The efforts of a robot's joints as a function of time and state: the feedback of the latest plan, within the limits
+    of the robot.
+
+    `policy(t, x)` returns the efforts of all joints but the free-flyer's, at the time t (s) and the state x = (q, v).
+    Another thread can call it while a plan is computed; a call never waits. All efforts are finite and within the
+    limits. After the end of the plan, after `stop()` or without a plan, the policy damps the joints. If x has a number
+    that is not finite, the policy returns the efforts of the plan without feedback. `source` tells which of these the
+    last call returned.
+    """
+
+    @property
+    def end(self) -> float | None:
+        """The time of the end of the plan (s); None before the first plan."""
+
+    @property
+    def source(self) -> Literal["plan", "open_loop", "damping"]:
+        """The source of the efforts of the last call: 'plan', 'open_loop' (the plan without feedback) or 'damping'."""
+
+    def __call__(self, t: float, x: ArrayLike) -> _Array: ...
+    def release(self) -> None:
+        """Makes the policy follow the plan again after `stop`."""
+
+    def stop(self) -> None:
+        """Makes the policy damp the joints from now on, as an emergency stop, until `release`."""
+
+@final
+class WholeBodyMpc:
+    """A model predictive controller of a walking robot. Each tick renews a plan of the whole body's motion and of the
+    contact forces, under the limits of the robot and of friction. A `JointPolicy` follows the plan at a higher rate.
+
+    The plan is an optimal control problem with a knot for each time step, and the schedule of the gait gives the
+    contacts of each knot. Knots begin at times that do not depend on the rate of the ticks. Each tick makes one
+    linearisation and at most `sweeps` sweeps of the interior point.
+
+    model: a robot with a free-flyer at its root.
+    feet: a list of `Foot`.
+    gait: a `Gait`.
+    horizon, knot: the durations of the horizon and of a knot (s).
+    weights: `Weights`; None for the defaults.
+    limits: `PlanLimits`; None for all limits of the model.
+    sweeps: the number of sweeps in a tick.
+    budget: the time budget of a tick (s); None without a budget. One sweep is always made.
+    latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
+    threads: the number of threads of a tick.
+    max_acceleration: the largest accelerations of the command: forwards, to the left (m/s²), and turning (rad/s²).
+    swing_height: the height of a swing (m).
+
+    Raises `ControllerError` for a robot without a free-flyer, a foot or a gait that does not fit the robot, or a number
+    outside its range.
+
+    >>> from condyle.mpc import Foot, Gait, WholeBodyMpc
+    >>> robot = condyle.robots.quadruped()
+    >>> feet = [Foot.point(f"{leg}_foot", 0.6, 0.0) for leg in ("LF", "RF", "LH", "RH")]
+    >>> mpc = WholeBodyMpc(robot, feet, Gait.trot(), threads=1)
+    >>> mpc.report.status
+    'no_plan'
+    """
+
+    def __new__(
+        cls,
+        model: Model,
+        feet: Sequence[Foot],
+        gait: Gait,
+        *,
+        horizon: float = 0.5,
+        knot: float = 0.02,
+        weights: Weights | None | None = None,
+        limits: PlanLimits | None | None = None,
+        sweeps: int = 2,
+        budget: float | None | None = None,
+        latency: float = 0.0,
+        threads: int = 1,
+        max_acceleration: tuple[float, float, float] = ...,
+        swing_height: float = 0.06,
+    ) -> WholeBodyMpc: ...
+    @property
+    def model(self) -> Model:
+        """The robot."""
+
+    @property
+    def report(self) -> Report:
+        """The `Report` of the last tick."""
+
+    def command(self, vx: float = 0.0, vy: float = 0.0, wz: float = 0.0, height: float | None | None = None) -> None:
+        """Sets the commanded velocity of the trunk, along its heading.
+
+        vx, vy: velocities forwards and to the left (m/s); wz: rate of turning to the left (rad/s); height: height of
+        the trunk relative to the stand (m), None to keep it.
+
+        Raises `ControllerError` for a number that is not finite.
+        """
+
+    def forces(self) -> _Array:
+        """Returns the planned forces of the ground on the feet, along the world's axes: (knots, feet, 3) (N). The force of
+        a foot in the air is 0.
+
+        Raises `ControllerError` without a plan.
+        """
+
+    def policy(self) -> JointPolicy:
+        """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
+
+    def prepare(self, t: float | None | None = None) -> None:
+        """Makes the part of the next `update` that does not depend on the measured state, before the state arrives.
+
+        t: the time of the next measurement (s); with None, it follows after the last period. An update at another time
+            makes the whole tick again.
+
+        Raises `ControllerError` before the first plan, and if t is before the last call.
+        """
+
+    def reset(self, x: ArrayLike, t: float = 0.0) -> None:
+        """Begins anew with a robot that stands: its joints are the posture to which the robot returns, and its feet are
+        on the ground. Solves the first problem.
+
+        x: the state (q, v); t: the time (s).
+
+        Raises `ControllerError` for a number that is not finite, or if the gait does not fit the feet.
+        """
+
+    def set_gait(self, gait: Gait) -> None:
+        """Changes the gait as soon as all feet that are in the air have landed.
+
+        Raises `ControllerError` for a gait that does not fit the feet.
+        """
+
+    def terrain(self, normal: ArrayLike | None = None, height: float = 0.0) -> None:
+        """Sets the plane of the ground. Without arguments, it is the plane through the last footholds.
+
+        normal: the normal of the plane, which points upwards; height: the height of the plane at the origin of the
+        world (m).
+        """
+
+    def update(self, t: float, x: ArrayLike) -> JointPolicy:
+        """Renews the plan for a measured state, and returns a new `JointPolicy` that follows the latest plan. The first
+        call is a `reset`. A state that is not finite leaves the plan as it is: see `report`.
+
+        t: the time of the measurement (s); x: the state (q, v).
+
+        Raises `ControllerError` if t is before the last call.
+        """
+
+@final
 class Action:
     """An action written in Python.
 
@@ -2847,6 +3155,20 @@ class AugmentedLagrangian:
         Raises `ProblemError` for an invalid number; then no setting changes.
         """
 
+    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
+        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+
+        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+
+        x: the measured state, nx numbers.
+        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            knot continues.
+
+        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+        """
+
     def publish(self, policy: Policy, start: float = 0.0) -> None:
         """Publishes the last solution for the threads that call a policy.
 
@@ -2881,6 +3203,29 @@ class AugmentedLagrangian:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
+        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+
+        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+        name keep their multipliers. After the end of the last solution, states and controls follow as in
+        `shift`.
+
+        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+        A knot whose model changes has the costs and limits that its new model has for all knots, until
+        `set_references` is called.
+
+        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            horizon, at least 0.
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def set_multipliers(self, name: str, values: ArrayLike) -> None:
@@ -3232,6 +3577,20 @@ class Fddp:
         exceptions raised by an `Action`.
         """
 
+    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
+        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+
+        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+
+        x: the measured state, nx numbers.
+        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            knot continues.
+
+        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
+        """
+
     def prepare(self) -> None:
         """Makes the first half of an iteration before the state arrives: derivatives and sweep along the trajectory of the
         last solution. `feedback` makes the second half.
@@ -3290,6 +3649,29 @@ class Fddp:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
+        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+
+        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+        name keep their multipliers. After the end of the last solution, states and controls follow as in
+        `shift`.
+
+        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+        A knot whose model changes has the costs and limits that its new model has for all knots, until
+        `set_references` is called.
+
+        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            horizon, at least 0.
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def shift(self, last: int) -> None:
@@ -3570,13 +3952,27 @@ class InteriorPoint:
 
         If the state equals the prediction, the result is the result of `problem.set_x0(x0)` and `tick`, to the bit.
         Elsewhere, the linearisation remains the one along the prediction, and the difference enters the last step. If
-        the difference is so large that other limits become active, the sweeps are repeated. `time_budget` applies to
-        this call alone; `timings` contain both. Other threads can run meanwhile.
+        the difference is so large that other limits may become active, one new sweep replaces the prepared ones.
+        `time_budget` applies to this call alone; `timings` contain both. Other threads can run meanwhile.
 
         x0: the measured state, nx numbers.
 
         Raises `ProblemError` if nothing is prepared, and as `Problem.set_x0` does; then the preparation is kept. Raises
         exceptions raised by an `Action`.
+        """
+
+    def predict(self, x: ArrayLike, now: float, then: float) -> _Array:
+        """Predicts the state at the time `then` from the state x at the time `now`: nx numbers. The last solution
+        is executed meanwhile: the dynamics of the knots are integrated, with the controls of the policy,
+        u = ū + K (x ⊖ x̄). The steps take at most 2 ms.
+
+        A controller predicts the state at which its next plan begins, before it calls `retime` or `shift`.
+
+        x: the measured state, nx numbers.
+        now, then: times (s) after the beginning of knot 0 of the last solution. After the horizon, the last
+            knot continues.
+
+        Raises `ProblemError` for a number that is not finite, and for knots without duration, of an `Action`.
         """
 
     def prepare(self, sweeps: int = 2) -> None:
@@ -3627,6 +4023,29 @@ class InteriorPoint:
         callback, verbose, progress: as for `solve`.
 
         Raises `ProblemError` as `solve` does, and if there is no solution yet.
+        """
+
+    def retime(self, elapsed: float, knot_models: Sequence[int], durations: ArrayLike) -> int:
+        """Moves the horizon by any time, gives its knots new models and durations, and turns the last solution
+        into a warm start for it. A controller calls this method in each period, with knots from a `Schedule`.
+        So the period is independent of the spacing of the knots, and contacts may begin and end at any time.
+
+        Each new knot takes its numbers from the last solution at the same time. States are interpolated;
+        a new knot has the controls, gains and multipliers of the old knot at its middle. If this knot has
+        other contacts, the controls hold the state still, the gains are zero, and only limits with the same
+        name keep their multipliers. After the end of the last solution, states and controls follow as in
+        `shift`.
+
+        Returns the number of knots that have passed. The costs and limits of single knots move by this number.
+        A knot whose model changes has the costs and limits that its new model has for all knots, until
+        `set_references` is called.
+
+        elapsed: the time (s) from the beginning of knot 0 of the last solution to the beginning of the new
+            horizon, at least 0.
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        Raises `ProblemError` for invalid arguments, and before the first solve. Then nothing changes.
         """
 
     def set_multipliers(self, name: str, values: ArrayLike) -> None:
@@ -3950,6 +4369,19 @@ class Problem:
         Raises `ProblemError` if the model does not fit.
         """
 
+    def set_knots(self, knot_models: Sequence[int], durations: ArrayLike) -> None:
+        """Sets the models and durations of all knots, before the first solve. Later, `retime` of a solver also moves its
+        solution.
+
+        knot_models: the index of the model of each knot, N indices.
+        durations: the duration (s) of each knot, N numbers, 0 for an impact.
+
+        A knot whose model changes has the costs and limits that its new model has for all knots.
+
+        Raises `ProblemError` for an unknown model, for a duration that is not above 0 or not 0 at an impact, and for a
+        new duration of an action that does not belong to a robot. Then nothing changes.
+        """
+
     def set_references(self, name: str, values: ArrayLike) -> None:
         """Writes new targets of the cost with this name at all knots, without making new costs. An MPC calls this in
         each period, between solves.
@@ -3989,6 +4421,69 @@ class Problem:
         Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate`, or if
         knots belong to different robots.
         """
+
+@final
+class Record:
+    """A record of a controller: all calls that change its problem or its solver, from the first `solve` on, and the result
+    of each tick. A replay makes the same calls on a new problem and gives the same results, bit for bit.
+
+    A record begins when it is made, before the first `solve`, and ends with `stop`. It contains the problem and the
+    settings at the beginning. Each call that solves (`solve`, `resume` or `tick`) ends a tick. `record[k]` returns tick
+    k as a `RecordedTick`: its calls with their arguments, states, controls and status. Recording copies the arguments
+    and results, about 20 kB in each tick of a quadruped with 25 knots.
+
+    Results have the same bits only on processors with the same vector extensions. A solve that its `time_budget`, a
+    callback or a signal ends early depends on the time, so its replay may differ.
+
+    solver: a solver of a robot's problem, which has not solved yet. Only calls of this solver are recorded.
+
+    Raises `ProblemError` if the problem cannot be written as JSON (see `Problem.to_json`).
+
+    >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Record, Residual
+    >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
+    >>> knot = FreeDynamics(arm, 0.02, [Cost("effort", 1.0, Residual.control(np.zeros(7)))])
+    >>> problem = Problem(x0, [knot], [0] * 10, FreeDynamics(arm, None, [Cost("rest", 1.0, Residual.state(x0))]))
+    >>> solver = Fddp(problem, max_iterations=2)
+    >>> record = Record(solver)
+    >>> solution = solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7)))
+    >>> solver.shift(0)
+    >>> problem.set_x0(x0 + 0.01)
+    >>> solution = solver.resume()
+    >>> record.stop()
+    >>> [name for name, arguments in record[1].calls], record.replay()
+    (['shift', 'set_x0', 'resume'], None)
+    """
+
+    def __new__(cls, solver: AugmentedLagrangian | Fddp | InteriorPoint) -> Record: ...
+    def __getitem__(self, key: int, /) -> RecordedTick: ...
+    def __len__(self, /) -> int: ...
+    @staticmethod
+    def load(path: _Path) -> Record:
+        """Reads a record from a file that `save` has written.
+
+        Raises `OSError` if the file cannot be read, and `ProblemError` if it contains no record, or a record of another
+        version.
+        """
+
+    def replay(self) -> Difference | None:
+        """Makes all calls on a new problem, and compares the results with the record. Returns the first `Difference`, or
+        None if all bits are the same. Other threads can run meanwhile.
+
+        Raises `ProblemError` if a call that solves fails, for example because the record began after the first solve.
+        """
+
+    def save(self, path: _Path) -> None:
+        """Writes the record to a file, as JSON. Arrays are written as base64 of their bytes, so that no bit is lost.
+
+        Raises `OSError` if the file cannot be written, and `ProblemError` if a model has a residual that is written in
+        Python.
+        """
+
+    def start(self) -> tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]:
+        """Returns a new problem and a new solver, as they were at the beginning of the record."""
+
+    def stop(self) -> None:
+        """Ends the record. Later calls are not recorded."""
 
 @final
 class Residual:
@@ -4174,6 +4669,71 @@ class Residual:
     @staticmethod
     def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
         """Returns the rows r = A w of a wrench cone, for a rigid contact's wrench w."""
+
+@final
+class Schedule:
+    """The models of a horizon in time: from each switching time on, knots have another model. A trot for example switches
+    between models that differ in their contacts.
+
+    `knots(t, count)` returns the models and durations of a horizon that begins at any time t, for `retime` of a solver.
+    Knots begin at times that do not depend on t, and no knot contains a switching time. The time between two switches
+    is divided into equal knots, whose duration is as near to the spacing as possible. Only the first knot of a horizon
+    differs: it begins at t. It takes the rest of the present knot, together with the next knot if the rest is at most
+    half the spacing and no switch follows. So later knots remain the same when the horizon moves. The number of knots
+    is constant, and the end of the horizon moves.
+
+    spacing: the duration of a knot (s).
+    model: the index of the model before the first switch.
+
+    Raises `ProblemError` if the spacing is not above 0.
+
+    >>> from condyle.optimal import Schedule
+    >>> schedule = Schedule(0.02, 0)
+    >>> schedule.switch(0.05, 1)
+    >>> schedule.switch(0.10, 0)
+    >>> models, durations = schedule.knots(0.015, 5)
+    >>> models, durations.round(6).tolist()
+    ([0, 0, 1, 1, 0], [0.015, 0.02, 0.025, 0.025, 0.02])
+    """
+
+    def __new__(cls, spacing: float, model: int = 0) -> Schedule: ...
+    @property
+    def spacing(self) -> float:
+        """The duration of a knot (s)."""
+
+    @property
+    def switches(self) -> list[tuple[float, int]]:
+        """The switches that are not forgotten: times (s), each with the model from this time on."""
+
+    @staticmethod
+    def _from_text(text: str) -> Schedule: ...
+    def forget(self, t: float) -> None:
+        """Forgets the switches before the present phase, so that the schedule does not grow.
+
+        t: a time (s) in the present phase.
+        """
+
+    def knots(self, t: float, count: int) -> tuple[list[int], _Array]:
+        """Returns the models and durations of the knots of a horizon: a list of indices and an array (s).
+
+        t: the time (s) at which the horizon begins.
+        count: the number of knots.
+
+        Raises `ProblemError` if t is not finite.
+        """
+
+    def model(self, t: float) -> int:
+        """Returns the index of the model at the time t (s)."""
+
+    def switch(self, t: float, model: int) -> None:
+        """Adds a switch. Switches at or after t are removed: a contact that occurs earlier than planned is a switch now,
+        followed by the new switches.
+
+        t: the time (s) from which on knots have the model.
+        model: the index of the model.
+
+        Raises `ProblemError` if t is not finite.
+        """
 
 @final
 class Sweep:

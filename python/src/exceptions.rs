@@ -52,6 +52,14 @@ pub(crate) fn controller_error(error: condyle::wholebody::Error) -> PyErr {
     }
 }
 
+/// Converts an error of `condyle::mpc` to a `ProblemError` or a `ControllerError`.
+pub(crate) fn mpc_error(error: condyle::mpc::Error) -> PyErr {
+    match error {
+        condyle::mpc::Error::Optimal(error) => problem_error(error),
+        other => ControllerError::new_err(other.to_string()),
+    }
+}
+
 /// Returns the error for a word that is not among the words expected for an argument.
 pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))

@@ -12,7 +12,7 @@
 //! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
-//! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
+//! - `optimal`, `wholebody`, `mpc`: the modules `condyle.optimal`, `condyle.wholebody` and `condyle.mpc`.
 //!
 //! The doc comments of Python classes and functions become docstrings; `stubs.py` writes these to
 //! `condyle/_condyle.pyi`.
@@ -41,6 +41,7 @@ mod joint;
 mod kinematics;
 mod made_for;
 mod model;
+mod mpc;
 mod optimal;
 mod regressors;
 mod robots;
@@ -116,6 +117,8 @@ mod _condyle {
     };
     #[pymodule_export]
     use model::{Model, model_from_bytes};
+    #[pymodule_export]
+    use mpc::{ArmMpc, Foot, Gait, JointPolicy, WholeBodyMpc};
     #[pymodule_export]
     use optimal::{
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,

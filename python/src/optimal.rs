@@ -20,6 +20,7 @@ mod robot_action;
 mod run;
 mod schedule;
 mod settings;
+mod solver_class;
 mod solvers;
 mod sweep;
 

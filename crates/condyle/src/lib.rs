@@ -34,6 +34,7 @@
     feature = "optimal",
     doc = "| optimal control | [`optimal`]: `Fddp`, `AugmentedLagrangian`, `InteriorPoint`, `Problem`, `robot` |"
 )]
+#![cfg_attr(feature = "mpc", doc = "| controllers at a rate | [`mpc`]: `WholeBodyMpc`, `Foot`, `Gait`, `Policy` |")]
 #![cfg_attr(
     feature = "wholebody",
     doc = "| whole-body control | [`wholebody`]: `WholeBodyController`, `Task`, `Plan` |"
@@ -55,6 +56,8 @@ pub use plan::plan_of;
 /// others in modules by theme.
 #[doc(no_inline)]
 pub use condyle_dynamics as dynamics;
+#[cfg(feature = "mpc")]
+pub use condyle_mpc as mpc;
 #[cfg(feature = "optimal")]
 pub use condyle_optimal as optimal;
 #[cfg(feature = "wholebody")]

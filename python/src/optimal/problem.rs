@@ -139,7 +139,7 @@ impl Problem {
         });
         let objects = lock("problem", &this.objects)?;
         let pairs = objects.iter().map(Option::as_ref).zip(described.iter().cloned());
-        let mut all: Vec<(Option<&Py<PyAny>>, Option<Arc<Described>>)> = pairs.collect();
+        let mut all: Vec<_> = pairs.collect();
         all.splice(last..last, of_added);
         let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
         let mut parts = Vec::new();

@@ -56,9 +56,10 @@ class World:
         size: tuple[float, float] | float,
         friction: float = 0.7,
         dt: float = 1e-3,
+        rise: Sequence[float] = (0.0, 0.0),
     ) -> None:
         """size: side lengths of the soles along x and y (m), or radius of the balls (m). friction: coefficient of
-        Coulomb friction in MuJoCo."""
+        Coulomb friction in MuJoCo. rise: slopes of the ground along x and y."""
         self.model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
         self.feet, self.ground = list(feet), 0.0
         spec = mujoco.MjSpec.from_string(ET.tostring(bare(urdf)).decode())
@@ -79,7 +80,9 @@ class World:
             body.add_geom(name=foot, contype=1 << k, conaffinity=0, mass=0.0, **shape, **contact)
         if isinstance(size, float):
             self.ground = -size  # the plan assumes that the centres of the balls are at height 0
-        plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0]}
+        quat = np.zeros(4)
+        mujoco.mju_quatZ2Vec(quat, np.array([-rise[0], -rise[1], 1.0]))
+        plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "quat": quat}
         for k, foot in enumerate(feet):  # each foot has its own ground, which can move
             ground = spec.worldbody.add_body(name=f"ground of {foot}", mocap=True, pos=[0.0, 0.0, self.ground])
             ground.add_geom(name=f"ground of {foot}", contype=0, conaffinity=1 << k, **plane, **contact)

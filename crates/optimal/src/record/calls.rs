@@ -182,11 +182,8 @@ impl AsRef<[f64]> for Numbers {
 impl Call {
     /// Returns whether the call runs the solver, and so ends a tick.
     pub fn solves(&self) -> bool {
-        match self {
-            Self::Solve { .. } | Self::Resume | Self::ResumeToFullStep { .. } => true,
-            Self::Tick { .. } | Self::Feedback { .. } => true,
-            _ => false,
-        }
+        let solves = matches!(self, Self::Solve { .. } | Self::Resume | Self::ResumeToFullStep { .. });
+        solves || matches!(self, Self::Tick { .. } | Self::Feedback { .. })
     }
 
     /// Makes the call.

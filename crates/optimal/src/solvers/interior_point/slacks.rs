@@ -230,7 +230,9 @@ impl Slacks {
     pub(super) fn save(&mut self) {
         let Self { barrier: Barrier { s, z: [zl, zu], .. }, y, saved, .. } = self;
         for (saved, now) in saved.iter_mut().zip([s, zl, zu, y]) {
-            saved.clone_from(now);
+            saved.clear();
+            saved.reserve(now.capacity()); // the rows of later ticks fit too
+            saved.extend_from_slice(now);
         }
     }
 

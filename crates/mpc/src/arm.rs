@@ -1,0 +1,299 @@
+//! Controller of an arm: a frame follows poses in time, under the limits of the arm.
+
+use crate::Error;
+use crate::knots::{EFFORT, effort_limits, joint_limits};
+use crate::policy::Policy;
+use crate::report::{Report, TickStatus};
+use crate::settings::{PlanLimits, check_above, check_at_least};
+use condyle_dynamics::{Model, Se3};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+use condyle_optimal::{InteriorPoint, PolicyPublisher, Problem, Schedule, Status};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Name of the cost of the pose.
+const POSE: &str = "pose";
+/// Numbers of a pose: the homogeneous matrix.
+const POSE_SIZE: usize = 16;
+/// Tolerance of the first solve.
+const TOLERANCE: f64 = 1e-4;
+
+/// Settings of an [`ArmMpc`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmSettings {
+    /// Duration of the horizon (s).
+    pub horizon: f64,
+    /// Duration of a knot (s).
+    pub knot: f64,
+    /// Weights of the costs.
+    pub weights: ArmWeights,
+    /// Limits that the plan keeps.
+    pub limits: PlanLimits,
+    /// Number of sweeps for the quadratic program of each tick.
+    pub sweeps: usize,
+    /// Time budget of a tick (s); infinite without a budget. One sweep is always made.
+    pub budget: f64,
+    /// Time between the measurement of a state and the use of the plan that is computed from it (s).
+    pub latency: f64,
+    /// Number of threads of a tick.
+    pub threads: usize,
+}
+
+impl Default for ArmSettings {
+    fn default() -> Self {
+        Self {
+            horizon: 0.5,
+            knot: 0.02,
+            weights: ArmWeights::default(),
+            limits: PlanLimits::default(),
+            sweeps: 2,
+            budget: f64::INFINITY,
+            latency: 0.0,
+            threads: 1,
+        }
+    }
+}
+
+/// Weights of the costs of an [`ArmMpc`]. Errors are squared: a weight w costs ½ w e² per second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmWeights {
+    /// Weight of the frame's position (m).
+    pub position: f64,
+    /// Weight of the frame's rotation (rad).
+    pub rotation: f64,
+    /// Weight of the deviation from the posture (rad).
+    pub posture: f64,
+    /// Weight of the velocities of the joints (rad/s).
+    pub velocity: f64,
+    /// Weight of the effort beyond gravity, relative to its limit.
+    pub effort: f64,
+}
+
+impl Default for ArmWeights {
+    fn default() -> Self {
+        Self { position: 1e5, rotation: 1e3, posture: 0.1, velocity: 0.1, effort: 1.0 }
+    }
+}
+
+/// Model predictive controller of an arm. A frame of the arm follows poses in time, and the plan keeps the limits of
+/// positions, velocities and efforts.
+///
+/// ```
+/// use condyle_dynamics::{Data, Se3, Vec3, forward_kinematics, robots};
+/// use condyle_mpc::{ArmMpc, ArmSettings};
+/// let arm = std::sync::Arc::new(robots::arm7());
+/// let x = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
+/// let begin = forward_kinematics(&arm, &mut Data::new(&arm), &x[..7]).frame(arm.frame("tool")?);
+/// let path = |t: f64| Se3 { translation: begin.translation + Vec3::new(0.0, 0.1 * t, 0.0), ..begin };
+/// let mut mpc = ArmMpc::new(arm.clone(), "tool", ArmSettings::default())?;
+/// mpc.reset(0.0, &x, path)?;
+/// let (mut policy, mut tau) = (mpc.policy(), [0.0; 7]);
+/// assert!(mpc.update(0.02, &x, path)?.status.is_new());
+/// policy.control(0.021, &x, &mut tau);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct ArmMpc {
+    model: Arc<Model>,
+    settings: ArmSettings,
+    problem: Problem,
+    solver: InteriorPoint,
+    publisher: PolicyPublisher,
+    knots: Schedule,
+    knot_models: Vec<usize>,
+    durations: Vec<f64>,
+    /// Times of the knots (s).
+    times: Vec<f64>,
+    poses: Vec<f64>,
+    x: Vec<f64>,
+    is_started: bool,
+    last: f64,
+    report: Report,
+}
+
+impl ArmMpc {
+    /// Creates a controller for a robot with a fixed base, whose frame `frame` follows poses. Allocates.
+    ///
+    /// # Errors
+    /// [`Error::Optimal`] for a frame that does not exist, or a robot with joints that move no mass;
+    /// [`Error::Setting`] for an invalid setting.
+    pub fn new(model: Arc<Model>, frame: &str, settings: ArmSettings) -> Result<Self, Error> {
+        settings.check()?;
+        let (nq, nv, w) = (model.nq(), model.nv(), settings.weights);
+        let knots = (settings.horizon / settings.knot).round().max(1.0) as usize;
+        let neutral = [condyle_dynamics::neutral(&model), vec![0.0; nv]].concat();
+        let weights = [vec![w.position; 3], vec![w.rotation; 3]].concat();
+        let pose = Residual::FramePlacement { frame: frame.into(), target: Se3::identity() };
+        let pose = Cost::new(POSE, 1.0, pose, Activation::Weighted(weights));
+        let weights = [vec![w.posture; nv], vec![w.velocity; nv]].concat();
+        let state = Residual::State { reference: neutral.clone() };
+        let state = Cost::new("state", 1.0, state, Activation::Weighted(weights));
+        let weights = effort_limits(&model, 0).iter().map(|limit| w.effort / (limit * limit)).collect();
+        let effort = Cost::new(EFFORT, 1.0, Residual::ControlGravity, Activation::Weighted(weights));
+        let limits = joint_limits(&model, 0, settings.limits, false);
+        let knot = FreeDynamics::running(model.clone(), settings.knot, vec![pose.clone(), state.clone(), effort])?;
+        let of_states: Vec<_> = limits.iter().filter(|limit| limit.name != EFFORT).cloned().collect();
+        let knot = Box::new(knot.with_limits(limits)?);
+        let scaled = |cost: Cost| Cost { weight: settings.knot * cost.weight, ..cost };
+        let end = FreeDynamics::terminal(model.clone(), vec![scaled(pose), scaled(state)])?;
+        let end = end.with_limits(of_states)?;
+        let problem = Problem::new(neutral, vec![knot], vec![0; knots], Box::new(end))?;
+        let mut solver = InteriorPoint::new(&problem);
+        solver.settings.tolerance = TOLERANCE;
+        solver.settings.threads = settings.threads;
+        solver.settings.time_budget = settings.budget.is_finite().then(|| Duration::from_secs_f64(settings.budget));
+        Ok(Self {
+            publisher: PolicyPublisher::new(&problem)?,
+            problem,
+            solver,
+            knots: Schedule::new(settings.knot, 0)?,
+            knot_models: vec![0; knots],
+            durations: vec![settings.knot; knots],
+            times: vec![0.0; knots + 1],
+            poses: vec![0.0; POSE_SIZE * (knots + 1)],
+            x: vec![0.0; nq + nv],
+            is_started: false,
+            last: f64::NEG_INFINITY,
+            report: Report::none(0),
+            settings,
+            model,
+        })
+    }
+
+    /// Begins anew at the time t (s) in the state x = (q, v), whose joints are the posture from which the arm deviates
+    /// as little as the path allows. `path` returns the pose of the frame at a time (s). Solves the first problem.
+    /// Allocates.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a number that is not finite; [`Error::Robot`] if no plan is found.
+    pub fn reset(&mut self, t: f64, x: &[f64], path: impl FnMut(f64) -> Se3<f64>) -> Result<&Report, Error> {
+        Error::check_array("t", &[t], 1)?;
+        Error::check_array("x", x, self.x.len())?;
+        self.x.copy_from_slice(x);
+        let nq = self.model.nq();
+        condyle_dynamics::normalize(&self.model, &mut self.x[..nq]);
+        let mut posture = self.x.clone();
+        posture[nq..].fill(0.0);
+        self.problem.set_references("state", &posture.repeat(self.times.len()))?;
+        (self.last, self.is_started) = (t, false);
+        self.plan_anew(t + self.settings.latency, path)?;
+        self.is_started = true;
+        Ok(&self.report)
+    }
+
+    /// Solves the problem at the time `start` from an arm that stands still in the state `self.x`.
+    fn plan_anew(&mut self, start: f64, path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {
+        let begin = Instant::now();
+        self.arrange(start);
+        self.problem.set_knots(&self.knot_models, &self.durations)?;
+        self.refer(path)?;
+        self.problem.set_x0(&self.x)?;
+        let xs = self.x.repeat(self.times.len());
+        let us = self.problem.quasi_static(&xs)?;
+        let references = begin.elapsed();
+        let status = self.solver.solve(&mut self.problem, &xs, &us)?.status;
+        if status == Status::NotFinite {
+            return Err(Error::Robot { what: format!("no plan from this state: {status}") });
+        }
+        self.publisher.publish(&self.problem, self.solver.solution(), start)?;
+        self.report.write(TickStatus::Restarted, start, self.solver.solution(), [references, begin.elapsed()]);
+        Ok(())
+    }
+
+    fn arrange(&mut self, start: f64) {
+        self.knots.write_knots(start, &mut self.knot_models, &mut self.durations);
+        self.times[0] = start;
+        for (k, dt) in self.durations.iter().enumerate() {
+            self.times[k + 1] = self.times[k] + dt;
+        }
+    }
+
+    fn refer(&mut self, mut path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {
+        for (&t, row) in self.times.iter().zip(self.poses.chunks_exact_mut(POSE_SIZE)) {
+            condyle_optimal::robot::Target::Placement(path(t)).write(row);
+        }
+        self.problem.set_references(POSE, &self.poses)?;
+        Ok(())
+    }
+
+    /// Renews the plan for the measured state x = (q, v) at the time t (s). `path` returns the pose of the frame at a
+    /// time (s); it is called for each knot. A state that is not finite leaves the plan as it is, and the report says
+    /// so. The first call is a [`reset`](Self::reset).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a state of another length or a time that is not finite; [`Error::Optimal`] for a pose
+    /// that is invalid; [`Error::Time`] if t is before the last call.
+    pub fn update(&mut self, t: f64, x: &[f64], mut path: impl FnMut(f64) -> Se3<f64>) -> Result<&Report, Error> {
+        Error::check_array("t", &[t], 1)?;
+        if t < self.last {
+            return Err(Error::Time { t, last: self.last });
+        }
+        if !self.is_started {
+            return self.reset(t, x, path);
+        }
+        if x.len() == self.x.len() && x.iter().any(|x| !x.is_finite()) {
+            self.report.status = TickStatus::InvalidState;
+            return Ok(&self.report);
+        }
+        Error::check_array("x", x, self.x.len())?;
+        let (begin, start, nq) = (Instant::now(), t + self.settings.latency, self.model.nq());
+        self.x.copy_from_slice(x);
+        condyle_dynamics::normalize(&self.model, &mut self.x[..nq]);
+        if start > t {
+            let at = self.times[0];
+            self.solver.solution().predict(&mut self.problem, x, t - at, start - at, &mut self.x)?;
+        }
+        let elapsed = start - self.times[0];
+        self.last = t;
+        self.arrange(start);
+        self.solver.retime(&mut self.problem, elapsed, &self.knot_models, &self.durations)?;
+        self.refer(&mut path)?;
+        self.problem.set_x0(&self.x)?;
+        let references = begin.elapsed();
+        let plan = self.solver.tick(&mut self.problem, self.settings.sweeps)?;
+        let result = if plan.fallback.is_none() { TickStatus::Planned } else { TickStatus::Fallback };
+        if !plan.is_executable() {
+            if self.plan_anew(start, path).is_err() {
+                self.report.status = TickStatus::Failed;
+            }
+            return Ok(&self.report);
+        }
+        self.publisher.publish(&self.problem, self.solver.solution(), start)?;
+        let times = [references, begin.elapsed() - references];
+        self.report.write(result, start, self.solver.solution(), times);
+        Ok(&self.report)
+    }
+
+    /// Returns a policy that follows the latest plan, for another thread. Allocates.
+    pub fn policy(&self) -> Policy {
+        Policy::new(&self.publisher, &self.model, &self.x[..self.model.nq()], 0)
+    }
+
+    /// Returns the report of the last tick.
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    /// Returns the solver, with the plan and its multipliers.
+    pub fn solver(&self) -> &InteriorPoint {
+        &self.solver
+    }
+
+    /// Returns the robot.
+    pub fn model(&self) -> &Arc<Model> {
+        &self.model
+    }
+}
+
+impl ArmSettings {
+    fn check(&self) -> Result<(), Error> {
+        check_above("knot", self.knot)?;
+        crate::settings::check_horizon(self.horizon, self.knot)?;
+        Error::check("sweeps", self.sweeps as f64, self.sweeps > 0, "at least 1")?;
+        Error::check("budget", self.budget, self.budget > 0.0, "above 0")?;
+        check_at_least("latency", self.latency)?;
+        let w = &self.weights;
+        let weights = [w.position, w.rotation, w.posture, w.velocity, w.effort];
+        weights.into_iter().try_for_each(|weight| check_at_least("weights", weight))
+    }
+}

@@ -1,0 +1,84 @@
+//! Tests of the controller of arms: a tool on a circle, limits, and bad input.
+
+use condyle_dynamics::simulation::{Settings as SimulationSettings, Simulation};
+use condyle_dynamics::{Data, Model, Se3, Vec3, forward_kinematics, robots};
+use condyle_mpc::{ArmMpc, ArmSettings, Error, TickStatus};
+use std::sync::Arc;
+
+const STEP: f64 = 1e-3;
+const PERIOD: usize = 10;
+/// Radius of the circle (m) and speed of the tool (m/s).
+const RADIUS: f64 = 0.12;
+const SPEED: f64 = 0.25;
+
+fn start() -> Vec<f64> {
+    [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat()
+}
+
+fn tool(arm: &Model, q: &[f64]) -> Se3<f64> {
+    forward_kinematics(arm, &mut Data::new(arm), q).frame(arm.frame("tool").unwrap())
+}
+
+/// Returns the pose on the circle at the time t. The tool starts from rest.
+fn circle(begin: Se3<f64>, t: f64) -> Se3<f64> {
+    let angle = SPEED / RADIUS * if t < 1.0 { 0.5 * t * t } else { t - 0.5 };
+    let by = Vec3::new(0.0, angle.sin(), angle.cos() - 1.0).scale(RADIUS);
+    Se3 { translation: begin.translation + by, ..begin }
+}
+
+#[test]
+fn the_tool_follows_a_circle_within_the_limits() {
+    let arm = Arc::new(robots::arm7());
+    let begin = tool(&arm, &start()[..7]);
+    let mut mpc = ArmMpc::new(arm.clone(), "tool", ArmSettings::default()).unwrap();
+    mpc.reset(0.0, &start(), |t| circle(begin, t)).unwrap();
+    let mut simulation = Simulation::new(arm.clone(), SimulationSettings { dt: STEP, ..Default::default() });
+    simulation.set_state(&start()[..7], &[0.0; 7]).unwrap();
+    let (mut policy, mut tau, mut worst) = (mpc.policy(), [0.0; 7], 0.0f64);
+    for step in 0..4000 {
+        let t = STEP * step as f64;
+        let x = [simulation.q(), simulation.v()].concat();
+        if step % PERIOD == 0 && step > 0 {
+            let report = mpc.update(t, &x, |t| circle(begin, t)).unwrap().clone();
+            assert_eq!(report.status, TickStatus::Planned, "{report:?} {:?}", mpc.solver().outcome().worst);
+        }
+        policy.control(t, &x, &mut tau);
+        assert!(simulation.step(&tau, &[]).is_taken());
+        let miss = tool(&arm, simulation.q()).translation - circle(begin, t + STEP).translation;
+        worst = worst.max(miss.norm_squared().sqrt());
+    }
+    assert!(worst < 2e-3, "{worst} m");
+}
+
+#[test]
+fn limits_hold_where_the_path_is_too_fast() {
+    let arm = robots::arm7();
+    let mut limits = arm.limits().clone();
+    limits.velocity.fill(0.6);
+    let arm = Arc::new(arm.with_limits(limits).unwrap());
+    let begin = tool(&arm, &start()[..7]);
+    let fast = |t: f64| Se3 { translation: begin.translation + Vec3::new(0.0, 0.8 * t.min(0.4), 0.0), ..begin };
+    let mut mpc = ArmMpc::new(arm.clone(), "tool", ArmSettings::default()).unwrap();
+    mpc.reset(0.0, &start(), fast).unwrap();
+    let plan = mpc.solver().solution();
+    let fastest = plan.xs.chunks(14).flat_map(|x| &x[7..]).fold(0.0f64, |most, v| most.max(v.abs()));
+    assert!(fastest > 0.55 && fastest < 0.62, "{fastest} rad/s");
+}
+
+#[test]
+fn bad_input_is_refused() {
+    let arm = Arc::new(robots::arm7());
+    let begin = tool(&arm, &start()[..7]);
+    let error = ArmMpc::new(arm.clone(), "paw", ArmSettings::default()).unwrap_err().to_string();
+    assert!(error.contains("paw"), "{error}");
+    let mut mpc = ArmMpc::new(arm, "tool", ArmSettings::default()).unwrap();
+    mpc.reset(0.0, &start(), |_| begin).unwrap();
+    let mut broken = start();
+    broken[3] = f64::NAN;
+    assert_eq!(mpc.update(0.02, &broken, |_| begin).unwrap().status, TickStatus::InvalidState);
+    let nowhere = Se3 { translation: Vec3::new(f64::NAN, 0.0, 0.0), ..begin };
+    let error = mpc.update(0.04, &start(), |_| nowhere).unwrap_err().to_string();
+    assert!(error.contains("pose") && error.contains("NaN"), "{error}");
+    assert_eq!(mpc.update(0.06, &start(), |_| begin).unwrap().status, TickStatus::Planned);
+    assert_eq!(mpc.update(0.05, &start(), |_| begin).unwrap_err(), Error::Time { t: 0.05, last: 0.06 });
+}

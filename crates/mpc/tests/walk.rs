@@ -1,0 +1,222 @@
+//! Tests of the controller of walking robots, in simulations on the ground.
+
+#[path = "../../../tests/common/counting.rs"]
+mod counting;
+
+use condyle_dynamics::simulation::{Ground, Settings as SimulationSettings, Simulation};
+use condyle_dynamics::{Model, robots};
+use condyle_mpc::{Command, EffortSource, Error, Foot, Gait, Pattern, Settings, TickStatus, WholeBodyMpc};
+use counting::allocated;
+use std::sync::Arc;
+
+const FEET: [&str; 4] = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
+/// Time step of simulations (s), and steps between two ticks.
+const STEP: f64 = 1e-3;
+const PERIOD: usize = 20;
+
+fn stand() -> Vec<f64> {
+    let legs = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4];
+    [&[0.0, 0.0, 0.5354, 0.0, 0.0, 0.0, 1.0], &legs[..], &legs, &[0.0; 18]].concat()
+}
+
+fn feet() -> [Foot; 4] {
+    FEET.map(|name| Foot::point(name, 0.6, 0.0))
+}
+
+fn trot() -> Gait {
+    Gait::in_turn(Pattern::Trot, 0.24, 0.04)
+}
+
+fn controller(gait: Gait, settings: Settings) -> WholeBodyMpc {
+    WholeBodyMpc::new(Arc::new(robots::quadruped()), &feet(), gait, settings).unwrap()
+}
+
+/// Simulates the quadruped under a controller for some seconds, with `period` steps between two ticks. Calls `before`
+/// before each tick with the time and the controller. Returns the states, one for each time step.
+fn simulate(
+    mpc: &mut WholeBodyMpc,
+    seconds: f64,
+    period: usize,
+    mut before: impl FnMut(f64, &mut WholeBodyMpc, &mut Vec<f64>),
+) -> Vec<Vec<f64>> {
+    let model: Arc<Model> = mpc.model().clone();
+    let mut simulation = Simulation::new(model.clone(), SimulationSettings { dt: STEP, ..Default::default() });
+    let frames = FEET.map(|name| model.frame(name).unwrap());
+    simulation.set_ground(Ground { friction: 0.7, ..Ground::at_frames(frames) }).unwrap();
+    let x = stand();
+    simulation.set_state(&x[..19], &x[19..]).unwrap();
+    mpc.reset(0.0, &x).unwrap();
+    let (mut policy, mut tau, mut states) = (mpc.policy(), vec![0.0; 18], Vec::new());
+    for step in 0..(seconds / STEP).round() as usize {
+        let t = step as f64 * STEP;
+        let mut x = [simulation.q(), simulation.v()].concat();
+        if step % period == 0 && step > 0 {
+            before(t, mpc, &mut x);
+            mpc.update(t, &x).unwrap();
+        }
+        policy.control(t, &x, &mut tau[6..]);
+        for (k, limit) in model.limits().effort().iter().enumerate().skip(6) {
+            assert!(tau[k].abs() <= *limit, "effort {k} is {} at {t} s", tau[k]);
+        }
+        states.push([simulation.q(), simulation.v()].concat());
+        assert!(simulation.step(&tau, &[]).is_taken());
+    }
+    states
+}
+
+/// Returns the mean of an entry of the state since a time step.
+fn mean(states: &[Vec<f64>], entry: usize, since: usize) -> f64 {
+    states[since..].iter().map(|x| x[entry]).sum::<f64>() / (states.len() - since) as f64
+}
+
+#[test]
+fn the_quadruped_follows_its_command_at_each_rate() {
+    for period in [5, 8, 20] {
+        let mut mpc = controller(trot(), Settings::default());
+        let states = simulate(&mut mpc, 2.5, period, |t, mpc, _| {
+            let vx = if t < 0.2 { 0.0 } else { 0.4 };
+            mpc.command(Command { vx, ..Command::default() }).unwrap();
+        });
+        let speed = mean(&states, 19, 1500);
+        assert!((speed - 0.4).abs() < 0.012, "{period} ms: {speed} m/s");
+        assert!(states.iter().all(|x| x[2] > 0.5 && x[3].abs() < 0.1 && x[4].abs() < 0.1));
+    }
+}
+
+/// Checks that ticks in two parts, before and after the state, walk as well as whole ticks.
+#[test]
+fn a_prepared_controller_walks() {
+    let mut mpc = controller(trot(), Settings::default());
+    let states = simulate(&mut mpc, 2.5, PERIOD, |t, mpc, _| {
+        mpc.command(Command { vx: 0.4, ..Command::default() }).unwrap();
+        mpc.prepare((t > 1.0).then_some(t)).unwrap(); // the controller knows the period
+    });
+    let speed = mean(&states, 19, 1500);
+    assert!((speed - 0.4).abs() < 0.012, "{speed} m/s");
+    assert!(states.iter().all(|x| x[2] > 0.5 && x[3].abs() < 0.1 && x[4].abs() < 0.1));
+}
+
+#[test]
+fn it_turns_and_walks_sideways() {
+    let mut mpc = controller(trot(), Settings::default());
+    let states = simulate(&mut mpc, 3.0, PERIOD, |_, mpc, _| {
+        mpc.command(Command { vx: 0.0, vy: 0.2, wz: 0.8 }).unwrap();
+    });
+    assert!((mean(&states, 20, 1800) - 0.2).abs() < 0.02, "{}", mean(&states, 20, 1800));
+    assert!((mean(&states, 24, 1800) - 0.8).abs() < 0.03, "{}", mean(&states, 24, 1800));
+}
+
+/// Checks that feet which are down stay down after the command to stop, until the robot has stopped.
+#[test]
+fn a_stop_lifts_no_foot() {
+    let mut mpc = controller(trot(), Settings::default());
+    let (mut down, mut lifted) = ([true; 4], 0);
+    simulate(&mut mpc, 2.0, PERIOD, |t, mpc, _| {
+        if (t - 1.0).abs() < 1e-6 {
+            mpc.set_gait(Gait::Stand).unwrap();
+        }
+        let stands = &mpc.report().stands;
+        if t > 1.03 {
+            lifted += (0..4).filter(|&foot| down[foot] && !stands[foot]).count();
+        }
+        down.copy_from_slice(stands);
+    });
+    assert_eq!((lifted, down), (0, [true; 4]));
+    // and it starts again, with another gait
+    mpc.set_gait(Gait::in_turn(Pattern::Walk, 0.24, 0.04)).unwrap();
+    let x = mpc.solver().solution().x(0).to_vec();
+    let mut fewest = 4;
+    for k in 0..60 {
+        let report = mpc.update(2.0 + 0.02 * f64::from(k), &x).unwrap();
+        fewest = fewest.min(report.stands.iter().filter(|stands| **stands).count());
+    }
+    assert_eq!(fewest, 3);
+}
+
+#[test]
+fn a_tick_allocates_nothing() {
+    let mut mpc = controller(trot(), Settings::default());
+    let x = stand();
+    mpc.reset(0.0, &x).unwrap();
+    mpc.command(Command { vx: 0.2, ..Command::default() }).unwrap();
+    let (mut policy, mut tau, mut grown) = (mpc.policy(), [0.0; 12], 0);
+    for tick in 1..120 {
+        let t = 0.013 * f64::from(tick);
+        let before = allocated();
+        mpc.update(t, &x).unwrap();
+        policy.control(t, &x, &mut tau);
+        if tick > 60 {
+            grown += allocated() - before; // the first two periods of the gait allocate memory for knots
+        }
+    }
+    assert_eq!(grown, 0);
+}
+
+#[test]
+fn bad_states_leave_a_safe_policy() {
+    let mut mpc = controller(trot(), Settings::default());
+    let (mut policy, mut tau) = (mpc.policy(), [1.0; 12]);
+    let x = stand();
+    assert_eq!(policy.control(0.0, &x, &mut tau), EffortSource::Damping);
+    assert_eq!(tau, [0.0; 12]);
+    mpc.reset(0.0, &x).unwrap();
+    assert_eq!(policy.control(0.01, &x, &mut tau), EffortSource::Plan);
+    let mut broken = x.clone();
+    broken[30] = f64::NAN;
+    assert_eq!(mpc.update(0.02, &broken).unwrap().status, TickStatus::InvalidState);
+    assert_eq!(policy.control(0.02, &broken, &mut tau), EffortSource::OpenLoop);
+    assert!(tau.iter().all(|tau| tau.is_finite()));
+    assert_eq!(mpc.update(0.04, &x).unwrap().status, TickStatus::Planned);
+    assert_eq!(mpc.update(0.03, &x).unwrap_err(), Error::Time { t: 0.03, last: 0.04 });
+    assert_eq!(mpc.update(0.06, &x[1..]).unwrap_err().to_string(), "`x`: expected 37 numbers, found 36");
+    let wrong = Command { vx: f64::INFINITY, ..Command::default() };
+    assert_eq!(mpc.command(wrong).unwrap_err().to_string(), "`command`: entry 0 is inf");
+    // tenfold velocities for one tick: the plan is finite, and the next plans are again as before
+    let fast = [&x[..19], &[3.0; 18]].concat();
+    mpc.update(0.06, &fast).unwrap();
+    policy.control(0.061, &fast, &mut tau);
+    let limits = mpc.model().limits().effort();
+    assert!(tau.iter().zip(&limits[6..]).all(|(tau, limit)| tau.abs() <= *limit));
+    for tick in 4..7 {
+        mpc.update(0.02 * f64::from(tick), &x).unwrap();
+    }
+    assert!(mpc.report().status.is_new() && mpc.report().gap < 1.0, "{:?}", mpc.report());
+    // after the end of the plan, and after a stop, the joints are damped
+    assert_eq!(policy.control(5.0, &fast, &mut tau), EffortSource::Damping);
+    assert!(tau.iter().all(|tau| *tau < 0.0));
+    policy.stop();
+    assert_eq!(policy.control(0.125, &x, &mut tau), EffortSource::Damping);
+    policy.release();
+    assert_eq!(policy.control(0.125, &x, &mut tau), EffortSource::Plan);
+}
+
+/// Checks the messages for feet, gaits and settings that do not fit the robot.
+#[test]
+fn wrong_descriptions_are_refused() {
+    let quadruped = Arc::new(robots::quadruped());
+    let refused = |feet: &[Foot], gait: Gait, settings: Settings| {
+        let mpc = WholeBodyMpc::new(quadruped.clone(), feet, gait, settings);
+        mpc.and_then(|mut mpc| mpc.reset(0.0, &stand()).map(|_| ())).unwrap_err().to_string()
+    };
+    let four = feet();
+    let arm = WholeBodyMpc::new(Arc::new(robots::arm7()), &four, trot(), Settings::default()).unwrap_err();
+    assert_eq!(arm.to_string(), "robot: `arm7` has no free-flyer at its root: read it with a floating base");
+    let unknown = refused(&[Foot::point("paw", 0.6, 0.0)], Gait::Stand, Settings::default());
+    assert!(unknown.starts_with("foot `paw`: the robot has no frame of this name; it has `"), "{unknown}");
+    let twice = refused(&[four[0].clone(), four[0].clone()], Gait::Stand, Settings::default());
+    assert_eq!(twice, "foot `LF_foot`: it is listed twice");
+    let slippery = refused(&[Foot::point("LF_foot", 0.0, 0.0)], Gait::Stand, Settings::default());
+    assert_eq!(slippery, "foot `LF_foot`: its friction is 0");
+    let two = refused(&four[..2], trot(), Settings::default());
+    assert_eq!(two, "gait: Trot needs four feet, one at each corner; there are 2");
+    let jump = Gait::Table { period: 1.0, swings: FEET.map(|name| (name.into(), 0.2, 0.5)).to_vec() };
+    let fall = refused(&four, jump, Settings::default());
+    assert_eq!(fall, "gait: at 0.2 s no foot is on the ground, so nothing supports the robot");
+    let late = Gait::Table { period: 1.0, swings: vec![("LF_foot".into(), 0.8, 1.2)] };
+    let late = refused(&four, late, Settings::default());
+    assert_eq!(late, "gait: `LF_foot` swings from 0.8 to 1.2 s; the period has 1 s");
+    let short = refused(&four, trot(), Settings { horizon: 0.01, ..Settings::default() });
+    assert_eq!(short, "setting `horizon` is 0.01, but it must be at least a knot, and at most 1000 knots");
+    let backwards = refused(&four, Gait::in_turn(Pattern::Trot, -0.2, 0.0), Settings::default());
+    assert_eq!(backwards, "gait: the swing's duration is -0.2 s");
+}

@@ -1,0 +1,164 @@
+//! The controller of arms as a Python class.
+
+use super::policy::JointPolicy;
+use super::settings::{give_report, read_arm_weights, read_limits};
+use crate::arrays::{pose, vector};
+use crate::exceptions::mpc_error;
+use crate::model::Model;
+use crate::optimal::lock;
+use condyle::mpc as rust;
+use condyle::{Se3, Vec3};
+use pyo3::gc::{PyTraverseError, PyVisit};
+use pyo3::prelude::*;
+use std::sync::Mutex;
+
+/// A model predictive controller of an arm with a fixed base. A frame of the arm follows poses in time, and the plan
+/// keeps the limits of positions, velocities and efforts. A `JointPolicy` follows the plan at a higher rate.
+///
+/// `path` is a function that returns the pose of the frame (4, 4) at a time (s), or a pose that does not change. It is
+/// called for each knot of the horizon.
+///
+/// model: the robot.
+/// frame: the name of the frame.
+/// horizon, knot: the durations of the horizon and of a knot (s).
+/// weights: `ArmWeights`; None for the defaults.
+/// limits: `PlanLimits`; None for all limits of the model.
+/// sweeps: the number of sweeps in a tick.
+/// budget: the time budget of a tick (s); None without a budget. One sweep is always made.
+/// latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
+/// threads: the number of threads of a tick.
+///
+/// Raises `ControllerError` for a number outside its range, and `ProblemError` for a frame that does not exist.
+///
+/// >>> from condyle.mpc import ArmMpc
+/// >>> arm = condyle.robots.arm7()
+/// >>> x = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+/// >>> pose = condyle.frame_placement(arm, condyle.Data(arm), x[:7], "tool")
+/// >>> mpc = ArmMpc(arm, "tool")
+/// >>> mpc.reset(x, pose)
+/// >>> mpc.update(0.02, x, pose)(0.021, x).shape
+/// (7,)
+#[pyclass(frozen, module = "condyle.mpc")]
+pub(crate) struct ArmMpc {
+    model: Py<Model>,
+    inner: Mutex<rust::ArmMpc>,
+    nx: usize,
+}
+
+#[pymethods]
+impl ArmMpc {
+    #[new]
+    #[pyo3(signature = (model, frame, *, horizon=0.5, knot=0.02, weights=None, limits=None, sweeps=2, budget=None,
+        latency=0.0, threads=1))]
+    fn new(
+        model: &Bound<'_, Model>,
+        frame: &str,
+        horizon: f64,
+        knot: f64,
+        weights: Option<&Bound<'_, PyAny>>,
+        limits: Option<&Bound<'_, PyAny>>,
+        sweeps: usize,
+        budget: Option<f64>,
+        latency: f64,
+        threads: usize,
+    ) -> PyResult<Self> {
+        let weights = weights.map_or_else(|| Ok(rust::ArmWeights::default()), read_arm_weights)?;
+        let limits = limits.map_or_else(|| Ok(rust::PlanLimits::default()), read_limits)?;
+        let budget = budget.unwrap_or(f64::INFINITY);
+        let settings = rust::ArmSettings { horizon, knot, weights, limits, sweeps, budget, latency, threads };
+        let robot = model.get().inner.clone();
+        let nx = robot.nq() + robot.nv();
+        let inner = rust::ArmMpc::new(robot, frame, settings).map_err(mpc_error)?;
+        Ok(Self { model: model.clone().unbind(), inner: Mutex::new(inner), nx })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.model)
+    }
+
+    /// The robot.
+    #[getter]
+    fn model(&self, py: Python<'_>) -> Py<Model> {
+        self.model.clone_ref(py)
+    }
+
+    /// Begins anew in a state, whose joints are the posture from which the arm deviates as little as the path allows.
+    ///
+    /// x: the state (q, v); path: the pose of the frame as a function of time, or a pose (4, 4); t: the time (s).
+    ///
+    /// Raises `ControllerError` for a number that is not finite.
+    #[pyo3(signature = (x, path, t=0.0))]
+    fn reset(&self, py: Python<'_>, x: &Bound<'_, PyAny>, path: &Bound<'_, PyAny>, t: f64) -> PyResult<()> {
+        let x = vector("x", x, self.nx)?.to_vec();
+        let mut inner = lock("controller", &self.inner)?;
+        let (mpc, mut path) = (&mut *inner, Path::new(path)?);
+        let done = py.detach(|| mpc.reset(t, &x, |t| path.at(t)).map(|_| ()));
+        path.finish(done)
+    }
+
+    /// Renews the plan for a measured state, and returns a new `JointPolicy` that follows the latest plan. The first
+    /// call is a `reset`. A state that is not finite leaves the plan as it is: see `report`.
+    ///
+    /// t: the time of the measurement (s); x: the state (q, v); path: the pose of the frame as a function of time, or a
+    /// pose (4, 4).
+    ///
+    /// Raises `ControllerError` if t is before the last call.
+    fn update(&self, py: Python<'_>, t: f64, x: &Bound<'_, PyAny>, path: &Bound<'_, PyAny>) -> PyResult<JointPolicy> {
+        let x = vector("x", x, self.nx)?.to_vec();
+        let mut inner = lock("controller", &self.inner)?;
+        let (mpc, mut path) = (&mut *inner, Path::new(path)?);
+        let done = py.detach(|| mpc.update(t, &x, |t| path.at(t)).map(|_| ()));
+        path.finish(done)?;
+        drop(inner);
+        self.policy()
+    }
+
+    /// Returns a `JointPolicy` that follows the latest plan, also after later updates.
+    fn policy(&self) -> PyResult<JointPolicy> {
+        let inner = lock("controller", &self.inner)?;
+        Ok(JointPolicy::new(inner.policy(), self.nx, inner.model().nv()))
+    }
+
+    /// The `Report` of the last tick.
+    #[getter]
+    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        give_report(py, lock("controller", &self.inner)?.report())
+    }
+}
+
+/// Path of a frame: a Python function of time, or a pose.
+enum Path {
+    Pose(Se3<f64>),
+    Function(Py<PyAny>, Option<PyErr>),
+}
+
+impl Path {
+    fn new(path: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match path.is_callable() {
+            true => Ok(Self::Function(path.clone().unbind(), None)),
+            false => pose("path", path).map(Self::Pose),
+        }
+    }
+
+    /// Returns the pose at the time t. After an exception, the pose is not finite, so that it is refused.
+    fn at(&mut self, t: f64) -> Se3<f64> {
+        match self {
+            Self::Pose(pose) => *pose,
+            Self::Function(function, error) => {
+                let found = Python::attach(|py| pose("path(t)", &function.bind(py).call1((t,))?));
+                found.unwrap_or_else(|exception| {
+                    error.get_or_insert(exception);
+                    Se3 { translation: Vec3::new(f64::NAN, f64::NAN, f64::NAN), ..Se3::identity() }
+                })
+            }
+        }
+    }
+
+    /// Returns the exception of the function, or the error of the controller.
+    fn finish(self, done: Result<(), rust::Error>) -> PyResult<()> {
+        match self {
+            Self::Function(_, Some(exception)) => Err(exception),
+            _ => done.map_err(mpc_error),
+        }
+    }
+}

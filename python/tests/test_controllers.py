@@ -1,0 +1,158 @@
+"""Tests of `condyle.mpc`: a quadruped that walks, an arm that follows a path, and bad input."""
+
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+import condyle
+from condyle.mpc import ArmMpc, ArmWeights, Foot, Gait, PlanLimits, Weights, WholeBodyMpc
+from condyle.simulation import Ground, Simulation
+from condyle.wholebody import ControllerError
+
+QUADRUPED, ARM = condyle.robots.quadruped(), condyle.robots.arm7()
+FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
+STAND = np.r_[0.0, 0.0, 0.5354, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, np.zeros(18)]
+REST = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
+
+
+def controller(gait: Gait | None = None, **settings: Any) -> WholeBodyMpc:
+    feet = [Foot.point(foot, 0.6, 0.0) for foot in FEET]
+    return WholeBodyMpc(QUADRUPED, feet, gait or Gait.trot(), **settings)
+
+
+def pose() -> Any:
+    return condyle.frame_placement(ARM, condyle.Data(ARM), REST[:7], "tool")
+
+
+@pytest.mark.parametrize(("gait", "vx"), [(Gait.trot(), 0.4), (Gait.pace(), 0.2), (Gait.walk(), 0.15)])
+def test_a_quadruped_walks(gait: Gait, vx: float) -> None:
+    mpc = controller(gait, latency=0.01)
+    mpc.reset(STAND)
+    policy, speeds = mpc.policy(), []
+
+    def law(now: Any) -> None:
+        x = np.r_[now.q, now.v]
+        if round(1e3 * now.time) % 20 == 0 and now.time > 0.0:
+            mpc.command(vx=vx)
+            mpc.update(now.time, x)
+            assert mpc.report.is_new and mpc.report.status == "planned"
+        now.tau[6:] = policy(now.time, x)
+        assert policy.source == "plan" and (np.abs(now.tau) <= QUADRUPED.limits.effort).all()
+        speeds.append(now.v[0])
+
+    simulation = Simulation(QUADRUPED, dt=1e-3, ground=Ground(FEET, friction=0.7))
+    simulation.set_state(STAND[:19], STAND[19:])
+    assert simulation.run(3000, law) == "done"
+    assert np.mean(speeds[1500:]) == pytest.approx(vx, abs=0.02)
+
+
+def test_planned_forces_carry_the_robot() -> None:
+    mpc = controller(Gait.stand())
+    mpc.reset(STAND)
+    forces = mpc.forces()
+    assert forces.shape == (25, 4, 3)
+    assert forces[..., 2].sum(axis=1) == pytest.approx(9.81 * QUADRUPED.total_mass, rel=1e-2)
+
+
+def test_another_thread_follows_the_plan() -> None:
+    mpc = controller()
+    mpc.reset(STAND)
+    policy, done, sent = mpc.policy(), threading.Event(), []
+
+    def motors() -> None:
+        while not done.is_set():
+            sent.append(policy(0.1, STAND))
+            time.sleep(1e-3)
+
+    thread = threading.Thread(target=motors)
+    thread.start()
+    try:
+        for k in range(1, 20):
+            mpc.prepare()
+            mpc.update(0.02 * k, STAND)
+    finally:
+        done.set()
+        thread.join()
+    assert len(sent) > 0 and np.isfinite(sent).all()
+
+
+def test_an_arm_follows_a_path() -> None:
+    begin = pose()
+
+    def path(t: float) -> Any:
+        there = begin.copy()
+        there[1, 3] += 0.1 * np.sin(t)
+        return there
+
+    mpc, worst = ArmMpc(ARM, "tool", weights=ArmWeights(position=1e4), limits=PlanLimits()), [0.0]
+    mpc.reset(REST, path)
+    policy = mpc.policy()
+
+    def law(now: Any) -> None:
+        x = np.r_[now.q, now.v]
+        if round(1e3 * now.time) % 10 == 0 and now.time > 0.0:
+            mpc.update(now.time, x, path)
+        now.tau[:] = policy(now.time, x)
+        tool = condyle.frame_placement(ARM, condyle.Data(ARM), now.q, "tool")
+        worst.append(float(np.abs(tool - path(now.time)).max()))
+
+    simulation = Simulation(ARM, dt=1e-3)
+    simulation.set_state(REST[:7], REST[7:])
+    assert simulation.run(2000, law) == "done"
+    assert 0.0 < max(worst) < 3e-3
+
+
+def test_exceptions_of_a_path_are_raised() -> None:
+    def path(t: float) -> Any:
+        raise KeyError(t)
+
+    mpc = ArmMpc(ARM, "tool")
+    with pytest.raises(KeyError):
+        mpc.reset(REST, path)
+    mpc.reset(REST, pose())
+    with pytest.raises(ValueError, match="path"):
+        mpc.update(0.02, REST, np.eye(3))
+    with pytest.raises(condyle.Error, match="paw"):
+        ArmMpc(ARM, "paw")
+
+
+def test_bad_input_is_refused() -> None:
+    with pytest.raises(ControllerError, match="friction is -1"):
+        Foot.point("LF_foot", -1.0, 0.0)
+    with pytest.raises(ControllerError, match="`weights` is -1"):
+        controller(weights=Weights(height=-1.0))
+    with pytest.raises(ControllerError, match="no frame of this name"):
+        WholeBodyMpc(QUADRUPED, [Foot.sole("paw", 0.6, (0.1, 0.1))], Gait.stand())
+    with pytest.raises(ControllerError, match="floating base"):
+        WholeBodyMpc(ARM, [Foot.point("tool", 0.6, 0.0)], Gait.stand())
+    mpc = controller()
+    with pytest.raises(ControllerError, match="no plan yet"):
+        mpc.forces()
+    with pytest.raises(ControllerError, match="no plan yet"):
+        mpc.prepare()
+    mpc.reset(STAND)
+    with pytest.raises(ControllerError, match="nothing supports the robot"):
+        mpc.set_gait(Gait.table(1.0, [(foot, 0.1, 0.4) for foot in FEET]))
+    with pytest.raises(ControllerError, match="is inf"):
+        mpc.command(vx=np.inf)
+    broken = STAND.copy()
+    broken[0] = np.nan
+    policy = mpc.update(0.02, broken)
+    assert mpc.report.status == "invalid_state" and np.isfinite(policy(0.02, broken)).all()
+    mpc.update(0.04, STAND)
+    with pytest.raises(ControllerError, match="time runs backwards"):
+        mpc.update(0.03, STAND)
+    policy.stop()
+    assert (policy(0.05, STAND) == 0.0).all() and policy.source == "damping"
+    policy.release()
+    policy(0.05, STAND)
+    assert policy.source == "plan" and policy.end is not None and policy.end > 0.4
+
+
+def test_classes_show_what_they_are() -> None:
+    assert repr(Gait.step()) == "Gait.step(swing=0.36, double=0.08)"
+    assert repr(Foot.point("a", 0.5, 0.02)) == "Foot.point('a', 0.5, 0.02)"
+    assert repr(Foot.sole("a", 0.5, (0.2, 0.1))) == "Foot.sole('a', 0.5, (0.2, 0.1))"
