@@ -4,7 +4,7 @@
     python3 tests/structure.py [--sizes]
 
 The check fails if a cycle has more than three modules, if a line of Rust is wider than 120 characters, or if
-PROMISES.md names a file or test that does not exist. With --sizes, it also fails if the program has more than 6.1 MB of
+PROMISES.md names a file or test that does not exist. With --sizes, it also fails if the program has more than 6.5 MB of
 code, or if one of its functions has more than 64 KB. A module and its child module count as one module if the child
 uses no other module than its parent. --sizes compiles the program and all its dependencies in a new folder (several
 minutes), and needs `nm` and `size`.
@@ -25,7 +25,7 @@ from prose import TO_DO
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST_CIRCLE = 3
 LARGEST_FUNCTION = 64 * 1024
-LARGEST_PROGRAM = 6_100_000
+LARGEST_PROGRAM = 6_500_000
 WIDEST = 120
 LITERALS = re.compile(r"//[^\n]*|\br(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^\\'])'", re.DOTALL)
 """Pattern of comments, string literals and character literals in Rust."""

@@ -1,5 +1,5 @@
 // Tests the pages of plans in headless Chromium: an arm that reaches, with and without limits that it meets, a
-// quadruped that trots, meshes. PAGES names their folder.
+// quadruped that trots, meshes, and a walk in the simulation. PAGES names their folder.
 //
 // Checks that a page causes no requests and no errors, and that slider, player and keys move the robot. Also checks a
 // gait, dark mode, small windows, printing, and a link to a time. Pictures are written to PAGES.
@@ -124,6 +124,23 @@ test("the trot has a gait: a row for each foot, a line that moves, arrows while 
   await page.$eval("#scrub", (scrub) => { scrub.value = 0.4; scrub.dispatchEvent(new Event("input")); });
   assert.ok((await cursor()) > before + 10);
   assert.equal(await page.$eval("#key-forces", (key) => key.hidden), false);
+  await page.close();
+});
+
+test("a walk has plots of speeds and of ticks, and the camera follows the robot", async () => {
+  const { page, wrong } = await open("walk");
+  assert.deepEqual(await page.$$eval("#plot-speed, #plot-ticks", (hosts) => hosts.map((host) => [host.parentElement.hidden, !!host.querySelector("canvas")])), [[false, true], [false, true]]);
+  assert.equal(await page.$$eval("#key-speed .dash", (keys) => keys.length), 3);
+  assert.match(await page.$eval("#badges", (badges) => badges.textContent), /No fall in 1 s.*Largest tilt.*% over.*limits hold/);
+  assert.equal(await page.$$eval("#gait > div", (rows) => rows.length), 4);
+  const left = () => page.$eval("#plot-speed .u-cursor-x", (line) => line.getBoundingClientRect().left);
+  const before = await left(), start = await picture(page);
+  await page.$eval("#scrub", (scrub) => { scrub.value = 0.8; scrub.dispatchEvent(new Event("input")); });
+  await settled(page);
+  assert.ok((await left()) > before + 100);
+  assert.notEqual(await picture(page), start);
+  await page.screenshot({ path: join(folder, "walk.png"), fullPage: true });
+  assert.deepEqual(wrong, []);
   await page.close();
 });
 

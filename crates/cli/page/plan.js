@@ -1,5 +1,6 @@
 "use strict";
-// Page of a plan: header, player, tables. `scene.js` draws the robot, `plots.js` the curves.
+// Page of a plan or of a walk: header, player, tables. `scene.js` draws the robot, `plots.js` the curves,
+// `walk.js` the curves of a walk.
 //
 // The data are JSON, which the program writes into the script element #data. Units: SI, radians. null means missing or
 // unknown; numbers that are not finite are null too. N knots have a control, N + 1 knots have a state.
@@ -41,6 +42,10 @@
 //                     reach no bound; each may be null, if no bound of the quantity is reached; or null
 //   worst             { text, is_gap } of the row that an unsolved problem violates most, or null; is_gap: the row belongs
 //                     to the dynamics
+//   scene.follow      index of the body that the camera follows; missing: the camera stays
+//   walk              { gait, seconds (requested), command [3], mean [3], since (s), velocities, commands: [N][3], ticks: { times,
+//                     ms, budget_ms, over }, tilt (rad), fall: { time, what } or null }: a walk in the simulation; velocities
+//                     along the heading: forwards, to the left (m/s), turning (rad/s); missing for a plan
 //   version, command  version of the program that wrote the page; its command line, or null
 //
 // `#t=0.4` in the address opens the page paused at 0.4 s. While the player is paused, the address shows its time.
@@ -88,7 +93,7 @@ function header(data) {
   const last = data.times.at(-1) - data.times[0];
   const fact = (name, value) => element("span", {}, `${name} `, element("b", {}, value));
   const knots = data.times.length - 1;
-  $("facts").append(
+  if (!data.walk) $("facts").append(
     fact("robot", data.robot),
     ...(data.frame ? [fact("end-effector", data.frame)] : []),
     ...(data.target ? [fact("target", `(${data.target.map((x) => x.toFixed(3).replace("-", "−")).join(", ")}) m`)] : []),
@@ -103,6 +108,12 @@ function header(data) {
     item.append(text);
     $("badges").append(item);
   };
+  if (data.walk) {
+    $("kind").textContent = "walk";
+    walkHeader(data, fact, badge);
+    limitsBadge(data, badge);
+    return footer(data);
+  }
   const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly decreases" }[data.status];
   badge(solved ? "good" : "bad", solved ?? `Not converged: ${data.status}`);
   if (data.worst) badge("bad", data.worst.text[0].toUpperCase() + data.worst.text.slice(1));
@@ -115,6 +126,11 @@ function header(data) {
     const { total_ms: total, budget_ms: budget } = data.budget;
     badge(total <= budget ? "good" : "warn", `${total <= budget ? "Within" : "Over"} budget: ${brief(total)} of ${brief(budget)} ms`);
   }
+  limitsBadge(data, badge);
+  footer(data);
+}
+
+function limitsBadge(data, badge) {
   const breaches = data.violations.length, { source, positions, velocities, efforts, of } = data.limits;
   const total = positions + velocities + efforts;
   const kinds = `${positions} of ${of} positions, ${velocities} of ${of} velocities, ${efforts} of ${of} efforts`;
@@ -122,6 +138,9 @@ function header(data) {
   else if (breaches) badge("bad", `${breaches} of ${total} limits exceeded (${source}: ${kinds})`);
   else if (data.worst?.is_gap) badge("warn", `The limits hold, but the motion does not follow the dynamics (${source}: ${kinds})`);
   else badge("good", `${total === 1 ? "1 limit holds" : `All ${total} limits hold${data.worst ? " up to rounding" : ""}`} (${source}: ${kinds})`);
+}
+
+function footer(data) {
   $("footer").append("Made by Condyle", data.version ? ` ${data.version}` : "", ...(data.command ? [" with ", element("code", {}, data.command)] : []), ". Drawn with three.js and uPlot (MIT).");
 }
 
@@ -397,12 +416,14 @@ try {
 
 const focus = (j) => { plots.focus(j); joints.mark(j); };
 const plots = makePlots(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes), focus });
+const walkPlots = data.walk && makeWalkPlots(data, { seek: (t) => player.seek(t), hold: (yes) => player.hold(yes) });
 const joints = makeJoints(data, plots, focus);
 const gait = makeGait(data);
 const player = makePlayer(data.times, (t) => {
   const { k, s } = knotAt(data.times, t);
   view?.show(k, s);
   plots.show(t);
+  walkPlots?.show(t);
   joints.show(k);
   gait.show(t);
 });
@@ -439,6 +460,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   hues();
   view?.recolour();
   plots.rebuild();
+  walkPlots?.rebuild();
   progress?.rebuild();
   joints.recolour();
 });

@@ -3,7 +3,7 @@
 
 /** Draws `data.scene` into `host`. Returns the functions that the player calls. Throws if the browser has no WebGL. */
 function makeScene(data, host) {
-  const { bodies, poses, trail } = data.scene;
+  const { bodies, poses, trail, follow } = data.scene;
   const renderer = new THREE.WebGLRenderer({ antialias: true });
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   renderer.shadowMap.enabled = true;
@@ -190,7 +190,21 @@ function makeScene(data, host) {
       travelled.instanceCount = k; // number of segments
     }
     showForces(k, s);
+    if (follow != null) accompany(groups[follow].position);
     redraw();
+  }
+
+  // The camera, the lamp and the floor follow a body that travels far. The lines of the grid stay in their places.
+  const start = follow == null ? null : new THREE.Vector3().fromArray(poses[0][follow]), by = new THREE.Vector3();
+  const travelledBy = new THREE.Vector3();
+  function accompany(position) {
+    by.copy(position).sub(start).setZ(0).sub(travelledBy);
+    travelledBy.add(by);
+    for (const point of [camera.position, controls.target, lamp.position, lamp.target.position, ground.position, centre]) point.add(by);
+    for (const point of cloud) point.add(by);
+    grid.position.x = Math.round(centre.x / pitch) * pitch;
+    grid.position.y = Math.round(centre.y / pitch) * pitch;
+    controls.update();
   }
 
   /** Shows the whole motion from the front right, as close as possible. */
@@ -261,10 +275,12 @@ function makeScene(data, host) {
 }
 
 /**
- * Returns points that enclose the motion: origins and shapes of the bodies at some knots, the path, and the target.
+ * Returns points that enclose the motion: origins and shapes of the bodies at some knots, the path, and the target. If the
+ * camera follows a body, the points enclose the robot at the first knot.
  * Also returns the height of the lowest centre of a shape, which tells whether the robot stays above the ground.
  */
-function cloudOf({ scene: { bodies, poses, trail, meshes }, target }) {
+function cloudOf({ scene: { bodies, poses: all, trail, meshes, follow }, target }) {
+  const poses = follow == null ? all : all.slice(0, 1);
   const boxes = bodies.map((body) => body.shapes.filter((shape) => shape.kind === "mesh").flatMap((shape) => cornersOf(shape, meshes[shape.part])));
   const points = [...(trail ?? []), ...(target ? [target] : [])].map((p) => new THREE.Vector3().fromArray(p));
   const q = new THREE.Quaternion(), o = new THREE.Vector3();
@@ -274,7 +290,7 @@ function cloudOf({ scene: { bodies, poses, trail, meshes }, target }) {
     bodies.forEach((body, b) => {
       o.fromArray(poses[k][b]);
       q.fromArray(poses[k][b], 3);
-      if (body.shapes.length || b === 0) points.push(o.clone());
+      if (body.shapes.length || (b === 0 && follow == null)) points.push(o.clone());
       const corners = boxes[b].map((corner) => corner.clone().applyQuaternion(q).add(o));
       points.push(...corners);
       // opposite corners of each box

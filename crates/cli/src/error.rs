@@ -6,7 +6,8 @@ use std::process::ExitCode;
 pub(crate) const STATUSES: &str = "\
 Exit status:
   0    done, and the answer is yes
-  1    done, and the answer is no: over budget, a check failed, the target is missed, a limit is not held
+  1    done, and the answer is no: over budget, a check failed, the target is missed, a limit is not held,
+       the robot fell
   2    a file, flag, number or name is wrong: one line says which, and nothing is written
   130  stopped by Ctrl-C; the best found so far is written";
 
@@ -19,6 +20,9 @@ pub(crate) enum Error {
     /// Error in the optimal control problem built from a task.
     #[error(transparent)]
     Problem(#[from] condyle::optimal::Error),
+    /// Error in the description of a controller: the robot, its feet, the gait or a setting.
+    #[error(transparent)]
+    Controller(#[from] condyle::mpc::Error),
     /// Invalid value of an option.
     #[error("--{option}: {what}")]
     Option { option: &'static str, what: String },

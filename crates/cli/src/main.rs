@@ -1,4 +1,5 @@
-//! Program `condyle`: shows a robot's model, checks its numbers, measures computing times, and plans motions.
+//! Program `condyle`: shows a robot's model, checks its numbers, measures computing times, plans motions, and lets
+//! robots walk in a simulation.
 
 #![allow(non_snake_case)] // names of variables are symbols of the literature
 
@@ -27,6 +28,7 @@ mod states;
 mod task;
 mod terminal;
 mod visuals;
+mod walk;
 mod watch;
 
 use clap::error::ErrorKind;
@@ -47,6 +49,7 @@ enum Command {
     Budget(budget::Arguments),
     Check(check::Arguments),
     Plan(Box<plan::Arguments>),
+    Walk(Box<walk::Arguments>),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
     /// Write a robot's dynamics as code; only in programs built with the feature `generate`
@@ -74,6 +77,7 @@ fn main() -> ExitCode {
         Command::Budget(arguments) => budget::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Walk(arguments) => walk::run(&arguments),
         #[cfg(feature = "generate")]
         Command::Generate(arguments) => generate::run(&arguments),
         #[cfg(not(feature = "generate"))]

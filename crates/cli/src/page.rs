@@ -1,4 +1,4 @@
-//! Writes the HTML page of `condyle plan`: plots and playback in one file that needs no network.
+//! Writes the HTML page of `condyle plan` and `condyle walk`: plots and playback in one file that needs no network.
 
 use crate::budget::held;
 use crate::limits::LimitCounts;
@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Placeholders of the template, and the texts that replace them, in this order. The data are inserted last. So text in
 /// the data is never replaced, even if it looks like a placeholder.
-const PARTS: [(&str, &str); 8] = [
+const PARTS: [(&str, &str); 9] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),
     ("/*{{three.js}}*/", include_str!("../page/vendor/three.bundle.js")),
@@ -20,6 +20,7 @@ const PARTS: [(&str, &str); 8] = [
     ("/*{{meshes.js}}*/", include_str!("../page/meshes.js")),
     ("/*{{scene.js}}*/", include_str!("../page/scene.js")),
     ("/*{{plots.js}}*/", include_str!("../page/plots.js")),
+    ("/*{{walk.js}}*/", include_str!("../page/walk.js")),
     ("/*{{plan.js}}*/", include_str!("../page/plan.js")),
 ];
 
@@ -31,21 +32,26 @@ pub(crate) fn write(
     violations: &[Violation],
     met: &[Met],
 ) -> std::io::Result<Option<String>> {
+    let (data, note) = data(plan, budget, violations, met);
+    write_data(path, data)?;
+    Ok(note)
+}
+
+/// Writes a page with the given data, and creates its folder. The comment at the top of `plan.js` describes the data.
+pub(crate) fn write_data(path: &Path, data: Value) -> std::io::Result<()> {
     let mut page = include_str!("../page/plan.html").to_owned();
     for (place, text) in PARTS {
         page = page.replacen(place, text, 1);
     }
-    let (data, note) = data(plan, budget, violations, met);
     let data = rounded(data).to_string().replace('<', "\\u003c");
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder)?;
     }
-    std::fs::write(path, page.replacen("/*{{data}}*/", &data, 1))?;
-    Ok(note)
+    std::fs::write(path, page.replacen("/*{{data}}*/", &data, 1))
 }
 
 /// Returns the joints that the page shows: joints with one degree of freedom that do not mimic another joint.
-fn shown(model: &Model) -> impl Iterator<Item = &condyle::tree::Body> {
+pub(crate) fn shown(model: &Model) -> impl Iterator<Item = &condyle::tree::Body> {
     model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none())
 }
 
@@ -95,14 +101,10 @@ fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> 
     Ok(json!({"feet": names, "trails": trails, "touches": touches, "forces": forces, "weight": weight}))
 }
 
-/// Returns all data of the page, and a note about the meshes that are left out. The comment at the top of `plan.js`
-/// describes each entry of the data.
-fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> (Value, Option<String>) {
-    let Plan { model, solution, .. } = plan;
-    let (nq, limits) = (model.nq(), model.limits());
-    let knots = with_time(plan);
+/// Returns the shown joints, with their limits.
+pub(crate) fn joints(model: &Model) -> Vec<Value> {
+    let (limits, (least, most)) = (model.limits(), crate::limits::efforts(model, model.nv()));
     let finite = |x: f64| x.is_finite().then_some(x);
-    let (least, most) = crate::limits::efforts(model, model.nv());
     let joint = |b: &condyle::tree::Body| {
         let range = |limit: &[f64]| if b.joint.nq() == 1 { finite(limit[b.idx_q]) } else { None };
         json!({
@@ -115,10 +117,28 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
             "effort_upper": finite(most[b.idx_v]),
         })
     };
-    let position = |x: &[f64], b: &condyle::tree::Body| match b.joint {
+    shown(model).map(joint).collect()
+}
+
+/// Returns the position of a shown joint in the state x (rad or m).
+pub(crate) fn position(x: &[f64], b: &condyle::tree::Body) -> f64 {
+    match b.joint {
         Joint::Continuous { .. } => x[b.idx_q + 1].atan2(x[b.idx_q]),
         _ => x[b.idx_q],
-    };
+    }
+}
+
+/// Returns the command line of the program.
+pub(crate) fn command_line() -> String {
+    std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word)
+}
+
+/// Returns all data of the page, and a note about the meshes that are left out. The comment at the top of `plan.js`
+/// describes each entry of the data.
+fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> (Value, Option<String>) {
+    let Plan { model, solution, .. } = plan;
+    let nq = model.nq();
+    let knots = with_time(plan);
     let series = |knots: &[usize], value: &dyn Fn(usize, &condyle::tree::Body) -> f64| -> Vec<Vec<f64>> {
         knots.iter().map(|&t| shown(model).map(|b| value(t, b)).collect()).collect()
     };
@@ -155,7 +175,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
         "tolerance": goal.map(|goal| goal.tolerance),
         "dt": plan.dt,
         "times": knots.iter().map(|&t| plan.times[t]).collect::<Vec<_>>(),
-        "joints": shown(model).map(joint).collect::<Vec<_>>(),
+        "joints": joints(model),
         "q": series(&knots, &|t, b| position(solution.x(t), b)),
         "v": series(&knots, &|t, b| solution.x(t)[nq + b.idx_v]),
         "tau": series(driven, &|t, b| efforts[t][b.idx_v]),
@@ -185,7 +205,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation], met: &[Met]) -> 
             "text": worst.to_string().replace('`', ""), "is_gap": worst.is_gap(),
         })),
         "version": env!("CARGO_PKG_VERSION"),
-        "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),
+        "command": command_line(),
     });
     (data, note)
 }

@@ -5,7 +5,7 @@ use crate::met::{HELD, Met, Worst};
 use crate::motion::Plan;
 use crate::terminal::{Style, styled};
 use condyle::optimal::{Iteration, Status};
-use condyle::{Data, aba, aba_derivatives, rnea};
+use condyle::{Data, Model, aba, aba_derivatives, rnea};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
@@ -119,11 +119,16 @@ pub(crate) struct Violation {
     pub limit: f64,
 }
 
-/// Returns all quantities that exceed their limits.
+/// Returns all quantities of a plan that exceed their limits.
 pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
+    exceeded(&plan.model, |quantity| plan.values(quantity))
+}
+
+/// Returns all quantities that exceed their limits. `values` returns the values of a quantity at all knots.
+pub(crate) fn exceeded(model: &Model, values: impl Fn(&Limited<'_>) -> Vec<f64>) -> Vec<Violation> {
     let mut found = Vec::new();
-    for quantity in limited(&plan.model) {
-        let values = plan.values(&quantity);
+    for quantity in limited(model) {
+        let values = values(&quantity);
         let Limited { what, joint, lower, upper, .. } = quantity;
         let beyond = |x: f64| if x > upper { (x - upper, upper) } else { (lower - x, lower) };
         let worst = values.into_iter().map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));

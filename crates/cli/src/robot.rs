@@ -21,8 +21,8 @@ pub(crate) struct RobotArguments {
 /// Options for reading a robot's file.
 #[derive(clap::Args, Clone, Default)]
 pub(crate) struct ReadingOptions {
-    /// Joint between the world and the root link of a URDF or SDF. Default: fixed; free for the built-in quadruped and
-    /// humanoid
+    /// Joint between the world and the root link of a URDF or SDF. Default: fixed; free for `condyle walk`,
+    /// and for the built-in quadruped and humanoid
     #[arg(long, value_name = "JOINT", value_enum)]
     pub root: Option<Root>,
     /// Make joints with a <mimic> (MJCF: <equality>) follow another joint; otherwise each has its own coordinate

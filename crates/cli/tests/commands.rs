@@ -338,7 +338,7 @@ fn generate_writes_code() {
 
 #[test]
 fn help_and_completions() {
-    for command in ["inspect", "budget", "check", "plan"] {
+    for command in ["inspect", "budget", "check", "plan", "walk"] {
         let help = said(&[command, "--help"], 0);
         assert!(help.contains(&format!("Examples:\n  condyle {command}")), "{help}");
     }
