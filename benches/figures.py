@@ -29,7 +29,7 @@ COMMANDS = {
     "dynamics": "python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "dynamics_avx2": "CONDYLE_LEVEL=avx2 python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "fddp": ".venv/crocoddyl/bin/python benches/peers/ocp.py --cpu 1 --solver fddp reach trot walk humanoid",
-    "mpc": ".venv/crocoddyl/bin/python benches/peers/mpc.py --cpu 1 --busy",
+    "mpc": ".venv/crocoddyl/bin/python benches/peers/mpc.py --cpu 1",
     "threads": ".venv/crocoddyl/bin/python benches/peers/ocp_threads.py",
     "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_comparison.py",
     "generated": "CC=clang-19 .venv/pinocchio/bin/python benches/generated.py --cpu 1",
