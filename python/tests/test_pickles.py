@@ -118,7 +118,7 @@ def test_residuals_of_ones_own_go_with_their_knots() -> None:
     for found in others:
         assert np.array_equal(found.xs, expected.xs)
         assert found.cost == expected.cost
-    with pytest.raises(optimal.ProblemError, match="written in Python, which JSON has not"):
+    with pytest.raises(optimal.ProblemError, match="written in Python, which JSON cannot contain"):
         problems[0].to_json()
 
 

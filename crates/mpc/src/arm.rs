@@ -1,7 +1,7 @@
 //! Controller of an arm: a frame follows poses in time, under the limits of the arm.
 
 use crate::Error;
-use crate::knots::{EFFORT, effort_limits, joint_limits};
+use crate::knots::{EFFORT, effort_limits, joint_limits, solver_of, write_times};
 use crate::policy::Policy;
 use crate::report::{Report, TickStatus};
 use crate::settings::{PlanLimits, check_above, check_at_least};
@@ -9,14 +9,12 @@ use condyle_dynamics::{Model, Se3};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle_optimal::{InteriorPoint, PolicyPublisher, Problem, Schedule, Status};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Name of the cost of the pose.
 const POSE: &str = "pose";
 /// Numbers of a pose: the homogeneous matrix.
 const POSE_SIZE: usize = 16;
-/// Tolerance of the first solve.
-const TOLERANCE: f64 = 1e-4;
 
 /// Settings of an [`ArmMpc`].
 #[derive(Clone, Debug, PartialEq)]
@@ -138,10 +136,7 @@ impl ArmMpc {
         let end = FreeDynamics::terminal(model.clone(), vec![scaled(pose), scaled(state)])?;
         let end = end.with_limits(of_states)?;
         let problem = Problem::new(neutral, vec![knot], vec![0; knots], Box::new(end))?;
-        let mut solver = InteriorPoint::new(&problem);
-        solver.settings.tolerance = TOLERANCE;
-        solver.settings.threads = settings.threads;
-        solver.settings.time_budget = settings.budget.is_finite().then(|| Duration::from_secs_f64(settings.budget));
+        let solver = solver_of(&problem, settings.threads, settings.budget);
         Ok(Self {
             publisher: PolicyPublisher::new(&problem)?,
             problem,
@@ -196,16 +191,14 @@ impl ArmMpc {
             return Err(Error::Robot { what: format!("no plan from this state: {status}") });
         }
         self.publisher.publish(&self.problem, self.solver.solution(), start)?;
-        self.report.write(TickStatus::Restarted, start, self.solver.solution(), [references, begin.elapsed()]);
+        let times = [references, begin.elapsed() - references];
+        self.report.write(TickStatus::Restarted, start, self.solver.solution(), times);
         Ok(())
     }
 
     fn arrange(&mut self, start: f64) {
         self.knots.write_knots(start, &mut self.knot_models, &mut self.durations);
-        self.times[0] = start;
-        for (k, dt) in self.durations.iter().enumerate() {
-            self.times[k + 1] = self.times[k] + dt;
-        }
+        write_times(start, &self.durations, &mut self.times);
     }
 
     fn refer(&mut self, mut path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {

@@ -1,7 +1,7 @@
 //! Controller of a walking robot: each tick renews a plan of whole-body motion and contact forces.
 
 use crate::command::Command;
-use crate::knots::{EFFORT, KnotMaker, STATE, swing_name, tilt_name};
+use crate::knots::{EFFORT, KnotMaker, STATE, solver_of, swing_name, tilt_name, write_times};
 use crate::policy::Policy;
 use crate::references::{PlanarPose, Stand, Walk};
 use crate::report::{Report, TickStatus};
@@ -13,8 +13,6 @@ use condyle_optimal::{ActionModel, InteriorPoint, PolicyPublisher, Problem, Sche
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Tolerance of the first solve.
-const TOLERANCE: f64 = 1e-4;
 /// Time for which the robot stands before its first step (s).
 const FIRST_STAND: f64 = 0.2;
 /// Difference below which two times are equal (s).
@@ -137,7 +135,7 @@ impl WholeBodyMpc {
             names: feet.iter().map(|foot| [swing_name(foot), tilt_name(foot)]).collect(),
             stances: vec![full],
             still: Vec::new(),
-            solver: solver_of(&problem, &walk.settings),
+            solver: solver_of(&problem, walk.settings.threads, walk.settings.budget),
             publisher: PolicyPublisher::new(&problem)?,
             problem,
             schedule: FootSchedule::new(cycle, count, 0.0),
@@ -230,7 +228,7 @@ impl WholeBodyMpc {
             problem.set_knots(&self.knot_models, &self.durations)?;
             problem.set_x0(self.problem.x0())?;
         }
-        let mut solver = solver_of(&problem, &self.walk.settings);
+        let mut solver = solver_of(&problem, self.walk.settings.threads, self.walk.settings.budget);
         if self.is_started {
             let plan = self.solver.solution();
             let (xs, us) = (plan.xs.clone(), plan.us.clone());
@@ -280,10 +278,7 @@ impl WholeBodyMpc {
         let index = |stance: u32| stances.iter().position(|other| *other == stance).unwrap_or(0);
         self.schedule.extend(start, until, &mut self.knots, index);
         self.knots.write_knots(start, &mut self.knot_models, &mut self.durations);
-        self.times[0] = start;
-        for (k, dt) in self.durations.iter().enumerate() {
-            self.times[k + 1] = self.times[k] + dt;
-        }
+        write_times(start, &self.durations, &mut self.times);
     }
 
     /// Writes all references.
@@ -544,12 +539,4 @@ fn problem_of(maker: &KnotMaker<'_>, stances: &[u32], x0: &[f64]) -> Result<Prob
 
 fn boxed(knot: ContactDynamics) -> Box<dyn ActionModel> {
     Box::new(knot)
-}
-
-fn solver_of(problem: &Problem, settings: &Settings) -> InteriorPoint {
-    let mut solver = InteriorPoint::new(problem);
-    solver.settings.tolerance = TOLERANCE;
-    solver.settings.threads = settings.threads;
-    solver.settings.time_budget = settings.budget.is_finite().then(|| Duration::from_secs_f64(settings.budget));
-    solver
 }

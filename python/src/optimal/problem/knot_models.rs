@@ -79,7 +79,7 @@ impl Problem {
                 return Err(wrong(k, "expected the robot of the first model, found another one"));
             }
             if !take_written(&mut knot.clone()).is_empty() {
-                return Err(wrong(k, "it has a residual that is written in Python, which JSON has not"));
+                return Err(wrong(k, "it has a residual that is written in Python, which JSON cannot contain"));
             }
             knots.push(knot.clone());
         }
