@@ -7,19 +7,22 @@ from pathlib import Path
 
 import pytest
 
-SHARED = {"gait", "ground"}  # modules that several examples share
+SHARED = {"gait", "ground", "mujoco_film", "mujoco_world"}  # modules that several examples share
 FOLDER = Path(__file__).parents[1] / "examples"
 EXAMPLES = sorted(path for path in FOLDER.glob("*.py") if path.stem not in SHARED)
 
 
 def test_there_are_examples() -> None:
-    assert {"dynamics", "derivatives", "mpc", "casadi_swing_up", "wholebody_trot"} <= {path.stem for path in EXAMPLES}
+    assert {"dynamics", "derivatives", "mpc", "casadi_swing_up", "wholebody_trot", "mujoco_go2"} <= {path.stem for path in EXAMPLES}
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example(path: Path, tmp_path: Path) -> None:
     if path.stem.startswith("casadi"):
         pytest.importorskip("casadi")
+    if path.stem.startswith("mujoco"):
+        pytest.importorskip("mujoco")
+        pytest.importorskip("example_robot_data")
     if path.stem == "wholebody_clarabel":
         pytest.importorskip("clarabel")
     if path.stem == "pictures":

@@ -46,14 +46,6 @@ class Walker(NamedTuple):
     friction: float = 0.5
     """Coefficient of friction that the controller assumes. The coefficient in MuJoCo is 0.7."""
 
-    def stand(self, model: condyle.Model) -> Array:
-        """Returns the position in which the robot stands, with the soles or centres of the feet at height 0."""
-        q, data = condyle.neutral(model), condyle.Data(model)
-        for name, index in zip(model.names[2:], model.idx_qs[2:], strict=True):
-            q[index] = next((angle for part, angle in self.joints.items() if part in name), 0.0)
-        q[2] -= min(condyle.frame_placement(model, data, q, foot)[2, 3] for foot in self.feet)
-        return q
-
     def foot_list(self) -> list[Foot]:
         """Returns the feet for the controller. The centres of balls are at height 0, so their radius does not count."""
         if isinstance(self.size, float):
@@ -214,7 +206,7 @@ def walk(
     world.mj.body_mass[world.trunk] *= conditions.trunk
     world.mj.body_inertia[world.trunk] *= conditions.trunk
     model = world.model
-    q, data = walker.stand(model), condyle.Data(model)
+    q, data = world.stand(walker.joints), condyle.Data(model)
     if tilt != 0.0:  # no foot is below the ground
         q[2] += max(condyle.frame_placement(model, data, q, foot)[:2, 3] @ rise for foot in walker.feet)
         q[2] += walker.size * (1.0 / np.cos(tilt) - 1.0) if isinstance(walker.size, float) else 0.0
