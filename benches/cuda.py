@@ -16,7 +16,6 @@ peers. Without a device, the program prints NOT RUN.
 import argparse
 import sys
 import time
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -122,11 +121,7 @@ def mujoco_model(path: Path, is_free: bool) -> Any:
     import mujoco
     from world import bare
 
-    robot = bare(path.read_text(encoding="utf-8"))
-    if not is_free:
-        [joint] = (joint for joint in robot.iter("joint") if joint.attrib.get("name") == "root_joint")
-        joint.attrib["type"] = "fixed"
-    model = mujoco.MjModel.from_xml_string(ET.tostring(robot).decode())
+    model = mujoco.MjModel.from_xml_string(bare(path.read_text(encoding="utf-8"), free=is_free))
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     return model
 

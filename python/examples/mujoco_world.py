@@ -41,9 +41,9 @@ def readable(shape: ET.Element) -> bool:
     return mesh is None or Path(mesh.attrib["filename"]).suffix.lower() in (".stl", ".obj")
 
 
-def bare(urdf: str, packages: Path | None = None) -> ET.Element:
-    """Returns a URDF with the links and joints of the given URDF. The root link moves freely. If the folder of packages
-    is given, links also have the shapes that MuJoCo can show; they touch nothing."""
+def bare(urdf: str, packages: Path | None = None, free: bool = True) -> str:
+    """Returns a URDF with the links and joints of the given URDF. If the folder of packages is given, links also have
+    the shapes that MuJoCo can show; they touch nothing. free: whether the root link moves freely."""
     robot = ET.fromstring(urdf)
     for link in robot.iter("link"):
         visuals, collisions = link.findall("visual"), link.findall("collision")
@@ -58,18 +58,19 @@ def bare(urdf: str, packages: Path | None = None) -> ET.Element:
             link.append(shape)
     for other in [child for child in robot if child.tag not in ("link", "joint")]:
         robot.remove(other)
-    moved = {joint.find("child").attrib["link"] for joint in robot.iter("joint")}
-    root = next(link.attrib["name"] for link in robot.iter("link") if link.attrib["name"] not in moved)
     for inertia in robot.iter("inertia"):
         if float(inertia.attrib["ixx"]) <= abs(float(inertia.attrib["ixy"])):  # ANYmal's base is physically impossible
             inertia.attrib.update(dict.fromkeys(["ixy", "ixz", "iyz"], "0"))
-    ET.SubElement(robot, "link", name="world")
-    joint = ET.SubElement(robot, "joint", name="root_joint", type="floating")
-    ET.SubElement(joint, "parent", link="world")
-    ET.SubElement(joint, "child", link=root)
+    if free:
+        moved = {joint.find("child").attrib["link"] for joint in robot.iter("joint")}
+        root = next(link.attrib["name"] for link in robot.iter("link") if link.attrib["name"] not in moved)
+        ET.SubElement(robot, "link", name="world")
+        joint = ET.SubElement(robot, "joint", name="root_joint", type="floating")
+        ET.SubElement(joint, "parent", link="world")
+        ET.SubElement(joint, "child", link=root)
     options = {"fusestatic": "true", "strippath": "false", "discardvisual": "false"}
     ET.SubElement(ET.SubElement(robot, "mujoco"), "compiler", options)
-    return robot
+    return ET.tostring(robot).decode()
 
 
 def decorate(spec: mujoco.MjSpec) -> None:
@@ -113,7 +114,7 @@ class World:
             placement[:3, 3] = position
             self.model = self.model.with_frame(frame, parent, placement)
         self.feet, self.ground = list(feet), 0.0
-        spec = mujoco.MjSpec.from_string(ET.tostring(bare(urdf, packages)).decode())
+        spec = mujoco.MjSpec.from_string(bare(urdf, packages))
         spec.option.timestep = dt
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.impratio = 10.0
