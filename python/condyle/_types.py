@@ -826,6 +826,22 @@ class LqKnot(NamedTuple):
     """The constraints of the knot; None without constraints."""
 
 
+class ManyRollouts(NamedTuple):
+    """The results of `rollout_many` for B control sequences.
+
+    If a sequence diverges, its cost is infinite, its gradients are NaN, and its states are NaN from there on.
+    """
+
+    costs: _Array
+    """The cost of each sequence, B numbers."""
+    xs: _Array | None
+    """The states of each sequence, (B, N + 1, nx); None if they were not asked for."""
+    du: _Array | None
+    """The gradients of the costs with respect to the controls, with the shape of `us`; None if not asked for."""
+    dx0: _Array | None
+    """The gradients of the costs with respect to the initial states, in the tangent space, (B, ndx)."""
+
+
 class SweepResult(NamedTuple):
     """The feedback and the value functions of a `Sweep`: V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + a constant."""
 
@@ -1023,6 +1039,7 @@ _MODULES = {
     "Difference": "optimal",
     "Solution": "optimal",
     "Evaluation": "optimal",
+    "ManyRollouts": "optimal",
     "SweepResult": "optimal",
     "LqKnot": "optimal",
     "ConstraintRows": "optimal",

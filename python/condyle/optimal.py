@@ -55,6 +55,7 @@ from ._condyle import (
     Sweep,
     Unicycle,
     WrenchCone,
+    rollout_many,
 )
 from ._types import (
     ConstraintRows,
@@ -62,6 +63,7 @@ from ._types import (
     Evaluation,
     Iteration,
     LqKnot,
+    ManyRollouts,
     Outcome,
     PlanPoint,
     RecordedTick,
@@ -95,6 +97,7 @@ __all__ = [
     "Limit",
     "LqKnot",
     "Lqr",
+    "ManyRollouts",
     "Outcome",
     "PlanPoint",
     "Policy",
@@ -113,5 +116,6 @@ __all__ = [
     "Violation",
     "WrenchCone",
     "ode_action",
+    "rollout_many",
     "thrusters",
 ]

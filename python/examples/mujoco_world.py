@@ -141,7 +141,7 @@ class World:
             look = {"group": 3} if k > 0 else {"material": FLOOR} if packages is not None else {}
             ground = spec.worldbody.add_body(name=f"ground of {foot}", mocap=True, pos=[0.0, 0.0, self.ground])
             ground.add_geom(name=f"ground of {foot}", contype=0, conaffinity=1 << k, **plane, **contact, **look)
-        self.mj = spec.compile()
+        self.spec, self.mj = spec, spec.compile()
         self.data = mujoco.MjData(self.mj)
         named = zip(self.model.names[1:], self.model.idx_qs[1:], self.model.idx_vs[1:], self.model.nqs[1:], strict=True)
         joints = [(self.mj.joint(name), q, v, nq) for name, q, v, nq in named]

@@ -124,6 +124,7 @@ mod _condyle {
         Action, Activation, AugmentedLagrangian, ConstrainedAction, ContactDynamics, ContactInverseDynamics,
         ControlRate, Cost, DifferentialAction, Fddp, FreeDynamics, FreeInverseDynamics, FrictionCone, ImpulseDynamics,
         InteriorPoint, Limit, Lqr, Policy, Problem, Record, Residual, Schedule, Sweep, Unicycle, WrenchCone,
+        rollout_many,
     };
     #[pymodule_export]
     use regressors::{

@@ -97,7 +97,7 @@ pub use lq::{
 pub use nalgebra;
 pub use problem::{
     ActionModel, AutoDiff, AutoDiffConstraint, Constrained, ControlRate, GenericAction, GenericConstraint, GroupModel,
-    Lqr, NumDiff, PathConstraint, Problem, Schedule, Unicycle,
+    Lqr, NumDiff, PathConstraint, Problem, RolloutResults, Rollouts, Schedule, Unicycle,
 };
 pub use solvers::{
     AugmentedLagrangian, ConstraintSettings, DdpMethod, Fallback, Fddp, InteriorPoint, InteriorPointSettings,

@@ -12,8 +12,8 @@ use condyle_optimal::robot::{
     OwnResidual, Residual, RobotState, Shape,
 };
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, PolicyPublisher, Problem, Schedule,
-    Status, Sweep,
+    ActionModel, AugmentedLagrangian, DdpMethod, Fddp, InteriorPoint, Iteration, PolicyPublisher, Problem,
+    RolloutResults, Rollouts, Schedule, Status, Sweep,
 };
 use condyle_spatial::Scalar;
 use counting::{allocated, allocations};
@@ -91,6 +91,19 @@ fn a_step_of_a_closed_loop_allocates_nothing() {
         solver.resume(&mut problem).unwrap();
     });
     assert_eq!(count, 0);
+}
+
+#[test]
+fn rollouts_allocate_nothing() {
+    let problem = cartpole(&HANGING, 50, 4);
+    let mut rollouts = Rollouts::new(&problem, 1).unwrap();
+    let (us, mut costs, mut du) = (vec![0.1; 9 * 50], [0.0; 9], vec![0.0; 9 * 50]);
+    let count = allocations(|| {
+        let results = RolloutResults { costs: &mut costs, du: &mut du, ..Default::default() };
+        rollouts.run(&HANGING, &us, results).unwrap();
+    });
+    assert_eq!(count, 0);
+    assert!(costs.iter().all(|cost| *cost == costs[0] && cost.is_finite()) && du[0] != 0.0);
 }
 
 #[test]

@@ -14,6 +14,8 @@ mod records;
 mod recovery;
 #[path = "mpc/retime.rs"]
 mod retime;
+#[path = "mpc/rollouts.rs"]
+mod rollouts;
 #[path = "mpc/trot.rs"]
 mod trot;
 

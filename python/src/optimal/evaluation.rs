@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
 /// Returns the number of controls of a knot, if all knots have the same number.
-fn common_nu(problem: &rust::Problem) -> Option<usize> {
+pub(super) fn common_nu(problem: &rust::Problem) -> Option<usize> {
     let nu = problem.nu(0);
     (0..problem.horizon()).all(|t| problem.nu(t) == nu).then_some(nu)
 }

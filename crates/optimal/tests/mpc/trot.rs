@@ -8,7 +8,7 @@ use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, InteriorPoi
 use std::sync::Arc;
 
 /// Number of knots of the horizon; a step of the trot has 6 knots with two feet in the air, and 2 knots on four feet.
-const HORIZON: usize = 12;
+pub(super) const HORIZON: usize = 12;
 const DT: f64 = 0.02;
 pub(super) const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
 
@@ -36,7 +36,7 @@ pub(super) fn stances() -> (Vec<f64>, [Vec<Contact>; 3]) {
 
 /// Creates the problem of a trot with 0.5 m/s that lifts the feet in the air by about 5 cm. Also returns the controls
 /// that hold the robot still.
-fn trot() -> (Problem, Vec<f64>) {
+pub(super) fn trot() -> (Problem, Vec<f64>) {
     let (model, (x0, stances)) = (Arc::new(robots::quadruped()), stances());
     let mut reference = x0.clone();
     reference[19] = 0.5;

@@ -272,10 +272,15 @@ impl Problem {
     /// [`Error`] if the length of `x0` is not nx, an entry is not finite, or the state is invalid; the old state is
     /// then kept.
     pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
-        Error::check("x0", x0, self.nx())?;
-        self.terminal.check_state(x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
+        self.check_x0(x0)?;
         self.x0.copy_from_slice(x0);
         Ok(())
+    }
+
+    /// Returns `Ok` if the state may be an initial state.
+    pub(crate) fn check_x0(&self, x0: &[f64]) -> Result<(), Error> {
+        Error::check("x0", x0, self.nx())?;
+        self.terminal.check_state(x0).map_err(|what| Error::State { name: "x0", knot: 0, what })
     }
 
     /// Returns the action model `index` as a `T`, so that a reference can be changed between solves. Returns `None` if
