@@ -86,7 +86,7 @@ ARGUMENTS = {
         q q0 q1 r rotation target tau theta up upper v velocity w x x0 x1 xs Residual.reference Model.effort
         Plan.controls corners durations normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers AugmentedLagrangian.set_multipliers.values
-        InteriorPoint.set_multipliers.values Problem.set_references.values
+        InteriorPoint.set_multipliers.values Problem.set_references.values rollout_many.us
         Problem.set_contact.kp Problem.set_entry_weights.weights ControlRate.weights""",
     "float | ArrayLike": "Problem.set_weight.weight",
     'Literal["full_step"]': "stop",
@@ -144,7 +144,7 @@ ARGUMENTS = {
     "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
-        Unicycle.terminal _lend.versioned""",
+        Unicycle.terminal _lend.versioned rollout_many.gradients rollout_many.states""",
     "list[tuple[int, Residual]]": " ".join(
         f"{kind}Dynamics._from_parts.written"
         for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")
@@ -365,6 +365,7 @@ RESULTS = {
     "tuple[Problem, Fddp | InteriorPoint | AugmentedLagrangian]": "Record.start",
     "Evaluation": "Problem.evaluate Problem._evaluate",
     "list[LqKnot]": "Problem.derivatives",
+    "ManyRollouts": "rollout_many",
     "SweepResult": "Sweep.run",
     "Solution | None": "AugmentedLagrangian.solution Fddp.solution InteriorPoint.solution",
     "Outcome": "AugmentedLagrangian.outcome InteriorPoint.outcome",

@@ -41,6 +41,7 @@ from ._types import (
     Iteration,
     Limits,
     LqKnot,
+    ManyRollouts,
     Mimic,
     ModelWarning,
     Outcome,
@@ -226,6 +227,7 @@ __all__ = [
     "rnea_hessian",
     "rnea_input_derivative",
     "rnea_second_derivatives",
+    "rollout_many",
     "static_torque",
     "static_torque_derivative",
     "to_inertia",
@@ -4804,6 +4806,45 @@ class WrenchCone:
 
     def rows(self) -> _Array:
         """Returns the matrix A, (facets + 13, 6)."""
+
+def rollout_many(
+    problem: Problem,
+    us: ArrayLike,
+    x0: ArrayLike | None = None,
+    *,
+    states: bool = True,
+    gradients: bool = False,
+    threads: int = 1,
+) -> ManyRollouts:
+    """Simulates many control sequences on the dynamics of a problem, with the costs of the problem.
+
+    Several sequences are computed together in SIMD lanes. The result of a sequence does not depend on the other ones.
+
+    problem: the problem. Its initial state is used where x0 is None.
+    us: the controls of B sequences, (B, N, nu); or (B, Σ nu), where the controls of all knots follow one another, as
+        for knots that differ in nu. Controls are not moved into their bounds.
+    x0: the initial state of all sequences, nx numbers; or of each sequence, (B, nx); None is the problem's.
+    states: whether to return the states.
+    gradients: whether to return the gradients of the costs.
+    threads: the number of threads.
+
+    Returns `ManyRollouts`. A sequence that diverges has an infinite cost and does not affect the others: its numbers
+    are not finite or exceed 1e30.
+
+    Other Python threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, ends the call.
+
+    Raises `ProblemError` if x0 is not finite or contains a rotation whose length is not 1, and for an action that
+    cannot be copied.
+
+    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual, rollout_many
+    >>> arm, x0 = condyle.robots.arm7(), np.zeros(14)
+    >>> effort = Cost("effort", 1e-4, Residual.control(np.zeros(7)))
+    >>> problem = Problem(x0, [FreeDynamics(arm, 0.02, [effort])], [0] * 25, FreeDynamics(arm, None, []))
+    >>> us = np.random.default_rng(0).normal(size=(1000, 25, 7))
+    >>> found = rollout_many(problem, us, gradients=True)
+    >>> found.costs.shape, found.xs.shape, found.du.shape
+    ((1000,), (1000, 26, 14), (1000, 25, 7))
+    """
 
 def joint_torque_regressor(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
