@@ -57,6 +57,24 @@ def test_planned_forces_carry_the_robot() -> None:
     assert forces[..., 2].sum(axis=1) == pytest.approx(9.81 * QUADRUPED.total_mass, rel=1e-2)
 
 
+def test_a_reported_contact_ends_a_swing() -> None:
+    stands = []
+    for report in (None, ["LF_foot", "RH_foot"], [True, False, False, True], np.zeros(4, bool)):
+        mpc = controller()
+        mpc.reset(STAND)
+        for k in range(1, 20):  # the first swing is from 0.22 to 0.46 s
+            if report is not None and k == 18:
+                mpc.touch(report)
+            mpc.update(0.02 * k, STAND)
+        stands.append(mpc.report.stands)
+    swing, stand = (False, True, True, False), (True,) * 4
+    assert stands == [swing, stand, stand, swing]
+    with pytest.raises(ControllerError, match="`feet`: `paw` is not a foot"):
+        mpc.touch(["paw"])
+    with pytest.raises(ControllerError, match="`feet`: expected 4 feet, found 3"):
+        mpc.touch([True] * 3)
+
+
 def test_another_thread_follows_the_plan() -> None:
     mpc = controller()
     mpc.reset(STAND)

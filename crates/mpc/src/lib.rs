@@ -19,6 +19,7 @@ mod error;
 mod foot;
 mod gait;
 mod knots;
+mod landing;
 mod policy;
 mod references;
 mod report;

@@ -83,6 +83,8 @@ pub(crate) struct Walk {
     pub lifted: Vec<Vec3<f64>>,
     /// Feet on the ground at the last observation, one bit for each foot.
     pub stance: u32,
+    /// Depth by which the foothold of each foot was lowered since it should have landed (m).
+    pub lowered: Vec<f64>,
 }
 
 impl Walk {
@@ -93,6 +95,7 @@ impl Walk {
             let bit = 1 << foot;
             if stance & bit != 0 {
                 self.placed[foot] = *place;
+                self.lowered[foot] = 0.0;
             } else if self.stance & bit != 0 {
                 self.lifted[foot] = *place;
             }
@@ -178,8 +181,12 @@ impl Walk {
                 continue;
             }
             let stance = swings.peek().map_or(0.0, |next| next.start - swing.end);
-            let to = self.foothold(foot, swing.end - begin, stance, now, velocity);
-            let start = if swing.start <= begin { self.lifted[foot] } else { from };
+            let mut to = self.foothold(foot, swing.end - begin, stance, now, velocity);
+            let mut start = from;
+            if swing.start <= begin {
+                start = self.lifted[foot];
+                to.z -= self.lowered[foot];
+            }
             for (&t, target) in times.iter().zip(targets.chunks_exact_mut(3)) {
                 if swing.start - SOON <= t && t <= swing.end + SOON {
                     let place = between(start, to, swing.fraction(t), self.settings.swing_height);

@@ -2,6 +2,7 @@
 
 use crate::command::Command;
 use crate::knots::{EFFORT, KnotMaker, STATE, solver_of, swing_name, tilt_name, write_times};
+use crate::landing::change_swings;
 use crate::policy::Policy;
 use crate::references::{PlanarPose, Stand, Walk};
 use crate::report::{Report, TickStatus};
@@ -84,6 +85,12 @@ pub struct WholeBodyMpc {
     period: f64,
     /// Time of the measurement for which a tick is prepared (s).
     prepared: Option<f64>,
+    /// Whether contacts are reported, so that the problem has models for early and late landings.
+    is_touching: bool,
+    /// Feet that touch the ground, one bit for each foot, as reported for the next tick.
+    touching: Option<u32>,
+    /// Feet that stood at the last tick, one bit for each foot.
+    stood: u32,
     report: Report,
 }
 
@@ -122,6 +129,7 @@ impl WholeBodyMpc {
             placed: vec![Vec3::zero(); count],
             lifted: vec![Vec3::zero(); count],
             stance: 0,
+            lowered: vec![0.0; count],
             settings,
         };
         let full = (1 << count) - 1;
@@ -151,6 +159,9 @@ impl WholeBodyMpc {
             measured: f64::NEG_INFINITY,
             period: walk.settings.knot,
             prepared: None,
+            is_touching: false,
+            touching: None,
+            stood: full,
             report: Report::none(count),
             walk,
             model,
@@ -186,6 +197,8 @@ impl WholeBodyMpc {
         walk.lifted.copy_from_slice(&self.places);
         (walk.command, walk.pose, walk.raised) = (Command::default(), pose, 0.0);
         walk.stance = (1 << self.places.len()) - 1;
+        walk.lowered.fill(0.0);
+        (self.touching, self.stood) = (None, walk.stance);
         let start = t + self.walk.settings.latency;
         self.start_schedule(start)?;
         self.is_started = false;
@@ -210,8 +223,13 @@ impl WholeBodyMpc {
         let probe = FootSchedule::of_cycle(cycle.clone(), self.places.len());
         for t in probe.events() {
             let stance = probe.stance(t);
-            if !self.stances.contains(&stance) {
-                self.stances.push(stance);
+            // with reports of contacts, each foot in the air may stand
+            let (full, stances) = ((1 << self.places.len()) - 1, &mut self.stances);
+            let most = if self.is_touching { full } else { stance };
+            for stance in (stance..=most).filter(|other| other & stance == stance) {
+                if !stances.contains(&stance) {
+                    stances.push(stance);
+                }
             }
         }
         if self.stances.len() == before && !self.still.is_empty() {
@@ -343,15 +361,16 @@ impl WholeBodyMpc {
         }
         Error::check_array("x", x, self.x.len())?;
         let begin = Instant::now();
-        let is_prepared = self.prepared.take().is_some_and(|prepared| (prepared - t).abs() < SAME_TIME);
         let start = (t + self.walk.settings.latency).max(self.times[0]);
+        let is_prepared = self.prepared.take().is_some_and(|prepared| (prepared - t).abs() < SAME_TIME);
+        let is_prepared = !self.change_swings(t, start) && is_prepared;
         self.predict(t, start, x)?;
         if !is_prepared {
             self.renew(t, start)?;
             self.problem.set_x0(&self.x)?;
         }
         self.period = t - self.measured;
-        self.measured = t;
+        (self.measured, self.stood) = (t, self.walk.stance);
         let references = begin.elapsed();
         let plan = match is_prepared {
             true => self.solver.feedback(&mut self.problem, &self.x)?,
@@ -406,6 +425,20 @@ impl WholeBodyMpc {
         self.arrange(start);
         self.solver.retime(&mut self.problem, elapsed, &self.knot_models, &self.durations)?;
         self.refer()
+    }
+
+    /// Changes the swings for the reported contacts, if there are any. Returns whether a swing was changed.
+    fn change_swings(&mut self, t: f64, start: f64) -> bool {
+        let Some(touching) = self.touching.take() else { return false };
+        let (stances, knot) = (&self.stances, self.walk.settings.knot);
+        let times = [start, t - self.measured, knot];
+        let is_stance = |stance| stances.contains(&stance);
+        let changed = change_swings(&mut self.walk, &mut self.schedule, [touching, self.stood], times, is_stance);
+        if changed {
+            let index = |stance: u32| stances.iter().position(|other| *other == stance).unwrap_or(0);
+            self.schedule.rewrite(start, &mut self.knots, index);
+        }
+        changed
     }
 
     /// Writes the state at the time `start` to `self.x`: the measured state x at the time t, moved by the dynamics
@@ -466,6 +499,48 @@ impl WholeBodyMpc {
         }
         self.gait = gait;
         Ok(())
+    }
+
+    /// Reports which feet touch the ground, as measured at the time of the next [`update`](Self::update), one entry for
+    /// each foot. Later updates need reports of their own. Without reports, feet land when the schedule says so.
+    ///
+    /// - A foot that touches after half of its swing has landed: it stands from then on, where it is.
+    /// - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
+    ///   most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
+    ///
+    /// Other swings stay as the schedule has them. The first call makes models for all stances that early landings can
+    /// lead to, and allocates.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is not one entry for each foot.
+    pub fn touch(&mut self, feet: &[bool]) -> Result<(), Error> {
+        if feet.len() != self.places.len() {
+            let what = format!("expected {} feet, found {}", self.places.len(), feet.len());
+            return Err(Error::Argument { name: "feet", what });
+        }
+        let mask = feet.iter().enumerate().fold(0, |mask, (foot, &touches)| mask | u32::from(touches) << foot);
+        if !std::mem::replace(&mut self.is_touching, true) && self.is_started {
+            let cycle = self.gait.cycle(&self.walk.feet, &self.walk.stand.feet)?;
+            self.add_stances(&cycle)?;
+        }
+        self.touching = Some(mask);
+        Ok(())
+    }
+
+    /// Reports the feet that touch the ground by the names of their frames, like [`touch`](Self::touch).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that is not a foot.
+    pub fn touch_named<S: AsRef<str>>(&mut self, feet: &[S]) -> Result<(), Error> {
+        let mut touching = vec![false; self.places.len()];
+        for name in feet {
+            let name = name.as_ref();
+            match self.walk.feet.iter().position(|foot| foot.frame == name) {
+                Some(foot) => touching[foot] = true,
+                None => return Err(Error::Argument { name: "feet", what: format!("`{name}` is not a foot") }),
+            }
+        }
+        self.touch(&touching)
     }
 
     /// Sets the plane of the ground. With `None`, it is the plane through the last footholds.

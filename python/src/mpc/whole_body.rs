@@ -169,6 +169,27 @@ impl WholeBodyMpc {
         lock("controller", &self.inner)?.set_gait(gait.get().0.clone()).map_err(mpc_error)
     }
 
+    /// Reports which feet touch the ground, as measured at the time of the next `update`. Later updates need reports of
+    /// their own. Without reports, feet land when the schedule says so.
+    ///
+    /// - A foot that touches after half of its swing has landed: it stands from then on, where it is.
+    /// - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
+    ///   most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
+    ///
+    /// Other swings stay as the schedule has them.
+    ///
+    /// feet: the names of the frames of the feet that touch, or a bool for each foot.
+    ///
+    /// Raises `ControllerError` for a name that is not a foot, or another number of bools.
+    fn touch(&self, feet: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = lock("controller", &self.inner)?;
+        if let Ok(names) = feet.extract::<Vec<String>>() {
+            return inner.touch_named(&names).map_err(mpc_error);
+        }
+        let flags: Vec<bool> = feet.try_iter()?.map(|flag| flag?.is_truthy()).collect::<PyResult<_>>()?;
+        inner.touch(&flags).map_err(mpc_error)
+    }
+
     /// Sets the plane of the ground. Without arguments, it is the plane through the last footholds.
     ///
     /// normal: the normal of the plane, which points upwards; height: the height of the plane at the origin of the
