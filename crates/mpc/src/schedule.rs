@@ -57,8 +57,8 @@ impl FootSchedule {
         core::iter::once(0.0).chain(self.swings.iter().flat_map(|swing| [swing.start, swing.end]))
     }
 
-    /// Adds swings until the time `until` (s), and removes swings that ended long before the time `now`. Writes the switches
-    /// of new swings to the schedule of the knots, where `index` gives the model of a stance.
+    /// Adds swings until the time `until` (s), and removes swings that ended long before the time `now`. Writes the
+    /// switches of new swings to the schedule of the knots, where `index` gives the model of a stance.
     pub(crate) fn extend(&mut self, now: f64, until: f64, knots: &mut KnotSchedule, index: impl Fn(u32) -> usize) {
         self.swings.retain(|swing| swing.end > now - KEPT);
         knots.forget(now);
