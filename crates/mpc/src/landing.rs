@@ -16,8 +16,8 @@ const DEEPEST: f64 = 0.06;
 /// A foot that touches after half of its swing has landed: its swing ends now. A late foot should have landed, but has
 /// not touched the ground since. It swings for `knot` seconds more, and its foothold is lowered by the distance for the
 /// `elapsed` seconds since the last tick. So it goes on until the foot touches or has been lowered by [`DEEPEST`], or
-/// until the remaining feet are no stance of the gait (`is_stance`). Then the foot counts as standing. Returns whether a
-/// swing was changed.
+/// until the remaining feet are no stance of the gait (`is_stance`). Then the foot counts as standing. Returns whether
+/// a swing was changed.
 pub(crate) fn change_swings(
     walk: &mut Walk,
     schedule: &mut FootSchedule,

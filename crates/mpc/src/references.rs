@@ -88,6 +88,54 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
+    /// Creates the walk of a robot with these feet, which stands in the state x.
+    pub(crate) fn new(x: &[f64], feet: &[Foot], settings: Settings) -> Self {
+        let zeros = vec![Vec3::zero(); feet.len()];
+        Self {
+            stand: Stand { x: x.to_vec(), feet: zeros.clone(), height: 0.0 },
+            feet: feet.to_vec(),
+            settings,
+            command: Command::default(),
+            goal: Command::default(),
+            raised: 0.0,
+            pose: PlanarPose::default(),
+            given_terrain: None,
+            terrain: Terrain { height: 0.0, slope: [0.0; 2] },
+            placed: zeros.clone(),
+            lifted: zeros,
+            stance: 0,
+            lowered: vec![0.0; feet.len()],
+        }
+    }
+
+    /// Begins with a robot that stands in the state x = (q, v), with nq positions. `places` are the positions of its
+    /// feet.
+    pub(crate) fn begin(&mut self, x: &[f64], nq: usize, places: &[Vec3<f64>]) {
+        let pose = PlanarPose::of(x);
+        let back = PlanarPose { heading: -pose.heading, ..pose };
+        self.stand.x.copy_from_slice(x);
+        self.stand.x[nq..].fill(0.0);
+        for (foot, place) in self.stand.feet.iter_mut().zip(places) {
+            let [dx, dy] = back.turned([place.x - pose.x, place.y - pose.y]);
+            *foot = Vec3::new(dx, dy, place.z - x[2]);
+        }
+        let below: f64 = self.stand.feet.iter().zip(&self.feet).map(|(p, foot)| p.z - foot.height()).sum();
+        self.stand.height = -below / places.len() as f64;
+        self.placed.copy_from_slice(places);
+        self.lifted.copy_from_slice(places);
+        self.lowered.fill(0.0);
+        (self.command, self.pose, self.raised) = (Command::default(), pose, 0.0);
+        self.stance = (1 << places.len()) - 1;
+        self.fit_terrain();
+    }
+
+    /// Fits the plane of the ground to the footholds, unless it is given.
+    fn fit_terrain(&mut self) {
+        let below = |(place, foot): (&Vec3<f64>, &Foot)| Vec3 { z: place.z - foot.height(), ..*place };
+        let ground = self.placed.iter().zip(&self.feet).map(below);
+        self.terrain = self.given_terrain.unwrap_or_else(|| Terrain::fitted(ground));
+    }
+
     /// Records where the feet are, which of them should be on the ground, and the state of the trunk after `elapsed`
     /// seconds.
     pub(crate) fn observe(&mut self, places: &[Vec3<f64>], stance: u32, state: &[f64], elapsed: f64) {
@@ -101,9 +149,7 @@ impl Walk {
             }
         }
         self.stance = stance;
-        let below = |(place, foot): (&Vec3<f64>, &Foot)| Vec3 { z: place.z - foot.height(), ..*place };
-        let ground = self.placed.iter().zip(&self.feet).map(below);
-        self.terrain = self.given_terrain.unwrap_or_else(|| Terrain::fitted(ground));
+        self.fit_terrain();
         self.command = self.command.towards(self.goal, self.settings.accelerations, elapsed);
         let (aim, now) = (self.pose.after(elapsed, self.command), PlanarPose::of(state));
         let [dx, dy] = [aim.x - now.x, aim.y - now.y];

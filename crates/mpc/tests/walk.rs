@@ -251,6 +251,94 @@ fn reports_that_agree_with_the_schedule_change_nothing() {
     assert_eq!(mpc.touch_named(&["LF_foot", "paw"]).unwrap_err().to_string(), "`feet`: `paw` is not a foot");
 }
 
+/// Checks that several linearisations are made if the budget allows them, and the least number without time.
+#[test]
+fn the_budget_limits_the_linearisations() {
+    let x = stand();
+    for (iterations, budget, expected) in [([1, 3], 10.0, 3), ([2, 3], 1e-9, 2), ([1, 1], f64::INFINITY, 1)] {
+        let mut mpc = controller(trot(), Settings { iterations, budget, ..Settings::default() });
+        mpc.reset(0.0, &x).unwrap();
+        mpc.update(0.02, &x).unwrap();
+        assert_eq!(mpc.report().iterations, expected, "{iterations:?} within {budget} s");
+    }
+    let wrong = WholeBodyMpc::new(
+        Arc::new(robots::quadruped()),
+        &feet(),
+        trot(),
+        Settings { iterations: [2, 1], ..Settings::default() },
+    );
+    let said = wrong.unwrap_err().to_string();
+    assert_eq!(said, "setting `iterations` is 1, but it must be at least the least number");
+}
+
+/// Checks that a gait changes at a given time: until then the feet swing as before, and from then on none begins a
+/// swing.
+#[test]
+fn a_gait_changes_at_a_given_time() {
+    let mut mpc = controller(trot(), Settings::default());
+    let x = stand();
+    mpc.reset(0.0, &x).unwrap();
+    mpc.set_gait_at(Gait::Stand, 0.9).unwrap();
+    let swings: Vec<bool> = (1..80)
+        .map(|k| {
+            let report = mpc.update(0.02 * f64::from(k), &x).unwrap();
+            report.stands.iter().any(|stands| !stands)
+        })
+        .collect();
+    // the swings are from 0.22, 0.50 and 0.78 s on, each for 0.24 s; the last one has begun before 0.9 s
+    let at = |t: f64| swings[(t / 0.02).round() as usize - 1];
+    assert!(!at(0.2) && at(0.3) && !at(0.48) && at(0.6) && at(0.8) && at(1.0) && !at(1.04), "{swings:?}");
+    assert!(!swings[51..].iter().any(|swings| *swings));
+    let late = mpc.set_gait_at(trot(), 100.0).unwrap_err();
+    assert_eq!(late.to_string(), "`t`: the time 100 s is not before 61.58 s");
+}
+
+/// Checks that the planned forces on a slope lie in the friction cones about the normal of the slope, also where the
+/// robot needs friction up to the limit.
+#[test]
+fn friction_cones_follow_the_slope() {
+    let (angle, mu) = (15.0_f64.to_radians(), 0.4);
+    let model = Arc::new(robots::quadruped());
+    let feet = FEET.map(|name| Foot::point(name, mu, 0.0));
+    let settings = Settings { accelerations: [4.0, 4.0, 2.0], ..Settings::default() };
+    let mut mpc = WholeBodyMpc::new(model.clone(), &feet, trot(), settings).unwrap();
+    let normal = Vec3::new(-angle.sin(), 0.0, angle.cos()); // the ground rises ahead
+    let mut x = stand();
+    let place = normal.scale(0.5354);
+    x[..7].copy_from_slice(&[place.x, place.y, place.z, 0.0, -(0.5 * angle).sin(), 0.0, (0.5 * angle).cos()]);
+    let mut simulation = Simulation::new(model.clone(), SimulationSettings { dt: STEP, ..Default::default() });
+    let frames = FEET.map(|name| model.frame(name).unwrap());
+    simulation.set_ground(Ground { friction: mu, normal, ..Ground::at_frames(frames) }).unwrap();
+    simulation.set_state(&x[..19], &x[19..]).unwrap();
+    mpc.reset(0.0, &x).unwrap();
+    let (mut policy, mut tau, mut ratio) = (mpc.policy(), vec![0.0; 18], 0.0_f64);
+    let mut worst = [0.0_f64; 2]; // outside the cone (N): at knot 0, and anywhere
+    for step in 0..2000 {
+        let t = step as f64 * STEP;
+        let x = [simulation.q(), simulation.v()].concat();
+        if step % PERIOD == 0 && step > 0 {
+            mpc.command(Command { vx: if t < 1.0 { 0.5 } else { -0.3 }, ..Command::default() }).unwrap();
+            mpc.update(t, &x).unwrap();
+            for (k, force) in mpc.forces().unwrap().chunks_exact(3).enumerate() {
+                let force = Vec3::new(force[0], force[1], force[2]);
+                let along = force.dot(normal);
+                let across = (force - normal.scale(along)).norm();
+                let outside = across - mu * along;
+                worst[usize::from(k >= 4)] = worst[usize::from(k >= 4)].max(outside);
+                if along > 20.0 {
+                    ratio = ratio.max(across / (mu * along));
+                }
+            }
+        }
+        policy.control(t, &x, &mut tau[6..]);
+        assert!(simulation.step(&tau, &[]).is_taken());
+    }
+    let up = mpc.terrain().normal();
+    assert!((up - normal).norm() < 0.02, "{up:?}");
+    assert!(worst[0] < 0.5 && worst[1] < 2.0, "{worst:?}");
+    assert!(ratio > 0.9, "no force needs the friction: {ratio}");
+}
+
 #[test]
 fn a_tick_allocates_nothing() {
     let mut mpc = controller(trot(), Settings::default());
