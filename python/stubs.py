@@ -137,7 +137,10 @@ ARGUMENTS = {
         WholeBodyMpc.command.height WholeBodyMpc.prepare.t""",
     "Weights | None": "WholeBodyMpc.weights",
     "ArmWeights | None": "ArmMpc.weights",
-    "PlanLimits | None": "ArmMpc.limits WholeBodyMpc.limits",
+    'Literal["model"] | PlanLimits | None': "ArmMpc.limits WholeBodyMpc.limits",
+    "tuple[int, int]": "ArmMpc.iterations WholeBodyMpc.iterations",
+    "Sequence[str] | ArrayLike": "WholeBodyMpc.touch.feet",
+    'Literal["next"] | float': "WholeBodyMpc.set_gait.at",
     "Sequence[Foot]": "WholeBodyMpc.feet",
     "Gait": "WholeBodyMpc.gait WholeBodyMpc.set_gait.gait",
     "Sequence[tuple[str, float, float]]": "Gait.table.swings",
@@ -306,7 +309,7 @@ RESULTS = {
     "KktResiduals": "WholeBodyController.kkt_residuals",
     "None": """
         ArmMpc.reset JointPolicy.release JointPolicy.stop WholeBodyMpc.command WholeBodyMpc.prepare WholeBodyMpc.reset
-        WholeBodyMpc.set_gait WholeBodyMpc.terrain
+        WholeBodyMpc.set_gait WholeBodyMpc.terrain WholeBodyMpc.touch
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
         AugmentedLagrangian.configure AugmentedLagrangian.publish AugmentedLagrangian.reset
@@ -320,6 +323,7 @@ RESULTS = {
         Problem.set_knots Problem.set_references Problem.set_weight Problem.set_x0 Record.save Record.stop
         Schedule.forget Schedule.switch Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
+    "Plan": "WholeBodyMpc.plan",
     "Report": "ArmMpc.report WholeBodyMpc.report",
     "JointPolicy": "ArmMpc.policy ArmMpc.update WholeBodyMpc.policy WholeBodyMpc.update",
     'Literal["plan", "open_loop", "damping"]': "JointPolicy.source",

@@ -80,6 +80,8 @@ class Report(NamedTuple):
     """The time at which knot 0 of the plan begins (s)."""
     solver: str | None
     """The status of the solver; None before the first tick."""
+    iterations: int
+    """The number of linearisations of the tick."""
     gap: float
     """The largest gap of the plan before the tick."""
     cost: float

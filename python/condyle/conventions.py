@@ -11,7 +11,8 @@ array([4., 5., 6., 1., 2., 3.])
 >>> conventions.wxyz([0.0, 0.0, 0.6, 0.8])  # as MuJoCo and Drake have it
 array([0.8, 0. , 0. , 0.6])
 
-`Coordinates` converts states of a robot to another library's coordinates:
+`MujocoRobot` reads states from a simulation in MuJoCo, and writes efforts to its actuators; it finds joints and
+actuators by their names. `Coordinates` converts states of a robot to another library's coordinates:
 
 >>> quadruped = condyle.robots.quadruped()
 >>> mujoco = conventions.Coordinates(quadruped, "mujoco")
@@ -28,11 +29,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._condyle import Model
+from ._mujoco_robot import MujocoRobot
 
 __all__ = [
     "LIBRARIES",
     "Coordinates",
     "FreeJoint",
+    "MujocoRobot",
     "classical_acceleration",
     "rotation",
     "spatial_acceleration",

@@ -1,6 +1,7 @@
 //! Controllers at a rate in Python: the module `condyle.mpc`.
 
 mod arm;
+mod controller;
 mod feet;
 mod policy;
 mod settings;

@@ -90,10 +90,29 @@ def test_what_does_not_fit_is_refused() -> None:
         ControlRate(knot, [1.0], upper=[1.0, 1.0])
     with pytest.raises(ProblemError):
         Problem([0.0] * 2, [ControlRate(knot, [1.0])], [0], end)
-    with pytest.raises(ProblemError):
-        stand(2, 1.0)[0].to_json()
+    with pytest.raises(ProblemError, match=r"models\[0\]: expected an action of a robot, which alone can be JSON"):
+        Problem([0.0] * 2, [ControlRate(knot, [1.0])], [0], ControlRate(end, [1.0])).to_json()
     again = pickle.loads(pickle.dumps(ControlRate(knot, [1.0], upper=[2.0])))
     assert repr(again) == repr(ControlRate(knot, [1.0]))
+
+
+def test_a_problem_in_json_or_a_pickle_is_the_same_problem() -> None:
+    problem, still = stand(8, 1e-2)
+    x0 = problem.x0.copy()
+    x0[20] = 0.4  # m/s to the left
+    problem.set_x0(x0)
+    problem.set_weight("effort", 2e-3)  # changes the action inside
+    guess = np.tile(x0, (9, 1)), np.tile(still, (8, 1))
+    plan = Fddp(problem).solve(*guess)
+    read = Problem.from_json(problem.to_json())
+    assert read.to_json() == problem.to_json()
+    for again in (read, pickle.loads(pickle.dumps(problem))):
+        assert again.nx == 37 + 12
+        other = Fddp(again).solve(*guess)
+        np.testing.assert_array_equal(other.xs, plan.xs)
+        np.testing.assert_array_equal(other.us, plan.us)
+    heavy, _ = stand(8, 1e-1)
+    assert heavy.to_json() != problem.to_json()
 
 
 def contact(kind: str, frame: str = "LF_foot", **more: object) -> ContactConstraint:

@@ -10,7 +10,7 @@ import pytest
 import condyle
 from condyle.mpc import ArmMpc, ArmWeights, Foot, Gait, PlanLimits, Weights, WholeBodyMpc
 from condyle.simulation import Ground, Simulation
-from condyle.wholebody import ControllerError
+from condyle.wholebody import ControllerError, FrictionContact, Gains, Settings, Task, WholeBodyController
 
 QUADRUPED, ARM = condyle.robots.quadruped(), condyle.robots.arm7()
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
@@ -55,6 +55,69 @@ def test_planned_forces_carry_the_robot() -> None:
     forces = mpc.forces()
     assert forces.shape == (25, 4, 3)
     assert forces[..., 2].sum(axis=1) == pytest.approx(9.81 * QUADRUPED.total_mass, rel=1e-2)
+
+
+def test_a_reported_contact_ends_a_swing() -> None:
+    stands = []
+    for report in (None, ["LF_foot", "RH_foot"], [True, False, False, True], np.zeros(4, bool)):
+        mpc = controller()
+        mpc.reset(STAND)
+        for k in range(1, 20):  # the first swing is from 0.22 to 0.46 s
+            if report is not None and k == 18:
+                mpc.touch(report)
+            mpc.update(0.02 * k, STAND)
+        stands.append(mpc.report.stands)
+    swing, stand = (False, True, True, False), (True,) * 4
+    assert stands == [swing, stand, stand, swing]
+    with pytest.raises(ControllerError, match="`feet`: `paw` is not a foot"):
+        mpc.touch(["paw"])
+    with pytest.raises(ControllerError, match="`feet`: expected 4 feet, found 3"):
+        mpc.touch([True] * 3)
+
+
+def test_whole_body_control_tracks_the_plan() -> None:
+    """A quadruped trots under a whole-body controller at 1 kHz, which tracks the plans of 50 Hz."""
+    contacts = [FrictionContact.point(foot, 0.6) for foot in FEET]
+    swings = [Task.position(foot, weight=100.0, gains=Gains.critical(900.0)) for foot in FEET]
+    tasks = [Task.com(), Task.orientation("trunk"), Task.posture(), *swings]
+    tracker = WholeBodyController(QUADRUPED, contacts, tasks, Settings(contact_gains=Gains(0.0, 40.0)))
+    mpc = controller()
+    mpc.reset(STAND)
+    references, plans, speeds = tracker.hold(STAND[:19]), [mpc.plan()], []
+
+    def law(now: Any) -> None:
+        if round(1e3 * now.time) % 20 == 0 and now.time > 0.0:
+            mpc.command(vx=0.4)
+            mpc.update(now.time, np.r_[now.q, now.v])
+            plans.append(mpc.plan())
+            assert plans[-1].span[0] == pytest.approx(now.time)
+        tracker.track(plans[-1], now.time, references)
+        now.tau[:] = tracker.step(now.q, now.v, references).tau
+        speeds.append(now.v[0])
+
+    simulation = Simulation(QUADRUPED, dt=1e-3, ground=Ground(FEET, friction=0.7))
+    simulation.set_state(STAND[:19], STAND[19:])
+    assert simulation.run(2500, law) == "done"
+    assert np.mean(speeds[1500:]) == pytest.approx(0.4, abs=0.03)
+    # the same feet touch in the plan and in the report
+    stands = [plans[-1].activation(foot, plans[-1].span[0]) == 1.0 for foot in range(4)]
+    assert tuple(stands) == mpc.report.stands
+
+
+def test_settings_have_the_forms_of_the_documentation() -> None:
+    for limits in ("model", None, PlanLimits(positions=False)):
+        mpc = controller(limits=limits, iterations=(1, 3), budget=10.0)
+        mpc.reset(STAND)
+        mpc.update(0.02, STAND)
+        assert mpc.report.iterations == 3
+    mpc.set_gait(Gait.stand(), at="next")
+    mpc.set_gait(Gait.trot(), at=1.0)
+    with pytest.raises(ValueError, match="at: expected 'next' or a time, found 'soon'"):
+        mpc.set_gait(Gait.trot(), at="soon")  # type: ignore[arg-type]
+    with pytest.raises(ControllerError, match="`t`: the time 1000 s is not before 60.02 s"):
+        mpc.set_gait(Gait.trot(), at=1000.0)
+    with pytest.raises(ValueError, match="limits: expected 'model', PlanLimits or None, found 'all'"):
+        controller(limits="all")
 
 
 def test_another_thread_follows_the_plan() -> None:

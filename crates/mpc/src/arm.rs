@@ -1,13 +1,14 @@
 //! Controller of an arm: a frame follows poses in time, under the limits of the arm.
 
 use crate::Error;
-use crate::knots::{EFFORT, effort_limits, joint_limits, solver_of, write_times};
+use crate::knots::{EFFORT, effort_limits, joint_limits};
+use crate::planner::Planner;
 use crate::policy::Policy;
-use crate::report::{Report, TickStatus};
-use crate::settings::{PlanLimits, check_above, check_at_least};
+use crate::report::Report;
+use crate::settings::{PlanLimits, PlanSettings, check_at_least};
 use condyle_dynamics::{Model, Se3};
-use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
-use condyle_optimal::{InteriorPoint, PolicyPublisher, Problem, Schedule, Status};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual, Target};
+use condyle_optimal::{InteriorPoint, Problem};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -27,8 +28,11 @@ pub struct ArmSettings {
     pub weights: ArmWeights,
     /// Limits that the plan keeps.
     pub limits: PlanLimits,
-    /// Number of sweeps for the quadratic program of each tick.
+    /// Number of sweeps for the quadratic program of each linearisation.
     pub sweeps: usize,
+    /// Least and largest number of linearisations in a tick. Further ones after the least number are made
+    /// only if the budget has time left for one more.
+    pub iterations: [usize; 2],
     /// Time budget of a tick (s); infinite without a budget. One sweep is always made.
     pub budget: f64,
     /// Time between the measurement of a state and the use of the plan that is computed from it (s).
@@ -45,6 +49,7 @@ impl Default for ArmSettings {
             weights: ArmWeights::default(),
             limits: PlanLimits::default(),
             sweeps: 2,
+            iterations: [1, 1],
             budget: f64::INFINITY,
             latency: 0.0,
             threads: 1,
@@ -92,21 +97,8 @@ impl Default for ArmWeights {
 /// ```
 #[derive(Debug)]
 pub struct ArmMpc {
-    model: Arc<Model>,
-    settings: ArmSettings,
-    problem: Problem,
-    solver: InteriorPoint,
-    publisher: PolicyPublisher,
-    knots: Schedule,
-    knot_models: Vec<usize>,
-    durations: Vec<f64>,
-    /// Times of the knots (s).
-    times: Vec<f64>,
+    planner: Planner,
     poses: Vec<f64>,
-    x: Vec<f64>,
-    is_started: bool,
-    last: f64,
-    report: Report,
 }
 
 impl ArmMpc {
@@ -117,7 +109,7 @@ impl ArmMpc {
     /// [`Error::Setting`] for an invalid setting.
     pub fn new(model: Arc<Model>, frame: &str, settings: ArmSettings) -> Result<Self, Error> {
         settings.check()?;
-        let (nq, nv, w) = (model.nq(), model.nv(), settings.weights);
+        let (nv, w) = (model.nv(), settings.weights);
         let knots = (settings.horizon / settings.knot).round().max(1.0) as usize;
         let neutral = [condyle_dynamics::neutral(&model), vec![0.0; nv]].concat();
         let weights = [vec![w.position; 3], vec![w.rotation; 3]].concat();
@@ -136,23 +128,8 @@ impl ArmMpc {
         let end = FreeDynamics::terminal(model.clone(), vec![scaled(pose), scaled(state)])?;
         let end = end.with_limits(of_states)?;
         let problem = Problem::new(neutral, vec![knot], vec![0; knots], Box::new(end))?;
-        let solver = solver_of(&problem, settings.threads, settings.budget);
-        Ok(Self {
-            publisher: PolicyPublisher::new(&problem)?,
-            problem,
-            solver,
-            knots: Schedule::new(settings.knot, 0)?,
-            knot_models: vec![0; knots],
-            durations: vec![settings.knot; knots],
-            times: vec![0.0; knots + 1],
-            poses: vec![0.0; POSE_SIZE * (knots + 1)],
-            x: vec![0.0; nq + nv],
-            is_started: false,
-            last: f64::NEG_INFINITY,
-            report: Report::none(0),
-            settings,
-            model,
-        })
+        let poses = vec![0.0; POSE_SIZE * (knots + 1)];
+        Ok(Self { planner: Planner::new(model, problem, PlanSettings::from(&settings), 0)?, poses })
     }
 
     /// Begins anew at the time t (s) in the state x = (q, v), whose joints are the posture from which the arm deviates
@@ -162,51 +139,13 @@ impl ArmMpc {
     /// # Errors
     /// [`Error::Argument`] for a number that is not finite; [`Error::Robot`] if no plan is found.
     pub fn reset(&mut self, t: f64, x: &[f64], path: impl FnMut(f64) -> Se3<f64>) -> Result<&Report, Error> {
-        Error::check_array("t", &[t], 1)?;
-        Error::check_array("x", x, self.x.len())?;
-        self.x.copy_from_slice(x);
-        let nq = self.model.nq();
-        condyle_dynamics::normalize(&self.model, &mut self.x[..nq]);
-        let mut posture = self.x.clone();
-        posture[nq..].fill(0.0);
-        self.problem.set_references("state", &posture.repeat(self.times.len()))?;
-        (self.last, self.is_started) = (t, false);
-        self.plan_anew(t + self.settings.latency, path)?;
-        self.is_started = true;
-        Ok(&self.report)
-    }
-
-    /// Solves the problem at the time `start` from an arm that stands still in the state `self.x`.
-    fn plan_anew(&mut self, start: f64, path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {
-        let begin = Instant::now();
-        self.arrange(start);
-        self.problem.set_knots(&self.knot_models, &self.durations)?;
-        self.refer(path)?;
-        self.problem.set_x0(&self.x)?;
-        let xs = self.x.repeat(self.times.len());
-        let us = self.problem.quasi_static(&xs)?;
-        let references = begin.elapsed();
-        let status = self.solver.solve(&mut self.problem, &xs, &us)?.status;
-        if status == Status::NotFinite {
-            return Err(Error::Robot { what: format!("no plan from this state: {status}") });
-        }
-        self.publisher.publish(&self.problem, self.solver.solution(), start)?;
-        let times = [references, begin.elapsed() - references];
-        self.report.write(TickStatus::Restarted, start, self.solver.solution(), times);
-        Ok(())
-    }
-
-    fn arrange(&mut self, start: f64) {
-        self.knots.write_knots(start, &mut self.knot_models, &mut self.durations);
-        write_times(start, &self.durations, &mut self.times);
-    }
-
-    fn refer(&mut self, mut path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {
-        for (&t, row) in self.times.iter().zip(self.poses.chunks_exact_mut(POSE_SIZE)) {
-            condyle_optimal::robot::Target::Placement(path(t)).write(row);
-        }
-        self.problem.set_references(POSE, &self.poses)?;
-        Ok(())
+        let Self { planner, poses } = self;
+        planner.begin(t, x)?;
+        let mut posture = planner.x.clone();
+        posture[planner.nq()..].fill(0.0);
+        planner.problem.set_references("state", &posture.repeat(planner.times.len()))?;
+        planner.restart(planner.times[0], |planner| refer(planner, poses, path))?;
+        Ok(&self.planner.report)
     }
 
     /// Renews the plan for the measured state x = (q, v) at the time t (s). `path` returns the pose of the frame at a
@@ -217,74 +156,63 @@ impl ArmMpc {
     /// [`Error::Argument`] for a state of another length or a time that is not finite; [`Error::Optimal`] for a pose
     /// that is invalid; [`Error::Time`] if t is before the last call.
     pub fn update(&mut self, t: f64, x: &[f64], mut path: impl FnMut(f64) -> Se3<f64>) -> Result<&Report, Error> {
-        Error::check_array("t", &[t], 1)?;
-        if t < self.last {
-            return Err(Error::Time { t, last: self.last });
-        }
-        if !self.is_started {
+        let Self { planner, poses } = self;
+        planner.check_time(t)?;
+        if !planner.is_started {
             return self.reset(t, x, path);
         }
-        if x.len() == self.x.len() && x.iter().any(|x| !x.is_finite()) {
-            self.report.status = TickStatus::InvalidState;
-            return Ok(&self.report);
+        if planner.accepts(x)? {
+            let (begin, start) = (Instant::now(), planner.start(t));
+            planner.predict(t, start, x)?;
+            planner.measured = t;
+            planner.move_to(start)?;
+            refer(planner, poses, &mut path)?;
+            planner.problem.set_x0(&planner.x)?;
+            planner.tick(false, begin, |planner| refer(planner, poses, path))?;
         }
-        Error::check_array("x", x, self.x.len())?;
-        let (begin, start, nq) = (Instant::now(), t + self.settings.latency, self.model.nq());
-        self.x.copy_from_slice(x);
-        condyle_dynamics::normalize(&self.model, &mut self.x[..nq]);
-        if start > t {
-            let at = self.times[0];
-            self.solver.solution().predict(&mut self.problem, x, t - at, start - at, &mut self.x)?;
-        }
-        let elapsed = start - self.times[0];
-        self.last = t;
-        self.arrange(start);
-        self.solver.retime(&mut self.problem, elapsed, &self.knot_models, &self.durations)?;
-        self.refer(&mut path)?;
-        self.problem.set_x0(&self.x)?;
-        let references = begin.elapsed();
-        let plan = self.solver.tick(&mut self.problem, self.settings.sweeps)?;
-        let result = if plan.fallback.is_none() { TickStatus::Planned } else { TickStatus::Fallback };
-        if !plan.is_executable() {
-            if self.plan_anew(start, path).is_err() {
-                self.report.status = TickStatus::Failed;
-            }
-            return Ok(&self.report);
-        }
-        self.publisher.publish(&self.problem, self.solver.solution(), start)?;
-        let times = [references, begin.elapsed() - references];
-        self.report.write(result, start, self.solver.solution(), times);
-        Ok(&self.report)
+        Ok(&self.planner.report)
     }
 
     /// Returns a policy that follows the latest plan, for another thread. Allocates.
     pub fn policy(&self) -> Policy {
-        Policy::new(&self.publisher, &self.model, &self.x[..self.model.nq()], 0)
+        self.planner.policy(&self.planner.x[..self.planner.nq()], 0)
     }
 
     /// Returns the report of the last tick.
     pub fn report(&self) -> &Report {
-        &self.report
+        &self.planner.report
     }
 
     /// Returns the solver, with the plan and its multipliers.
     pub fn solver(&self) -> &InteriorPoint {
-        &self.solver
+        &self.planner.solver
     }
 
     /// Returns the robot.
     pub fn model(&self) -> &Arc<Model> {
-        &self.model
+        &self.planner.model
+    }
+}
+
+/// Writes the poses of a path at all knots.
+fn refer(planner: &mut Planner, poses: &mut [f64], mut path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {
+    for (&t, row) in planner.times.iter().zip(poses.chunks_exact_mut(POSE_SIZE)) {
+        Target::Placement(path(t)).write(row);
+    }
+    planner.problem.set_references(POSE, poses)?;
+    Ok(())
+}
+
+impl From<&ArmSettings> for PlanSettings {
+    fn from(settings: &ArmSettings) -> Self {
+        let &ArmSettings { knot, sweeps, iterations, budget, latency, threads, .. } = settings;
+        Self { knot, sweeps, iterations, budget, latency, threads }
     }
 }
 
 impl ArmSettings {
     fn check(&self) -> Result<(), Error> {
-        check_above("knot", self.knot)?;
-        crate::settings::check_horizon(self.horizon, self.knot)?;
-        Error::check("sweeps", self.sweeps as f64, self.sweeps > 0, "at least 1")?;
-        Error::check("budget", self.budget, self.budget > 0.0, "above 0")?;
-        check_at_least("latency", self.latency)?;
+        PlanSettings::from(self).check(self.horizon)?;
         let w = &self.weights;
         let weights = [w.position, w.rotation, w.posture, w.velocity, w.effort];
         weights.into_iter().try_for_each(|weight| check_at_least("weights", weight))

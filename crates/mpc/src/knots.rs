@@ -2,10 +2,9 @@
 
 use crate::{Error, Foot, PlanLimits, Settings};
 use condyle_dynamics::{Joint, Model, Vec3};
+use condyle_optimal::ActionModel;
 use condyle_optimal::robot::{Activation, ContactDynamics, Cost, FreeDynamics, Limit, Residual};
-use condyle_optimal::{ActionModel, InteriorPoint, Problem};
 use std::sync::Arc;
-use std::time::Duration;
 
 /// Name of the cost of the state.
 pub(crate) const STATE: &str = "state";
@@ -27,26 +26,6 @@ pub(crate) fn swing_name(foot: &Foot) -> String {
 /// Returns the name of the cost of the tilt of a swinging sole.
 pub(crate) fn tilt_name(foot: &Foot) -> String {
     format!("{} tilts", foot.frame)
-}
-
-/// Tolerance of the first solve.
-const TOLERANCE: f64 = 1e-4;
-
-/// Returns the solver of a controller. A tick may take `budget` seconds.
-pub(crate) fn solver_of(problem: &Problem, threads: usize, budget: f64) -> InteriorPoint {
-    let mut solver = InteriorPoint::new(problem);
-    solver.settings.tolerance = TOLERANCE;
-    solver.settings.threads = threads;
-    solver.settings.time_budget = budget.is_finite().then(|| Duration::from_secs_f64(budget));
-    solver
-}
-
-/// Writes the times of the knots of a horizon that begins at the time `start`: N + 1 times from N durations (s).
-pub(crate) fn write_times(start: f64, durations: &[f64], times: &mut [f64]) {
-    times[0] = start;
-    for (k, dt) in durations.iter().enumerate() {
-        times[k + 1] = times[k] + dt;
-    }
 }
 
 /// Maker of the models of knots.

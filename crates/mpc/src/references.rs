@@ -83,9 +83,59 @@ pub(crate) struct Walk {
     pub lifted: Vec<Vec3<f64>>,
     /// Feet on the ground at the last observation, one bit for each foot.
     pub stance: u32,
+    /// Depth by which the foothold of each foot was lowered since it should have landed (m).
+    pub lowered: Vec<f64>,
 }
 
 impl Walk {
+    /// Creates the walk of a robot with these feet, which stands in the state x.
+    pub(crate) fn new(x: &[f64], feet: &[Foot], settings: Settings) -> Self {
+        let zeros = vec![Vec3::zero(); feet.len()];
+        Self {
+            stand: Stand { x: x.to_vec(), feet: zeros.clone(), height: 0.0 },
+            feet: feet.to_vec(),
+            settings,
+            command: Command::default(),
+            goal: Command::default(),
+            raised: 0.0,
+            pose: PlanarPose::default(),
+            given_terrain: None,
+            terrain: Terrain { height: 0.0, slope: [0.0; 2] },
+            placed: zeros.clone(),
+            lifted: zeros,
+            stance: 0,
+            lowered: vec![0.0; feet.len()],
+        }
+    }
+
+    /// Begins with a robot that stands in the state x = (q, v), with nq positions. `places` are the positions of its
+    /// feet.
+    pub(crate) fn begin(&mut self, x: &[f64], nq: usize, places: &[Vec3<f64>]) {
+        let pose = PlanarPose::of(x);
+        let back = PlanarPose { heading: -pose.heading, ..pose };
+        self.stand.x.copy_from_slice(x);
+        self.stand.x[nq..].fill(0.0);
+        for (foot, place) in self.stand.feet.iter_mut().zip(places) {
+            let [dx, dy] = back.turned([place.x - pose.x, place.y - pose.y]);
+            *foot = Vec3::new(dx, dy, place.z - x[2]);
+        }
+        let below: f64 = self.stand.feet.iter().zip(&self.feet).map(|(p, foot)| p.z - foot.height()).sum();
+        self.stand.height = -below / places.len() as f64;
+        self.placed.copy_from_slice(places);
+        self.lifted.copy_from_slice(places);
+        self.lowered.fill(0.0);
+        (self.command, self.pose, self.raised) = (Command::default(), pose, 0.0);
+        self.stance = (1 << places.len()) - 1;
+        self.fit_terrain();
+    }
+
+    /// Fits the plane of the ground to the footholds, unless it is given.
+    fn fit_terrain(&mut self) {
+        let below = |(place, foot): (&Vec3<f64>, &Foot)| Vec3 { z: place.z - foot.height(), ..*place };
+        let ground = self.placed.iter().zip(&self.feet).map(below);
+        self.terrain = self.given_terrain.unwrap_or_else(|| Terrain::fitted(ground));
+    }
+
     /// Records where the feet are, which of them should be on the ground, and the state of the trunk after `elapsed`
     /// seconds.
     pub(crate) fn observe(&mut self, places: &[Vec3<f64>], stance: u32, state: &[f64], elapsed: f64) {
@@ -93,14 +143,13 @@ impl Walk {
             let bit = 1 << foot;
             if stance & bit != 0 {
                 self.placed[foot] = *place;
+                self.lowered[foot] = 0.0;
             } else if self.stance & bit != 0 {
                 self.lifted[foot] = *place;
             }
         }
         self.stance = stance;
-        let below = |(place, foot): (&Vec3<f64>, &Foot)| Vec3 { z: place.z - foot.height(), ..*place };
-        let ground = self.placed.iter().zip(&self.feet).map(below);
-        self.terrain = self.given_terrain.unwrap_or_else(|| Terrain::fitted(ground));
+        self.fit_terrain();
         self.command = self.command.towards(self.goal, self.settings.accelerations, elapsed);
         let (aim, now) = (self.pose.after(elapsed, self.command), PlanarPose::of(state));
         let [dx, dy] = [aim.x - now.x, aim.y - now.y];
@@ -178,8 +227,12 @@ impl Walk {
                 continue;
             }
             let stance = swings.peek().map_or(0.0, |next| next.start - swing.end);
-            let to = self.foothold(foot, swing.end - begin, stance, now, velocity);
-            let start = if swing.start <= begin { self.lifted[foot] } else { from };
+            let mut to = self.foothold(foot, swing.end - begin, stance, now, velocity);
+            let mut start = from;
+            if swing.start <= begin {
+                start = self.lifted[foot];
+                to.z -= self.lowered[foot];
+            }
             for (&t, target) in times.iter().zip(targets.chunks_exact_mut(3)) {
                 if swing.start - SOON <= t && t <= swing.end + SOON {
                     let place = between(start, to, swing.fraction(t), self.settings.swing_height);

@@ -12,6 +12,8 @@ pub struct Report {
     pub time: f64,
     /// Status of the solver.
     pub solver: Option<Status>,
+    /// Number of linearisations of the tick.
+    pub iterations: usize,
     /// Largest gap of the plan before the tick: between a state and the state that the knot before predicts.
     pub gap: f64,
     /// Cost of the plan before the tick.
@@ -64,6 +66,7 @@ impl Report {
             status: TickStatus::NoPlan,
             time: 0.0,
             solver: None,
+            iterations: 0,
             gap: 0.0,
             cost: 0.0,
             references: Duration::ZERO,

@@ -6,6 +6,9 @@ use condyle_optimal::Schedule as KnotSchedule;
 /// Difference below which two times are equal (s).
 const EQUAL: f64 = 1e-6;
 
+/// Time for which swings that have ended are kept (s), because a late foot continues its swing.
+const KEPT: f64 = 0.2;
+
 /// Number of swings for which memory is allocated.
 const MOST_SWINGS: usize = 256;
 
@@ -54,10 +57,10 @@ impl FootSchedule {
         core::iter::once(0.0).chain(self.swings.iter().flat_map(|swing| [swing.start, swing.end]))
     }
 
-    /// Adds swings until the time `until` (s), and removes swings that ended before the time `now`. Writes the switches
-    /// of new swings to the schedule of the knots, where `index` gives the model of a stance.
+    /// Adds swings until the time `until` (s), and removes swings that ended long before the time `now`. Writes the
+    /// switches of new swings to the schedule of the knots, where `index` gives the model of a stance.
     pub(crate) fn extend(&mut self, now: f64, until: f64, knots: &mut KnotSchedule, index: impl Fn(u32) -> usize) {
-        self.swings.retain(|swing| swing.end > now - EQUAL);
+        self.swings.retain(|swing| swing.end > now - KEPT);
         knots.forget(now);
         while self.next < until && !self.cycle.swings.is_empty() {
             let (begin, end) = (self.next, self.next + self.cycle.period);
@@ -93,6 +96,24 @@ impl FootSchedule {
         let model = index(self.stance(now + EQUAL));
         knots.switch(now + 2.0 * EQUAL, model).expect("the time is finite"); // removes all later switches
         self.write_switches(now + 2.0 * EQUAL, self.next, knots, index);
+    }
+
+    /// Ends the swing of a foot at another time `end` (s), now or later. Later swings stay. Returns whether a swing was
+    /// changed: the last one that began before `now`, unless the next swing of the foot begins before `end`.
+    pub(crate) fn end_swing(&mut self, foot: usize, now: f64, end: f64) -> bool {
+        let is_later = |swing: &Swing| swing.foot == foot && swing.start > now + EQUAL;
+        if self.swings.iter().any(|swing| is_later(swing) && swing.start < end + EQUAL) {
+            return false;
+        }
+        let begun = self.swings.iter_mut().filter(|swing| swing.foot == foot && swing.start <= now + EQUAL);
+        let last = begun.max_by(|a, b| a.start.total_cmp(&b.start));
+        last.map(|swing| swing.end = end).is_some()
+    }
+
+    /// Writes all changes of stance from the time `now` on to the schedule of the knots.
+    pub(crate) fn rewrite(&self, now: f64, knots: &mut KnotSchedule, index: impl Fn(u32) -> usize) {
+        knots.switch(now, index(self.stance(now))).expect("the time is finite"); // removes all later switches
+        self.write_switches(now, self.next, knots, index);
     }
 
     /// Returns the swings of a foot, in the sequence of their times.

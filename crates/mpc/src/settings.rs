@@ -1,6 +1,8 @@
 //! Settings of the controllers.
 
 use crate::Error;
+use condyle_optimal::{InteriorPoint, Problem};
+use std::time::Duration;
 
 /// Settings of a [`WholeBodyMpc`](crate::WholeBodyMpc). The defaults fit legged robots of 10 to 100 kg.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,8 +15,11 @@ pub struct Settings {
     pub weights: Weights,
     /// Limits that the plan keeps, in addition to friction cones.
     pub limits: PlanLimits,
-    /// Number of sweeps for the quadratic program of each tick.
+    /// Number of sweeps for the quadratic program of each linearisation.
     pub sweeps: usize,
+    /// Least and largest number of linearisations in a tick. Further ones after the least number are made
+    /// only if the budget has time left for one more.
+    pub iterations: [usize; 2],
     /// Time budget of a tick (s); infinite without a budget. One sweep is always made.
     pub budget: f64,
     /// Time between the measurement of a state and the use of the plan that is computed from it (s).
@@ -39,6 +44,7 @@ impl Default for Settings {
             weights: Weights::default(),
             limits: PlanLimits::default(),
             sweeps: 2,
+            iterations: [1, 1],
             budget: f64::INFINITY,
             latency: 0.0,
             threads: 1,
@@ -132,11 +138,7 @@ impl Settings {
     /// # Errors
     /// [`Error::Setting`] for a number outside its range.
     pub fn check(&self) -> Result<(), Error> {
-        check_above("knot", self.knot)?;
-        check_horizon(self.horizon, self.knot)?;
-        Error::check("sweeps", self.sweeps as f64, self.sweeps > 0, "at least 1")?;
-        Error::check("budget", self.budget, self.budget > 0.0, "above 0")?;
-        check_at_least("latency", self.latency)?;
+        PlanSettings::from(self).check(self.horizon)?;
         for value in self.accelerations {
             check_above("accelerations", value)?;
         }
@@ -154,8 +156,52 @@ impl Settings {
     }
 }
 
+/// Settings of a plan, which all controllers have.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PlanSettings {
+    pub knot: f64,
+    pub sweeps: usize,
+    pub iterations: [usize; 2],
+    pub budget: f64,
+    pub latency: f64,
+    pub threads: usize,
+}
+
+impl From<&Settings> for PlanSettings {
+    fn from(settings: &Settings) -> Self {
+        let &Settings { knot, sweeps, iterations, budget, latency, threads, .. } = settings;
+        Self { knot, sweeps, iterations, budget, latency, threads }
+    }
+}
+
+impl PlanSettings {
+    /// Checks the settings, for a horizon of `horizon` seconds.
+    pub(crate) fn check(&self, horizon: f64) -> Result<(), Error> {
+        check_above("knot", self.knot)?;
+        let is_valid = horizon >= self.knot && horizon / self.knot <= MOST_KNOTS;
+        Error::check("horizon", horizon, is_valid, "at least a knot, and at most 1000 knots")?;
+        Error::check("sweeps", self.sweeps as f64, self.sweeps > 0, "at least 1")?;
+        let [least, most] = self.iterations;
+        Error::check("iterations", least as f64, least > 0, "at least 1")?;
+        Error::check("iterations", most as f64, most >= least, "at least the least number")?;
+        Error::check("budget", self.budget, self.budget > 0.0, "above 0")?;
+        check_at_least("latency", self.latency)
+    }
+
+    /// Returns the solver of a problem.
+    pub(crate) fn solver_of(&self, problem: &Problem) -> InteriorPoint {
+        let mut solver = InteriorPoint::new(problem);
+        solver.settings.tolerance = TOLERANCE;
+        solver.settings.threads = self.threads;
+        solver.settings.time_budget = self.budget.is_finite().then(|| Duration::from_secs_f64(self.budget));
+        solver
+    }
+}
+
 /// Most knots of a horizon.
 const MOST_KNOTS: f64 = 1000.0;
+/// Tolerance of the first solve.
+const TOLERANCE: f64 = 1e-4;
 
 pub(crate) fn check_above(name: &'static str, value: f64) -> Result<(), Error> {
     Error::check(name, value, value > 0.0 && value.is_finite(), "above 0")
@@ -163,9 +209,4 @@ pub(crate) fn check_above(name: &'static str, value: f64) -> Result<(), Error> {
 
 pub(crate) fn check_at_least(name: &'static str, value: f64) -> Result<(), Error> {
     Error::check(name, value, value >= 0.0 && value.is_finite(), "at least 0")
-}
-
-pub(crate) fn check_horizon(horizon: f64, knot: f64) -> Result<(), Error> {
-    let is_valid = horizon >= knot && horizon / knot <= MOST_KNOTS;
-    Error::check("horizon", horizon, is_valid, "at least a knot, and at most 1000 knots")
 }

@@ -1,6 +1,6 @@
 //! Ground under the robot, as a plane.
 
-use condyle_dynamics::Vec3;
+use condyle_dynamics::{Mat3, Vec3};
 
 /// Weight of level ground in the fit of a plane, relative to one foot at a distance of 1 m.
 const LEVEL: f64 = 2e-3;
@@ -32,6 +32,17 @@ impl Terrain {
     pub fn normal(&self) -> Vec3<f64> {
         let [a, b] = self.slope;
         Vec3::new(-a, -b, 1.0).scale((1.0 + a * a + b * b).sqrt().recip())
+    }
+
+    /// Returns the rotation by the smallest angle that turns the vertical to a unit vector n, which points upwards:
+    /// R = 1 + \[w\]× + \[w\]×² / (1 + n_z) with w = e_z × n.
+    pub(crate) fn turn_to(n: Vec3<f64>) -> Mat3<f64> {
+        let s = (1.0 + n.z).recip();
+        Mat3 {
+            x: Vec3::new(1.0 - s * n.x * n.x, -s * n.x * n.y, -n.x),
+            y: Vec3::new(-s * n.x * n.y, 1.0 - s * n.y * n.y, -n.y),
+            z: n,
+        }
     }
 
     /// Fits a plane to points by least squares. A small weight keeps the plane level where the points do not determine

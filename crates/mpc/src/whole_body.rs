@@ -1,22 +1,28 @@
 //! Controller of a walking robot: each tick renews a plan of whole-body motion and contact forces.
 
 use crate::command::Command;
-use crate::knots::{EFFORT, KnotMaker, STATE, solver_of, swing_name, tilt_name, write_times};
+use crate::gait::Cycle;
+use crate::guide::Guide;
+use crate::knots::KnotMaker;
+use crate::planner::Planner;
 use crate::policy::Policy;
-use crate::references::{PlanarPose, Stand, Walk};
-use crate::report::{Report, TickStatus};
+use crate::references::Walk;
+use crate::report::Report;
 use crate::schedule::FootSchedule;
+use crate::settings::PlanSettings;
 use crate::{Error, Foot, Gait, Settings, Terrain};
-use condyle_dynamics::{Data, Model, Vec3, forward_kinematics};
+use condyle_dynamics::Model;
 use condyle_optimal::robot::ContactDynamics;
-use condyle_optimal::{ActionModel, InteriorPoint, PolicyPublisher, Problem, Schedule, Status};
+use condyle_optimal::{ActionModel, InteriorPoint, Problem, Schedule};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Time for which the robot stands before its first step (s).
 const FIRST_STAND: f64 = 0.2;
 /// Difference below which two times are equal (s).
 const SAME_TIME: f64 = 1e-6;
+/// Longest time until a change of the gait (s).
+const LATEST: f64 = 60.0;
 /// Most feet of a robot: a stance has a bit for each.
 const MOST_FEET: usize = 16;
 
@@ -51,40 +57,19 @@ const MOST_FEET: usize = 16;
 /// (2017), for schedules of contacts in time; Raibert, *Legged robots that balance* (1986), for footholds.
 #[derive(Debug)]
 pub struct WholeBodyMpc {
-    model: Arc<Model>,
-    data: Data<f64>,
-    walk: Walk,
+    planner: Planner,
+    guide: Guide,
     gait: Gait,
-    frames: Vec<usize>,
-    /// Names of the costs of each foot: of its swing and its tilt.
-    names: Vec<[String; 2]>,
-    /// Stances, with one model of the problem for each.
-    stances: Vec<u32>,
-    /// Efforts that hold the robot still in each stance.
-    still: Vec<Vec<f64>>,
-    problem: Problem,
-    solver: InteriorPoint,
-    publisher: PolicyPublisher,
-    schedule: FootSchedule,
-    knots: Schedule,
-    /// Time of knot 0 (s), and times of all knots.
-    times: Vec<f64>,
-    knot_models: Vec<usize>,
-    durations: Vec<f64>,
-    /// Rows of references, and positions of feet.
-    rows: Vec<f64>,
-    places: Vec<Vec3<f64>>,
-    /// State with which the plan begins: the measured one, or its prediction.
-    x: Vec<f64>,
-    /// Whether there is a plan.
-    is_started: bool,
-    /// Times of the last change of the horizon, and of the last measurement; time between two measurements (s).
-    last: f64,
-    measured: f64,
+    /// Time between the last two measurements (s).
     period: f64,
     /// Time of the measurement for which a tick is prepared (s).
     prepared: Option<f64>,
-    report: Report,
+    /// Whether contacts are reported, so that the problem has models for early and late landings.
+    is_touching: bool,
+    /// Feet that touch the ground, one bit for each foot, as reported for the next tick.
+    touching: Option<u32>,
+    /// Feet that stood at the last tick, one bit for each foot.
+    stood: u32,
 }
 
 impl WholeBodyMpc {
@@ -108,53 +93,16 @@ impl WholeBodyMpc {
             frames.push(foot.contact(&model, settings.knot)?.constraint.frame);
         }
         let x = [condyle_dynamics::neutral(&model), vec![0.0; model.nv()]].concat();
-        let (count, horizon, nv) = (feet.len(), settings.knots(), model.nv());
-        let stand = Stand { x: x.clone(), feet: vec![Vec3::zero(); count], height: 0.0 };
-        let walk = Walk {
-            stand,
-            feet: feet.to_vec(),
-            command: Command::default(),
-            goal: Command::default(),
-            raised: 0.0,
-            pose: PlanarPose::default(),
-            given_terrain: None,
-            terrain: Terrain { height: 0.0, slope: [0.0; 2] },
-            placed: vec![Vec3::zero(); count],
-            lifted: vec![Vec3::zero(); count],
-            stance: 0,
-            settings,
-        };
-        let full = (1 << count) - 1;
+        let (knots, walk) = (PlanSettings::from(&settings), Walk::new(&x, feet, settings));
+        let full = (1 << feet.len()) - 1;
         let maker = KnotMaker { model: &model, feet, settings: &walk.settings };
         let problem = problem_of(&maker, &[full], &x)?;
         let cycle = Gait::Stand.cycle(feet, &walk.placed)?;
-        Ok(Self {
-            data: Data::new(&model),
-            gait,
-            frames,
-            names: feet.iter().map(|foot| [swing_name(foot), tilt_name(foot)]).collect(),
-            stances: vec![full],
-            still: Vec::new(),
-            solver: solver_of(&problem, walk.settings.threads, walk.settings.budget),
-            publisher: PolicyPublisher::new(&problem)?,
-            problem,
-            schedule: FootSchedule::new(cycle, count, 0.0),
-            knots: Schedule::new(walk.settings.knot, 0)?,
-            times: vec![0.0; horizon + 1],
-            knot_models: vec![0; horizon],
-            durations: vec![walk.settings.knot; horizon],
-            rows: vec![0.0; (horizon + 1) * (model.nq() + nv)],
-            places: vec![Vec3::zero(); count],
-            x,
-            is_started: false,
-            last: f64::NEG_INFINITY,
-            measured: f64::NEG_INFINITY,
-            period: walk.settings.knot,
-            prepared: None,
-            report: Report::none(count),
-            walk,
-            model,
-        })
+        let (schedule, period) = (FootSchedule::new(cycle, feet.len(), 0.0), knots.knot);
+        let guide = Guide::new(&model, walk, schedule, frames, problem.horizon());
+        let planner = Planner::new(model, problem, knots, feet.len())?;
+        let (prepared, is_touching, touching, stood) = (None, false, None, full);
+        Ok(Self { planner, guide, gait, period, prepared, is_touching, touching, stood })
     }
 
     /// Begins anew at the time t (s) with a robot that stands in the state x = (q, v). This state defines the stand:
@@ -165,161 +113,53 @@ impl WholeBodyMpc {
     /// [`Error::Argument`] for a state or a time that is not finite; [`Error::Gait`] if the gait does not fit the
     /// positions of the feet; [`Error::Robot`] if no plan is found.
     pub fn reset(&mut self, t: f64, x: &[f64]) -> Result<&Report, Error> {
-        let (nq, nv) = (self.model.nq(), self.model.nv());
-        Error::check_array("x", x, nq + nv)?;
-        Error::check_array("t", &[t], 1)?;
-        self.x.copy_from_slice(x);
-        condyle_dynamics::normalize(&self.model, &mut self.x[..nq]);
-        self.find_feet();
-        let pose = PlanarPose::of(&self.x);
-        let back = PlanarPose { heading: -pose.heading, ..pose };
-        let walk = &mut self.walk;
-        walk.stand.x.copy_from_slice(&self.x);
-        walk.stand.x[nq..].fill(0.0);
-        for (foot, place) in self.places.iter().enumerate() {
-            let [dx, dy] = back.turned([place.x - pose.x, place.y - pose.y]);
-            walk.stand.feet[foot] = Vec3::new(dx, dy, place.z - self.x[2]);
-        }
-        let below: f64 = walk.stand.feet.iter().zip(&walk.feet).map(|(p, foot)| p.z - foot.height()).sum();
-        walk.stand.height = -below / self.places.len() as f64;
-        walk.placed.copy_from_slice(&self.places);
-        walk.lifted.copy_from_slice(&self.places);
-        (walk.command, walk.pose, walk.raised) = (Command::default(), pose, 0.0);
-        walk.stance = (1 << self.places.len()) - 1;
-        let start = t + self.walk.settings.latency;
-        self.start_schedule(start)?;
-        self.is_started = false;
-        self.plan_anew(start)?;
-        (self.last, self.measured, self.prepared) = (t, t, None);
-        Ok(&self.report)
+        self.planner.begin(t, x)?;
+        self.guide.begin(t, &self.planner);
+        (self.touching, self.stood, self.prepared) = (None, self.guide.full(), None);
+        let start = self.planner.times[0];
+        let Guide { walk, still, .. } = &mut self.guide;
+        let cycle = self.gait.cycle(&walk.feet, &walk.stand.feet)?;
+        still.clear(); // they belong to the last stand
+        self.add_stances(&cycle)?;
+        self.planner.knots = Schedule::new(self.settings().knot, 0)?;
+        self.guide.schedule = FootSchedule::new(cycle, self.count(), start + FIRST_STAND);
+        self.guide.extend(start, &mut self.planner);
+        self.planner.restart(start, |planner| self.guide.refer(planner))?;
+        Ok(self.complete_report())
     }
 
-    /// Starts the schedule with a short stand, followed by the gait.
-    fn start_schedule(&mut self, start: f64) -> Result<(), Error> {
-        let cycle = self.gait.cycle(&self.walk.feet, &self.walk.stand.feet)?;
-        self.add_stances(&cycle)?;
-        self.knots = Schedule::new(self.walk.settings.knot, 0)?;
-        self.schedule = FootSchedule::new(cycle, self.places.len(), start + FIRST_STAND);
-        Ok(())
+    /// Returns the number of feet.
+    fn count(&self) -> usize {
+        self.guide.places.len()
     }
 
     /// Creates models for the stances of a gait that have none yet. If there are any, the problem is made anew, and the
     /// plan is moved to the new problem.
-    fn add_stances(&mut self, cycle: &crate::gait::Cycle) -> Result<(), Error> {
-        let before = self.stances.len();
-        let probe = FootSchedule::of_cycle(cycle.clone(), self.places.len());
+    fn add_stances(&mut self, cycle: &Cycle) -> Result<(), Error> {
+        let (full, count) = (self.guide.full(), self.count());
+        let Guide { walk, stances, still, .. } = &mut self.guide;
+        let before = stances.len();
+        let probe = FootSchedule::of_cycle(cycle.clone(), count);
         for t in probe.events() {
             let stance = probe.stance(t);
-            if !self.stances.contains(&stance) {
-                self.stances.push(stance);
+            // with reports of contacts, each foot in the air may stand
+            let most = if self.is_touching { full } else { stance };
+            for stance in (stance..=most).filter(|other| other & stance == stance) {
+                if !stances.contains(&stance) {
+                    stances.push(stance);
+                }
             }
         }
-        if self.stances.len() == before && !self.still.is_empty() {
+        if stances.len() == before && !still.is_empty() {
             return Ok(());
         }
-        let maker = KnotMaker { model: &self.model, feet: &self.walk.feet, settings: &self.walk.settings };
-        let stand = &self.walk.stand.x;
-        self.still.clear();
-        for &stance in &self.stances {
-            self.still.push(maker.knot(stance)?.quasi_static(stand));
+        let maker = KnotMaker { model: &self.planner.model, feet: &walk.feet, settings: &walk.settings };
+        still.clear();
+        for &stance in &*stances {
+            still.push(maker.knot(stance)?.quasi_static(&walk.stand.x));
         }
-        let mut problem = problem_of(&maker, &self.stances, stand)?;
-        if self.is_started {
-            problem.set_knots(&self.knot_models, &self.durations)?;
-            problem.set_x0(self.problem.x0())?;
-        }
-        let mut solver = solver_of(&problem, self.walk.settings.threads, self.walk.settings.budget);
-        if self.is_started {
-            let plan = self.solver.solution();
-            let (xs, us) = (plan.xs.clone(), plan.us.clone());
-            solver.settings.max_iterations = 0;
-            solver.solve(&mut problem, &xs, &us)?;
-            solver.settings.max_iterations = self.solver.settings.max_iterations;
-        }
-        (self.problem, self.solver) = (problem, solver);
-        Ok(())
-    }
-
-    /// Writes the positions of the feet in the state `self.x`.
-    fn find_feet(&mut self) {
-        let placements = forward_kinematics(&self.model, &mut self.data, &self.x[..self.model.nq()]);
-        for (place, &frame) in self.places.iter_mut().zip(&self.frames) {
-            *place = placements.frame(frame).translation;
-        }
-    }
-
-    /// Solves the problem at the time `start` from the state `self.x` alone: the robot stands still on the feet of the
-    /// schedule.
-    fn plan_anew(&mut self, start: f64) -> Result<(), Error> {
-        let begin = Instant::now();
-        self.arrange(start);
-        self.problem.set_knots(&self.knot_models, &self.durations)?;
-        self.refer()?;
-        self.problem.set_x0(&self.x)?;
-        let xs = self.x.repeat(self.knot_models.len() + 1);
-        let us = self.problem.quasi_static(&xs)?;
-        let references = begin.elapsed();
-        let plan = self.solver.solve(&mut self.problem, &xs, &us)?;
-        let (status, is_finite) = (plan.status, plan.status != Status::NotFinite);
-        let solve = begin.elapsed() - references;
-        if !is_finite {
-            return Err(Error::Robot { what: format!("no plan from this state: {status:?}") });
-        }
-        self.publisher.publish(&self.problem, self.solver.solution(), start)?;
-        self.write_report(TickStatus::Restarted, start, [references, solve]);
-        self.is_started = true;
-        Ok(())
-    }
-
-    /// Extends the schedule, and writes the knots of a horizon that begins at the time `start`.
-    fn arrange(&mut self, start: f64) {
-        let until = start + self.walk.settings.horizon + 2.0 * self.walk.settings.knot;
-        let stances = &self.stances;
-        let index = |stance: u32| stances.iter().position(|other| *other == stance).unwrap_or(0);
-        self.schedule.extend(start, until, &mut self.knots, index);
-        self.knots.write_knots(start, &mut self.knot_models, &mut self.durations);
-        write_times(start, &self.durations, &mut self.times);
-    }
-
-    /// Writes all references.
-    fn refer(&mut self) -> Result<(), Error> {
-        let (nq, nx) = (self.model.nq(), self.model.nq() + self.model.nv());
-        let begin = self.times[0];
-        let rows = &mut self.rows[..(self.times.len()) * nx];
-        for (t, row) in self.times.iter().zip(rows.chunks_exact_mut(nx)) {
-            self.walk.write_state(t - begin, nq, row);
-        }
-        self.problem.set_references(STATE, rows)?;
-        let nu = self.model.nv() - 6;
-        let rows = &mut self.rows[..self.times.len() * nu];
-        for (&model, row) in self.knot_models.iter().zip(rows.chunks_exact_mut(nu)) {
-            row.copy_from_slice(&self.still[model]);
-        }
-        self.problem.set_references(EFFORT, rows)?;
-        let velocity = self.velocity();
-        let rows = &mut self.rows[..self.times.len() * 3];
-        for foot in 0..self.places.len() {
-            let [swing, tilt] = &self.names[foot];
-            if !self.walk.write_swing(foot, &self.schedule, &self.times, &self.x, velocity, rows) {
-                continue;
-            }
-            self.problem.set_references(swing, rows)?;
-            if self.walk.feet[foot].is_sole() {
-                for (t, row) in self.times.iter().zip(rows.chunks_exact_mut(3)) {
-                    self.walk.write_vertical(t - begin, row);
-                }
-                self.problem.set_references(tilt, rows)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the horizontal velocity of the trunk in the state `self.x`, along the world's axes (m/s).
-    fn velocity(&self) -> [f64; 2] {
-        let (q, v) = self.x.split_at(self.model.nq());
-        let quaternion = condyle_dynamics::Quaternion::new(q[3], q[4], q[5], q[6]);
-        let velocity = quaternion.to_rotation() * Vec3::new(v[0], v[1], v[2]);
-        [velocity.x, velocity.y]
+        let problem = problem_of(&maker, stances, &walk.stand.x)?;
+        self.guide.replace(problem, &mut self.planner)
     }
 
     /// Renews the plan for the measured state x = (q, v) at the time t (s). After [`prepare`](Self::prepare) for this
@@ -330,44 +170,31 @@ impl WholeBodyMpc {
     /// [`Error::Argument`] for a state of another length or a time that is not finite; [`Error::Time`] if t is before
     /// the last call; at the first call, the errors of [`reset`](Self::reset).
     pub fn update(&mut self, t: f64, x: &[f64]) -> Result<&Report, Error> {
-        Error::check_array("t", &[t], 1)?;
-        if t < self.measured {
-            return Err(Error::Time { t, last: self.measured });
-        }
-        if !self.is_started {
+        self.planner.check_time(t)?;
+        if !self.planner.is_started {
             return self.reset(t, x);
         }
-        if x.len() == self.x.len() && x.iter().any(|x| !x.is_finite()) {
-            self.report.status = TickStatus::InvalidState;
-            return Ok(&self.report);
+        if !self.planner.accepts(x)? {
+            return Ok(&self.planner.report);
         }
-        Error::check_array("x", x, self.x.len())?;
-        let begin = Instant::now();
+        let (begin, start) = (Instant::now(), self.planner.start(t));
         let is_prepared = self.prepared.take().is_some_and(|prepared| (prepared - t).abs() < SAME_TIME);
-        let start = (t + self.walk.settings.latency).max(self.times[0]);
-        self.predict(t, start, x)?;
+        let is_prepared = !self.land(t, start) && is_prepared;
+        self.planner.predict(t, start, x)?;
         if !is_prepared {
-            self.renew(t, start)?;
-            self.problem.set_x0(&self.x)?;
+            self.guide.renew(t, start, &mut self.planner)?;
+            self.planner.problem.set_x0(&self.planner.x)?;
         }
-        self.period = t - self.measured;
-        self.measured = t;
-        let references = begin.elapsed();
-        let plan = match is_prepared {
-            true => self.solver.feedback(&mut self.problem, &self.x)?,
-            false => self.solver.tick(&mut self.problem, self.walk.settings.sweeps)?,
-        };
-        if !plan.is_executable() {
-            if self.plan_anew(start).is_err() {
-                self.report.status = TickStatus::Failed;
-            }
-            return Ok(&self.report);
-        }
-        let status = if plan.fallback.is_none() { TickStatus::Planned } else { TickStatus::Fallback };
-        self.publisher.publish(&self.problem, self.solver.solution(), start)?;
-        let solve = begin.elapsed() - references;
-        self.write_report(status, start, [references, solve]);
-        Ok(&self.report)
+        self.period = t - self.planner.measured;
+        (self.planner.measured, self.stood) = (t, self.guide.walk.stance);
+        self.planner.tick(is_prepared, begin, |planner| self.guide.refer(planner))?;
+        Ok(self.complete_report())
+    }
+
+    /// Changes the swings for the reported contacts, if there are any. Returns whether a swing was changed.
+    fn land(&mut self, t: f64, start: f64) -> bool {
+        let touching = self.touching.take();
+        touching.is_some_and(|touching| self.guide.land(touching, self.stood, [t, start], &mut self.planner))
     }
 
     /// Makes the part of the next [`update`](Self::update) that does not depend on the measured state, before the state
@@ -378,56 +205,32 @@ impl WholeBodyMpc {
     /// # Errors
     /// [`Error::Robot`] before the first plan; [`Error::Time`] for a time before the last call.
     pub fn prepare(&mut self, t: Option<f64>) -> Result<(), Error> {
-        if !self.is_started {
-            return Err(Error::Robot { what: "there is no plan yet".to_owned() });
-        }
-        let t = t.unwrap_or(self.measured + self.period);
-        Error::check_array("t", &[t], 1)?;
-        if t < self.measured {
-            return Err(Error::Time { t, last: self.measured });
-        }
-        let start = (t + self.walk.settings.latency).max(self.times[0]);
-        let begin = self.times[0];
-        let plan = self.solver.solution();
-        plan.predict(&mut self.problem, plan.x(0), 0.0, start - begin, &mut self.x)?;
-        self.renew(t, start)?;
-        self.solver.prepare(&mut self.problem, self.walk.settings.sweeps)?;
+        self.check_started()?;
+        let t = t.unwrap_or(self.planner.measured + self.period);
+        self.planner.check_time(t)?;
+        let start = self.planner.start(t);
+        self.planner.follow(start)?;
+        self.guide.renew(t, start, &mut self.planner)?;
+        self.planner.solver.prepare(&mut self.planner.problem, self.guide.walk.settings.sweeps)?;
         self.prepared = Some(t);
         Ok(())
     }
 
-    /// Moves the horizon to the time `start`, and writes references for the state `self.x` then. `t` is the time of the
-    /// measurement.
-    fn renew(&mut self, t: f64, start: f64) -> Result<(), Error> {
-        self.find_feet();
-        self.walk.observe(&self.places, self.schedule.stance(start), &self.x, (t - self.last).max(0.0));
-        self.last = t;
-        let elapsed = start - self.times[0];
-        self.arrange(start);
-        self.solver.retime(&mut self.problem, elapsed, &self.knot_models, &self.durations)?;
-        self.refer()
-    }
-
-    /// Writes the state at the time `start` to `self.x`: the measured state x at the time t, moved by the dynamics
-    /// under the plan until then.
-    fn predict(&mut self, t: f64, start: f64, x: &[f64]) -> Result<(), Error> {
-        self.x.copy_from_slice(x);
-        let nq = self.model.nq();
-        condyle_dynamics::normalize(&self.model, &mut self.x[..nq]);
-        if start > t {
-            let (plan, begin) = (self.solver.solution(), self.times[0]);
-            plan.predict(&mut self.problem, x, t - begin, start - begin, &mut self.x)?;
+    fn check_started(&self) -> Result<(), Error> {
+        match self.planner.is_started {
+            true => Ok(()),
+            false => Err(Error::Robot { what: "there is no plan yet".to_owned() }),
         }
-        Ok(())
     }
 
-    fn write_report(&mut self, status: TickStatus, time: f64, durations: [Duration; 2]) {
-        let report = &mut self.report;
-        report.write(status, time, self.solver.solution(), durations);
-        report.command = self.walk.command.to_array();
+    /// Writes the command and the feet on the ground to the report, and returns it.
+    fn complete_report(&mut self) -> &Report {
+        let (report, walk) = (&mut self.planner.report, &self.guide.walk);
+        report.command = walk.command.to_array();
         for (foot, stands) in report.stands.iter_mut().enumerate() {
-            *stands = self.walk.stance & (1 << foot) != 0;
+            *stands = walk.stance & (1 << foot) != 0;
         }
+        report
     }
 
     /// Sets the commanded velocity of the trunk. The velocity changes with at most the accelerations of the settings.
@@ -436,7 +239,7 @@ impl WholeBodyMpc {
     /// [`Error::Argument`] for a number that is not finite.
     pub fn command(&mut self, command: Command) -> Result<(), Error> {
         command.check()?;
-        self.walk.goal = command;
+        self.guide.walk.goal = command;
         Ok(())
     }
 
@@ -446,7 +249,7 @@ impl WholeBodyMpc {
     /// [`Error::Argument`] for a number that is not finite.
     pub fn set_height(&mut self, raised: f64) -> Result<(), Error> {
         Error::check_array("height", &[raised], 1)?;
-        self.walk.raised = raised;
+        self.guide.walk.raised = raised;
         Ok(())
     }
 
@@ -456,26 +259,82 @@ impl WholeBodyMpc {
     /// # Errors
     /// [`Error::Gait`] for a gait that does not fit the feet.
     pub fn set_gait(&mut self, gait: Gait) -> Result<(), Error> {
-        if self.is_started {
-            let cycle = gait.cycle(&self.walk.feet, &self.walk.stand.feet)?;
+        self.set_gait_at(gait, f64::NEG_INFINITY)
+    }
+
+    /// Changes the gait as [`set_gait`](Self::set_gait) does, but not before the time t (s), at most 60 s ahead. Until
+    /// then the present gait goes on, and swings that have begun by then end as planned.
+    ///
+    /// # Errors
+    /// [`Error::Gait`] for a gait that does not fit the feet; [`Error::Argument`] for a time that is too late or no
+    /// number.
+    pub fn set_gait_at(&mut self, gait: Gait, t: f64) -> Result<(), Error> {
+        let now = self.guide.last() + self.settings().latency;
+        if t.is_nan() || self.planner.is_started && t > now + LATEST {
+            let what = format!("the time {t} s is not before {} s", now + LATEST);
+            return Err(Error::Argument { name: "t", what });
+        }
+        if self.planner.is_started {
+            let walk = &self.guide.walk;
+            let cycle = gait.cycle(&walk.feet, &walk.stand.feet)?;
             self.add_stances(&cycle)?;
-            let now = self.last + self.walk.settings.latency;
-            let stances = &self.stances;
-            let index = |stance: u32| stances.iter().position(|other| *other == stance).unwrap_or(0);
-            self.schedule.change(cycle, now, &mut self.knots, index);
+            self.guide.change_gait(cycle, now, t.max(now), &mut self.planner);
         }
         self.gait = gait;
         Ok(())
     }
 
+    /// Reports which feet touch the ground, as measured at the time of the next [`update`](Self::update), one entry for
+    /// each foot. Later updates need reports of their own. Without reports, feet land when the schedule says so.
+    ///
+    /// - A foot that touches after half of its swing has landed: it stands from then on, where it is.
+    /// - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
+    ///   most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
+    ///
+    /// Other swings stay as the schedule has them. The first call makes models for all stances that early landings can
+    /// lead to, and allocates.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] if there is not one entry for each foot.
+    pub fn touch(&mut self, feet: &[bool]) -> Result<(), Error> {
+        if feet.len() != self.count() {
+            let what = format!("expected {} feet, found {}", self.count(), feet.len());
+            return Err(Error::Argument { name: "feet", what });
+        }
+        let mask = feet.iter().enumerate().fold(0, |mask, (foot, &touches)| mask | u32::from(touches) << foot);
+        if !std::mem::replace(&mut self.is_touching, true) && self.planner.is_started {
+            let walk = &self.guide.walk;
+            let cycle = self.gait.cycle(&walk.feet, &walk.stand.feet)?;
+            self.add_stances(&cycle)?;
+        }
+        self.touching = Some(mask);
+        Ok(())
+    }
+
+    /// Reports the feet that touch the ground by the names of their frames, like [`touch`](Self::touch).
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for a name that is not a foot.
+    pub fn touch_named<S: AsRef<str>>(&mut self, feet: &[S]) -> Result<(), Error> {
+        let mut touching = vec![false; self.count()];
+        for name in feet {
+            let name = name.as_ref();
+            match self.guide.walk.feet.iter().position(|foot| foot.frame == name) {
+                Some(foot) => touching[foot] = true,
+                None => return Err(Error::Argument { name: "feet", what: format!("`{name}` is not a foot") }),
+            }
+        }
+        self.touch(&touching)
+    }
+
     /// Sets the plane of the ground. With `None`, it is the plane through the last footholds.
     pub fn set_terrain(&mut self, terrain: Option<Terrain>) {
-        self.walk.given_terrain = terrain;
+        self.guide.walk.given_terrain = terrain;
     }
 
     /// Returns a policy that follows the latest plan, for another thread. Allocates.
     pub fn policy(&self) -> Policy {
-        Policy::new(&self.publisher, &self.model, &self.walk.stand.x[..self.model.nq()], 6)
+        self.planner.policy(&self.guide.walk.stand.x[..self.planner.nq()], 6)
     }
 
     /// Writes the planned forces of the ground on the feet, along the world's axes: for each knot, three numbers for
@@ -484,14 +343,13 @@ impl WholeBodyMpc {
     /// # Errors
     /// [`Error::Robot`] without a plan.
     pub fn forces(&mut self) -> Result<Vec<f64>, Error> {
-        if !self.is_started {
-            return Err(Error::Robot { what: "there is no plan yet".to_owned() });
-        }
-        let count = self.places.len();
-        let mut forces = vec![0.0; 3 * count * self.knot_models.len()];
-        for (t, row) in forces.chunks_exact_mut(3 * count).enumerate() {
-            let Some(motion) = self.problem.motion(self.solver.solution(), t) else { continue };
-            for (foot, force) in self.walk.feet.iter().zip(row.chunks_exact_mut(3)) {
+        self.check_started()?;
+        let Planner { problem, solver, knot_models, .. } = &mut self.planner;
+        let feet = &self.guide.walk.feet;
+        let mut forces = vec![0.0; 3 * feet.len() * knot_models.len()];
+        for (t, row) in forces.chunks_exact_mut(3 * feet.len()).enumerate() {
+            let Some(motion) = problem.motion(solver.solution(), t) else { continue };
+            for (foot, force) in feet.iter().zip(row.chunks_exact_mut(3)) {
                 if let Some(contact) = motion.contact(&foot.frame) {
                     force.copy_from_slice(&contact.force.linear.to_array());
                 }
@@ -500,34 +358,52 @@ impl WholeBodyMpc {
         Ok(forces)
     }
 
+    /// Returns the times of the knots of the plan: N + 1 times (s).
+    pub fn times(&self) -> &[f64] {
+        &self.planner.times
+    }
+
+    /// Returns which feet are on the ground in each knot, flat: one entry for each of N knots and each foot. Together
+    /// with the solution and the [`times`](Self::times), these are the arguments of `condyle::plan_of`. It makes the
+    /// plan that a whole-body controller tracks. Allocates.
+    ///
+    /// # Errors
+    /// [`Error::Robot`] without a plan.
+    pub fn touches(&self) -> Result<Vec<bool>, Error> {
+        self.check_started()?;
+        let stance = |&model: &usize| self.guide.stances[model];
+        let stands = |stance: u32| (0..self.count()).map(move |foot| stance & (1 << foot) != 0);
+        Ok(self.planner.knot_models.iter().map(stance).flat_map(stands).collect())
+    }
+
     /// Returns the report of the last tick.
     pub fn report(&self) -> &Report {
-        &self.report
+        &self.planner.report
     }
 
     /// Returns the problem of the last tick.
     pub fn problem(&mut self) -> &mut Problem {
-        &mut self.problem
+        &mut self.planner.problem
     }
 
     /// Returns the solver, with the plan and its multipliers.
     pub fn solver(&self) -> &InteriorPoint {
-        &self.solver
+        &self.planner.solver
     }
 
     /// Returns the robot.
     pub fn model(&self) -> &Arc<Model> {
-        &self.model
+        &self.planner.model
     }
 
     /// Returns the settings.
     pub fn settings(&self) -> &Settings {
-        &self.walk.settings
+        &self.guide.walk.settings
     }
 
     /// Returns the plane of the ground that the controller assumes.
     pub fn terrain(&self) -> Terrain {
-        self.walk.terrain
+        self.guide.walk.terrain
     }
 }
 

@@ -3,8 +3,8 @@
 #[path = "../../../tests/common/counting.rs"]
 mod counting;
 
-use condyle_dynamics::simulation::{Ground, Settings as SimulationSettings, Simulation};
-use condyle_dynamics::{Model, robots};
+use condyle_dynamics::simulation::{Ground, GroundPoint, Settings as SimulationSettings, Simulation};
+use condyle_dynamics::{Data, Model, Vec3, forward_kinematics, robots};
 use condyle_mpc::{Command, EffortSource, Error, Foot, Gait, Pattern, Settings, TickStatus, WholeBodyMpc};
 use counting::allocated;
 use std::sync::Arc;
@@ -133,6 +133,212 @@ fn a_stop_lifts_no_foot() {
     assert_eq!(fewest, 3);
 }
 
+/// Ground of another height below a foot that swings: the point of the foot that touches the ground moves.
+fn stone(simulation: &Simulation, foot: usize, height: f64) -> GroundPoint {
+    let (model, frame) = (simulation.model(), simulation.ground().unwrap().points[foot].frame);
+    let mut data = Data::new(&**model);
+    let pose = forward_kinematics(model, &mut data, simulation.q()).frame(frame);
+    GroundPoint { frame, position: pose.rotation.transpose() * Vec3::new(0.0, 0.0, -height) }
+}
+
+/// Result of a walk over ground of another height.
+#[derive(Debug)]
+struct Uneven {
+    /// Lowest height of the trunk above the mean of the feet (m), and its largest tilt (rad).
+    lowest: f64,
+    tilt: f64,
+    /// Largest vertical force on a foot (N).
+    force: f64,
+    /// Steps (1 ms) in which a foot touched the ground, but the controller let it swing, and in which a foot did not
+    /// touch, but the controller let it stand.
+    unseen: usize,
+    missed: usize,
+}
+
+/// Simulates a trot. While a foot swings, the ground below it changes by a height, once. `reports` tells whether the
+/// controller gets to know which feet touch.
+fn uneven(height: f64, reports: bool) -> Uneven {
+    let mut mpc = controller(trot(), Settings::default());
+    let model = mpc.model().clone();
+    let mut simulation = Simulation::new(model.clone(), SimulationSettings { dt: STEP, ..Default::default() });
+    let ground = Ground { friction: 0.7, ..Ground::at_frames(FEET.map(|name| model.frame(name).unwrap())) };
+    simulation.set_ground(ground).unwrap();
+    let x = stand();
+    simulation.set_state(&x[..19], &x[19..]).unwrap();
+    mpc.reset(0.0, &x).unwrap();
+    mpc.command(Command { vx: 0.3, ..Command::default() }).unwrap();
+    let (mut policy, mut tau, mut swings) = (mpc.policy(), vec![0.0; 18], [0.0; 4]);
+    let mut changed = [false; 4];
+    let mut result = Uneven { lowest: f64::INFINITY, tilt: 0.0, force: 0.0, unseen: 0, missed: 0 };
+    for step in 0..2500 {
+        let t = f64::from(step) * STEP;
+        let x = [simulation.q(), simulation.v()].concat();
+        let touches: Vec<_> = simulation.contacts().iter().map(|contact| contact.touches).collect();
+        if step % 10 == 0 && step > 0 {
+            if reports {
+                mpc.touch(&touches).unwrap();
+            }
+            mpc.update(t, &x).unwrap();
+        }
+        let stands = mpc.report().stands.clone();
+        for foot in 0..4 {
+            swings[foot] = if stands[foot] { 0.0 } else { swings[foot] + STEP };
+            if t > 1.0 && swings[foot] > 0.09 && !changed[foot] {
+                changed[foot] = true;
+                let mut ground = simulation.ground().unwrap().clone();
+                ground.points[foot] = stone(&simulation, foot, height);
+                simulation.set_ground(ground).unwrap();
+            }
+            if t > 1.0 && step > 0 {
+                let late = swings[foot] > 0.13;
+                result.unseen += usize::from(touches[foot] && late);
+                result.missed += usize::from(!touches[foot] && stands[foot]);
+                result.force = result.force.max(simulation.contacts()[foot].force.z);
+            }
+        }
+        if t > 1.0 {
+            result.lowest = result.lowest.min(x[2]);
+            result.tilt = result.tilt.max(x[3].hypot(x[4]) * 2.0);
+        }
+        policy.control(t, &x, &mut tau[6..]);
+        assert!(simulation.step(&tau, &[]).is_taken());
+    }
+    assert!(changed.iter().all(|changed| *changed));
+    result
+}
+
+#[test]
+fn a_foot_that_lands_early_or_late_is_seen() {
+    for height in [0.02, 0.0, -0.02] {
+        let [blind, seeing] = [false, true].map(|reports| uneven(height, reports));
+        assert!(blind.tilt < 0.02 && seeing.tilt < 0.02, "{height} m: {blind:?}, {seeing:?}");
+        let expected = 0.5354 + height.min(0.0);
+        assert!(seeing.lowest > expected - 5e-3, "{height} m: {seeing:?}");
+        // fewer feet stand in the air, and landings are softer
+        assert!(2 * seeing.missed <= blind.missed, "{height} m: {blind:?}, {seeing:?}");
+        assert!(seeing.force < blind.force, "{height} m: {blind:?}, {seeing:?}");
+        if height > 0.0 {
+            assert!(seeing.unseen < blind.unseen, "{height} m: {blind:?}, {seeing:?}");
+        }
+    }
+}
+
+/// Checks that a controller without reports has the bits of one whose reports always agree with the schedule, and that
+/// a report of a wrong length is refused.
+#[test]
+fn reports_that_agree_with_the_schedule_change_nothing() {
+    let walked = |reports: bool| {
+        let mut mpc = controller(trot(), Settings::default());
+        if reports {
+            mpc.touch(&[true; 4]).unwrap();
+        }
+        let mut plans = Vec::new();
+        let states = simulate(&mut mpc, 1.2, PERIOD, |t, mpc, _| {
+            mpc.command(Command { vx: 0.3, ..Command::default() }).unwrap();
+            if reports {
+                let down = (t - 0.22 + 1e-9).rem_euclid(0.28); // since the last lift-off
+                let pair = ((t - 0.22 + 1e-9) / 0.28).floor().rem_euclid(2.0) == 0.0;
+                let in_air = |foot: usize| t > 0.219 && down < 0.24 && (foot == 0 || foot == 3) == pair;
+                mpc.touch(&[0, 1, 2, 3].map(|foot| !in_air(foot))).unwrap();
+            }
+            plans.push(mpc.solver().solution().us.clone());
+        });
+        (states, plans)
+    };
+    assert!(walked(false) == walked(true));
+    let mut mpc = controller(trot(), Settings::default());
+    assert_eq!(mpc.touch(&[true; 3]).unwrap_err().to_string(), "`feet`: expected 4 feet, found 3");
+    assert_eq!(mpc.touch_named(&["LF_foot", "paw"]).unwrap_err().to_string(), "`feet`: `paw` is not a foot");
+}
+
+/// Checks that several linearisations are made if the budget allows them, and the least number without time.
+#[test]
+fn the_budget_limits_the_linearisations() {
+    let x = stand();
+    for (iterations, budget, expected) in [([1, 3], 10.0, 3), ([2, 3], 1e-9, 2), ([1, 1], f64::INFINITY, 1)] {
+        let mut mpc = controller(trot(), Settings { iterations, budget, ..Settings::default() });
+        mpc.reset(0.0, &x).unwrap();
+        mpc.update(0.02, &x).unwrap();
+        assert_eq!(mpc.report().iterations, expected, "{iterations:?} within {budget} s");
+    }
+    let wrong = WholeBodyMpc::new(
+        Arc::new(robots::quadruped()),
+        &feet(),
+        trot(),
+        Settings { iterations: [2, 1], ..Settings::default() },
+    );
+    let said = wrong.unwrap_err().to_string();
+    assert_eq!(said, "setting `iterations` is 1, but it must be at least the least number");
+}
+
+/// Checks that a gait changes at a given time: until then the feet swing as before, and from then on none begins a
+/// swing.
+#[test]
+fn a_gait_changes_at_a_given_time() {
+    let mut mpc = controller(trot(), Settings::default());
+    let x = stand();
+    mpc.reset(0.0, &x).unwrap();
+    mpc.set_gait_at(Gait::Stand, 0.9).unwrap();
+    let swings: Vec<bool> = (1..80)
+        .map(|k| {
+            let report = mpc.update(0.02 * f64::from(k), &x).unwrap();
+            report.stands.iter().any(|stands| !stands)
+        })
+        .collect();
+    // the swings are from 0.22, 0.50 and 0.78 s on, each for 0.24 s; the last one has begun before 0.9 s
+    let at = |t: f64| swings[(t / 0.02).round() as usize - 1];
+    assert!(!at(0.2) && at(0.3) && !at(0.48) && at(0.6) && at(0.8) && at(1.0) && !at(1.04), "{swings:?}");
+    assert!(!swings[51..].iter().any(|swings| *swings));
+    let late = mpc.set_gait_at(trot(), 100.0).unwrap_err();
+    assert_eq!(late.to_string(), "`t`: the time 100 s is not before 61.58 s");
+}
+
+/// Checks that the planned forces on a slope lie in the friction cones about the normal of the slope, also where the
+/// robot needs friction up to the limit.
+#[test]
+fn friction_cones_follow_the_slope() {
+    let (angle, mu) = (15.0_f64.to_radians(), 0.4);
+    let model = Arc::new(robots::quadruped());
+    let feet = FEET.map(|name| Foot::point(name, mu, 0.0));
+    let settings = Settings { accelerations: [4.0, 4.0, 2.0], ..Settings::default() };
+    let mut mpc = WholeBodyMpc::new(model.clone(), &feet, trot(), settings).unwrap();
+    let normal = Vec3::new(-angle.sin(), 0.0, angle.cos()); // the ground rises ahead
+    let mut x = stand();
+    let place = normal.scale(0.5354);
+    x[..7].copy_from_slice(&[place.x, place.y, place.z, 0.0, -(0.5 * angle).sin(), 0.0, (0.5 * angle).cos()]);
+    let mut simulation = Simulation::new(model.clone(), SimulationSettings { dt: STEP, ..Default::default() });
+    let frames = FEET.map(|name| model.frame(name).unwrap());
+    simulation.set_ground(Ground { friction: mu, normal, ..Ground::at_frames(frames) }).unwrap();
+    simulation.set_state(&x[..19], &x[19..]).unwrap();
+    mpc.reset(0.0, &x).unwrap();
+    let (mut policy, mut tau, mut ratio) = (mpc.policy(), vec![0.0; 18], 0.0_f64);
+    let mut worst = [0.0_f64; 2]; // outside the cone (N): at knot 0, and anywhere
+    for step in 0..2000 {
+        let t = step as f64 * STEP;
+        let x = [simulation.q(), simulation.v()].concat();
+        if step % PERIOD == 0 && step > 0 {
+            mpc.command(Command { vx: if t < 1.0 { 0.5 } else { -0.3 }, ..Command::default() }).unwrap();
+            mpc.update(t, &x).unwrap();
+            for (k, force) in mpc.forces().unwrap().chunks_exact(3).enumerate() {
+                let force = Vec3::new(force[0], force[1], force[2]);
+                let along = force.dot(normal);
+                let across = (force - normal.scale(along)).norm();
+                let outside = across - mu * along;
+                worst[usize::from(k >= 4)] = worst[usize::from(k >= 4)].max(outside);
+                if along > 20.0 {
+                    ratio = ratio.max(across / (mu * along));
+                }
+            }
+        }
+        policy.control(t, &x, &mut tau[6..]);
+        assert!(simulation.step(&tau, &[]).is_taken());
+    }
+    let up = mpc.terrain().normal();
+    assert!((up - normal).norm() < 0.02, "{up:?}");
+    assert!(worst[0] < 0.5 && worst[1] < 2.0, "{worst:?}");
+    assert!(ratio > 0.9, "no force needs the friction: {ratio}");
+}
+
 #[test]
 fn a_tick_allocates_nothing() {
     let mut mpc = controller(trot(), Settings::default());
@@ -143,6 +349,7 @@ fn a_tick_allocates_nothing() {
     for tick in 1..120 {
         let t = 0.013 * f64::from(tick);
         let before = allocated();
+        mpc.touch(&[true; 4]).unwrap(); // each swing ends early
         mpc.update(t, &x).unwrap();
         policy.control(t, &x, &mut tau);
         if tick > 60 {

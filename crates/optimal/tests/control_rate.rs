@@ -2,8 +2,11 @@
 //! differences, and with a robot in contact.
 #![allow(non_snake_case)] // names follow the literature
 
-use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
-use condyle_optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, Limit, Residual};
+use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, robots};
+use condyle_optimal::robot::{
+    Activation, Contact, ContactDynamics, ControlBounds, ControlChange, Cost, Dynamics, FreeDynamics, FrictionCone,
+    Integrator, Knot, Limit, Residual, RobotProblem,
+};
 use condyle_optimal::{
     ActionModel, AugmentedLagrangian, ControlRate, Error, Fddp, InteriorPoint, LqKnot, Lqr, NumDiff, Problem, Status,
 };
@@ -126,7 +129,17 @@ struct Stand {
     still: Vec<f64>,
 }
 
-fn stand(weight: f64) -> Stand {
+/// Parts of the standing quadruped: the robot, the state at rest, contacts, costs, and limits.
+struct Parts {
+    model: Arc<Model>,
+    x: Vec<f64>,
+    contacts: Vec<Contact>,
+    state: Cost,
+    effort: Cost,
+    limits: Vec<Limit>,
+}
+
+fn parts() -> Parts {
     let model = Arc::new(robots::quadruped());
     let mut x = vec![0.0; model.nq() + model.nv()];
     x[..7].copy_from_slice(&[0.0, 0.0, 0.5354, 0.0, 0.0, 0.0, 1.0]);
@@ -147,13 +160,54 @@ fn stand(weight: f64) -> Stand {
         let residual = Residual::FrictionCone { contact: foot.to_owned(), cone: cone.clone() };
         Limit::new(foot, residual, lower.clone(), upper.clone())
     };
+    Parts { limits: feet.map(grip).to_vec(), contacts: contacts.to_vec(), model, x, state, effort }
+}
+
+fn stand(weight: f64) -> Stand {
+    let Parts { model, x, contacts, state, effort, limits } = parts();
     let robot = ContactDynamics::running(model.clone(), &contacts, DT, vec![state.clone(), effort]).unwrap();
-    let mut robot = robot.with_limits(feet.map(grip).to_vec()).unwrap();
+    let mut robot = robot.with_limits(limits).unwrap();
     let still = robot.quasi_static(&x);
     let end = FreeDynamics::terminal(model, vec![state]).unwrap();
     let knot = ControlRate::new(Box::new(robot), &[weight; 12]).unwrap();
     let end = ControlRate::new(Box::new(end), &[weight; 12]).unwrap();
     Stand { knot, end, x, still }
+}
+
+/// A problem with changes of the controls is written to JSON and read again. It has the bits of the problem that is
+/// made from actions, also with limits of the changes.
+#[test]
+fn a_problem_in_a_file_is_the_same_problem() {
+    let (count, weights, upper) = (6, vec![1e-3; 12], vec![4.0; 12]);
+    let Stand { knot, end, x, still } = stand(1e-3);
+    let mut x0 = [x, still.clone()].concat();
+    x0[20] = 0.6; // m/s
+    let Parts { model, contacts, state, effort, limits, .. } = parts();
+    let (integrator, lower) = (Integrator::SemiImplicitEuler, vec![-4.0; 12]);
+    let dynamics = Dynamics::Contact { contacts, damping: 0.0, actuation: None, integrator, dt: DT };
+    let bounds = Some(ControlBounds { lower: lower.clone(), upper: upper.clone() });
+    let change = Some(ControlChange { weights, bounds });
+    let data = RobotProblem {
+        model: (*model).clone(),
+        x0: x0.clone(),
+        knots: vec![Knot { limits, change: change.clone(), ..Knot::new(dynamics, vec![state.clone(), effort]) }],
+        knot_models: vec![0; count],
+        terminal: Knot { change, ..Knot::new(Dynamics::Terminal, vec![state]) },
+    };
+    let text = serde_json::to_string(&data).unwrap();
+    let read: RobotProblem = serde_json::from_str(&text).unwrap();
+    assert_eq!(read, data);
+    let limited = Box::new(knot.limited(&lower, &upper).unwrap());
+    let made = Problem::new(x0.clone(), vec![limited], vec![0; count], Box::new(end)).unwrap();
+    let [one, other] = [made, read.build().unwrap()].map(|mut problem| {
+        let mut solver = InteriorPoint::new(&problem);
+        solver.solve(&mut problem, &x0.repeat(count + 1), &still.repeat(count)).unwrap().clone()
+    });
+    assert_eq!((&one.xs, &one.us, one.status), (&other.xs, &other.us, Status::Converged));
+    let first = one.us[..12].iter().zip(&still).map(|(u, p)| (u - p).abs()).fold(0.0, f64::max);
+    assert!((3.9..4.0 + ACTIVE).contains(&first), "{first}"); // the limits act
+    let wrong = text.replace("\"change\":{\"weights\"", "\"change\":{\"waits\"");
+    assert!(serde_json::from_str::<RobotProblem>(&wrong).unwrap_err().to_string().contains("unknown field `waits`"));
 }
 
 /// Compares the derivatives of a robot's knots, which are computed in groups, with central differences.

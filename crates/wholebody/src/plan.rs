@@ -105,6 +105,11 @@ impl Plan {
         &self.data
     }
 
+    /// Returns the number of controls: all coordinates but the free-flyers'.
+    pub fn controls(&self) -> usize {
+        self.controls
+    }
+
     /// Returns the times of the first and the last knot.
     pub fn span(&self) -> [f64; 2] {
         [self.data.times[0], self.data.times[self.data.times.len() - 1]]

@@ -1,7 +1,8 @@
 //! The controller of arms as a Python class.
 
+use super::controller::controller;
 use super::policy::JointPolicy;
-use super::settings::{give_report, read_arm_weights, read_limits};
+use super::settings::{Limits, give_report, read_arm_weights};
 use crate::arrays::{pose, vector};
 use crate::exceptions::mpc_error;
 use crate::model::Model;
@@ -22,8 +23,10 @@ use std::sync::Mutex;
 /// frame: the name of the frame.
 /// horizon, knot: the durations of the horizon and of a knot (s).
 /// weights: `ArmWeights`; None for the defaults.
-/// limits: `PlanLimits`; None for all limits of the model.
-/// sweeps: the number of sweeps in a tick.
+/// limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
+/// sweeps: the number of sweeps for the quadratic program of each linearisation.
+/// iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
+///     made only if the budget has time left for one more.
 /// budget: the time budget of a tick (s); None without a budget. One sweep is always made.
 /// latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
 /// threads: the number of threads of a tick.
@@ -45,41 +48,32 @@ pub(crate) struct ArmMpc {
     nx: usize,
 }
 
-#[pymethods]
-impl ArmMpc {
+controller! { ArmMpc, 0 {
     #[new]
-    #[pyo3(signature = (model, frame, *, horizon=0.5, knot=0.02, weights=None, limits=None, sweeps=2, budget=None,
-        latency=0.0, threads=1))]
+    #[pyo3(signature = (model, frame, *, horizon=0.5, knot=0.02, weights=None, limits=Limits::MODEL, sweeps=2,
+        iterations=[1, 1], budget=None, latency=0.0, threads=1), text_signature = "(model, frame, *, horizon=0.5,
+        knot=0.02, weights=None, limits='model', sweeps=2, iterations=(1, 1), budget=None, latency=0.0, threads=1)")]
     fn new(
         model: &Bound<'_, Model>,
         frame: &str,
         horizon: f64,
         knot: f64,
         weights: Option<&Bound<'_, PyAny>>,
-        limits: Option<&Bound<'_, PyAny>>,
+        limits: Limits,
         sweeps: usize,
+        iterations: [usize; 2],
         budget: Option<f64>,
         latency: f64,
         threads: usize,
     ) -> PyResult<Self> {
         let weights = weights.map_or_else(|| Ok(rust::ArmWeights::default()), read_arm_weights)?;
-        let limits = limits.map_or_else(|| Ok(rust::PlanLimits::default()), read_limits)?;
-        let budget = budget.unwrap_or(f64::INFINITY);
-        let settings = rust::ArmSettings { horizon, knot, weights, limits, sweeps, budget, latency, threads };
+        let (Limits(limits), budget) = (limits, budget.unwrap_or(f64::INFINITY));
+        let settings =
+            rust::ArmSettings { horizon, knot, weights, limits, sweeps, iterations, budget, latency, threads };
         let robot = model.get().inner.clone();
         let nx = robot.nq() + robot.nv();
         let inner = rust::ArmMpc::new(robot, frame, settings).map_err(mpc_error)?;
         Ok(Self { model: model.clone().unbind(), inner: Mutex::new(inner), nx })
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.model)
-    }
-
-    /// The robot.
-    #[getter]
-    fn model(&self, py: Python<'_>) -> Py<Model> {
-        self.model.clone_ref(py)
     }
 
     /// Begins anew in a state, whose joints are the posture from which the arm deviates as little as the path allows.
@@ -112,18 +106,7 @@ impl ArmMpc {
         drop(inner);
         self.policy()
     }
-
-    /// Returns a `JointPolicy` that follows the latest plan, also after later updates.
-    fn policy(&self) -> PyResult<JointPolicy> {
-        let inner = lock("controller", &self.inner)?;
-        Ok(JointPolicy::new(inner.policy(), self.nx, inner.model().nv()))
-    }
-
-    /// The `Report` of the last tick.
-    #[getter]
-    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_report(py, lock("controller", &self.inner)?.report())
-    }
+}
 }
 
 /// Path of a frame: a Python function of time, or a pose.

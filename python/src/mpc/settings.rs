@@ -2,6 +2,7 @@
 
 use crate::arrays::class;
 use condyle::mpc as rust;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use rust::TickStatus;
@@ -20,7 +21,8 @@ pub(super) fn give_report<'py>(py: Python<'py>, report: &rust::Report) -> PyResu
     let seconds = [report.references, report.solve].map(|time| time.as_secs_f64());
     let stands = PyTuple::new(py, &report.stands)?;
     let command = PyTuple::new(py, report.command)?;
-    let members = (status, report.time, solver, report.gap, report.cost, seconds[0], seconds[1], stands, command);
+    let (time, iterations, [references, solve]) = (report.time, report.iterations, seconds);
+    let members = (status, time, solver, iterations, report.gap, report.cost, references, solve, stands, command);
     class!(py, "condyle._mpc", "Report")?.call1(members)
 }
 
@@ -58,8 +60,46 @@ pub(super) fn read_arm_weights(given: &Bound<'_, PyAny>) -> PyResult<rust::ArmWe
     })
 }
 
-/// Reads `PlanLimits`.
-pub(super) fn read_limits(given: &Bound<'_, PyAny>) -> PyResult<rust::PlanLimits> {
-    let one = |name: &str| given.getattr(name)?.extract::<bool>();
-    Ok(rust::PlanLimits { efforts: one("efforts")?, positions: one("positions")?, velocities: one("velocities")? })
+/// Limits that a plan keeps: the word 'model', `PlanLimits`, or None.
+pub(super) struct Limits(pub rust::PlanLimits);
+
+impl Limits {
+    /// All limits of the model.
+    pub(super) const MODEL: Self = Self(rust::PlanLimits { efforts: true, positions: true, velocities: true });
+}
+
+impl<'py> FromPyObject<'_, 'py> for Limits {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if given.is_none() {
+            return Ok(Self(rust::PlanLimits { efforts: false, positions: false, velocities: false }));
+        }
+        if let Ok(word) = given.extract::<String>() {
+            return match &*word {
+                "model" => Ok(Self::MODEL),
+                _ => {
+                    Err(PyValueError::new_err(format!("limits: expected 'model', PlanLimits or None, found '{word}'")))
+                }
+            };
+        }
+        let one = |name: &str| given.getattr(name)?.extract::<bool>();
+        let [efforts, positions, velocities] = [one("efforts")?, one("positions")?, one("velocities")?];
+        Ok(Self(rust::PlanLimits { efforts, positions, velocities }))
+    }
+}
+
+/// Time of a change of the gait: the word 'next', or a time (s).
+pub(super) struct ChangeTime(pub Option<f64>);
+
+impl<'py> FromPyObject<'_, 'py> for ChangeTime {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match given.extract::<String>() {
+            Ok(word) if word == "next" => Ok(Self(None)),
+            Ok(word) => Err(PyValueError::new_err(format!("at: expected 'next' or a time, found '{word}'"))),
+            Err(_) => Ok(Self(Some(given.extract()?))),
+        }
+    }
 }

@@ -1,12 +1,14 @@
 //! The controller of walking robots as a Python class.
 
+use super::controller::controller;
 use super::feet::{Foot, Gait};
 use super::policy::JointPolicy;
-use super::settings::{give_report, read_limits, read_weights};
+use super::settings::{ChangeTime, Limits, give_report, read_weights};
 use crate::arrays::{Computed, Give, three, vector};
-use crate::exceptions::mpc_error;
+use crate::exceptions::{controller_error, mpc_error};
 use crate::model::Model;
 use crate::optimal::lock;
+use crate::wholebody::Plan;
 use condyle::mpc as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -25,8 +27,10 @@ use std::sync::Mutex;
 /// gait: a `Gait`.
 /// horizon, knot: the durations of the horizon and of a knot (s).
 /// weights: `Weights`; None for the defaults.
-/// limits: `PlanLimits`; None for all limits of the model.
-/// sweeps: the number of sweeps in a tick.
+/// limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
+/// sweeps: the number of sweeps for the quadratic program of each linearisation.
+/// iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
+///     made only if the budget has time left for one more.
 /// budget: the time budget of a tick (s); None without a budget. One sweep is always made.
 /// latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
 /// threads: the number of threads of a tick.
@@ -49,11 +53,12 @@ pub(crate) struct WholeBodyMpc {
     nx: usize,
 }
 
-#[pymethods]
-impl WholeBodyMpc {
+controller! { WholeBodyMpc, 6 {
     #[new]
-    #[pyo3(signature = (model, feet, gait, *, horizon=0.5, knot=0.02, weights=None, limits=None, sweeps=2, budget=None,
-        latency=0.0, threads=1, max_acceleration=[1.0, 1.0, 2.0], swing_height=0.06))]
+    #[pyo3(signature = (model, feet, gait, *, horizon=0.5, knot=0.02, weights=None, limits=Limits::MODEL, sweeps=2,
+        iterations=[1, 1], budget=None, latency=0.0, threads=1, max_acceleration=[1.0, 1.0, 2.0], swing_height=0.06),
+        text_signature = "(model, feet, gait, *, horizon=0.5, knot=0.02, weights=None, limits='model', sweeps=2,
+        iterations=(1, 1), budget=None, latency=0.0, threads=1, max_acceleration=(1.0, 1.0, 2.0), swing_height=0.06)")]
     fn new(
         model: &Bound<'_, Model>,
         feet: Vec<PyRef<'_, Foot>>,
@@ -61,8 +66,9 @@ impl WholeBodyMpc {
         horizon: f64,
         knot: f64,
         weights: Option<&Bound<'_, PyAny>>,
-        limits: Option<&Bound<'_, PyAny>>,
+        limits: Limits,
         sweeps: usize,
+        iterations: [usize; 2],
         budget: Option<f64>,
         latency: f64,
         threads: usize,
@@ -74,8 +80,9 @@ impl WholeBodyMpc {
             horizon,
             knot,
             weights: weights.map_or_else(|| Ok(rust::Weights::default()), read_weights)?,
-            limits: limits.map_or_else(|| Ok(rust::PlanLimits::default()), read_limits)?,
+            limits: limits.0,
             sweeps,
+            iterations,
             budget: budget.unwrap_or(f64::INFINITY),
             latency,
             threads,
@@ -87,16 +94,6 @@ impl WholeBodyMpc {
         let nx = robot.nq() + robot.nv();
         let inner = rust::WholeBodyMpc::new(robot, &feet, gait.get().0.clone(), settings).map_err(mpc_error)?;
         Ok(Self { model: model.clone().unbind(), inner: Mutex::new(inner), nx })
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(&self.model)
-    }
-
-    /// The robot.
-    #[getter]
-    fn model(&self, py: Python<'_>) -> Py<Model> {
-        self.model.clone_ref(py)
     }
 
     /// Begins anew with a robot that stands: its joints are the posture to which the robot returns, and its feet are
@@ -141,12 +138,6 @@ impl WholeBodyMpc {
         py.detach(|| mpc.prepare(t)).map_err(mpc_error)
     }
 
-    /// Returns a `JointPolicy` that follows the latest plan, also after later updates.
-    fn policy(&self) -> PyResult<JointPolicy> {
-        let inner = lock("controller", &self.inner)?;
-        Ok(JointPolicy::new(inner.policy(), self.nx, inner.model().nv() - 6))
-    }
-
     /// Sets the commanded velocity of the trunk, along its heading.
     ///
     /// vx, vy: velocities forwards and to the left (m/s); wz: rate of turning to the left (rad/s); height: height of
@@ -162,11 +153,37 @@ impl WholeBodyMpc {
         inner.command(rust::Command { vx, vy, wz }).map_err(mpc_error)
     }
 
-    /// Changes the gait as soon as all feet that are in the air have landed.
+    /// Changes the gait as soon as all feet that are in the air have landed. No other foot leaves the ground before.
     ///
-    /// Raises `ControllerError` for a gait that does not fit the feet.
-    fn set_gait(&self, gait: &Bound<'_, Gait>) -> PyResult<()> {
-        lock("controller", &self.inner)?.set_gait(gait.get().0.clone()).map_err(mpc_error)
+    /// gait: the new `Gait`.
+    /// at: 'next' for now, or the time before which the present gait goes on (s), at most 60 s ahead.
+    ///
+    /// Raises `ControllerError` for a gait that does not fit the feet, and for a time that is too late.
+    #[pyo3(signature = (gait, at=ChangeTime(None)), text_signature = "($self, gait, at='next')")]
+    fn set_gait(&self, gait: &Bound<'_, Gait>, at: ChangeTime) -> PyResult<()> {
+        let mut inner = lock("controller", &self.inner)?;
+        inner.set_gait_at(gait.get().0.clone(), at.0.unwrap_or(f64::NEG_INFINITY)).map_err(mpc_error)
+    }
+
+    /// Reports which feet touch the ground, as measured at the time of the next `update`. Later updates need reports of
+    /// their own. Without reports, feet land when the schedule says so.
+    ///
+    /// - A foot that touches after half of its swing has landed: it stands from then on, where it is.
+    /// - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
+    ///   most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
+    ///
+    /// Other swings stay as the schedule has them.
+    ///
+    /// feet: the names of the frames of the feet that touch, or a bool for each foot.
+    ///
+    /// Raises `ControllerError` for a name that is not a foot, or another number of bools.
+    fn touch(&self, feet: &Bound<'_, PyAny>) -> PyResult<()> {
+        let mut inner = lock("controller", &self.inner)?;
+        if let Ok(names) = feet.extract::<Vec<String>>() {
+            return inner.touch_named(&names).map_err(mpc_error);
+        }
+        let flags: Vec<bool> = feet.try_iter()?.map(|flag| flag?.is_truthy()).collect::<PyResult<_>>()?;
+        inner.touch(&flags).map_err(mpc_error)
     }
 
     /// Sets the plane of the ground. Without arguments, it is the plane through the last footholds.
@@ -186,6 +203,27 @@ impl WholeBodyMpc {
         Ok(())
     }
 
+    /// Returns the plan of the last tick for `condyle.wholebody`: a `Plan` with the states, efforts and gains of the
+    /// horizon, and the feet that touch. A `WholeBodyController` with a contact for each foot, in the same order,
+    /// tracks it: `controller.track(mpc.plan(), t, references)`.
+    ///
+    /// fade: the time (s) during which a contact is loaded and unloaded.
+    ///
+    /// Raises `ControllerError` without a plan.
+    ///
+    /// >>> mpc.reset(np.r_[0.0, 0.0, 0.5354, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, np.zeros(18)])
+    /// >>> mpc.plan()
+    /// <condyle.wholebody.Plan of 26 knots and 4 contacts, 0 s to 0.5 s>
+    #[pyo3(signature = (fade=0.0))]
+    fn plan(&self, py: Python<'_>, fade: f64) -> PyResult<Plan> {
+        let inner = lock("controller", &self.inner)?;
+        let touches = inner.touches().map_err(mpc_error)?;
+        let contacts = inner.report().stands.len();
+        let model = self.model.bind(py);
+        let plan = condyle::plan_of(inner.model(), inner.solver().solution(), inner.times(), &touches, fade);
+        Ok(Plan::from_rust(model, plan.map_err(controller_error)?, contacts))
+    }
+
     /// Returns the planned forces of the ground on the feet, along the world's axes: (knots, feet, 3) (N). The force of
     /// a foot in the air is 0.
     ///
@@ -196,10 +234,5 @@ impl WholeBodyMpc {
         let shape = [forces.len() / (3 * feet), feet, 3];
         Computed::new(shape, |numbers: &mut [f64]| numbers.copy_from_slice(&forces)).give(py, None)
     }
-
-    /// The `Report` of the last tick.
-    #[getter]
-    fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give_report(py, lock("controller", &self.inner)?.report())
-    }
+}
 }

@@ -78,7 +78,7 @@ pub(super) fn knot(
     let limits_at = limits_at.into_iter().flatten().map(|(t, those)| (t, limits(model, Some(those)))).collect();
     let bounds = bounds.map(|[lower, upper]| ControlBounds { lower, upper });
     let (costs, limits) = (terms(model, costs), limits(model, all));
-    Knot { dynamics, costs, costs_at, limits, limits_at, bounds, controls }
+    Knot { dynamics, costs, costs_at, limits, limits_at, bounds, controls, change: None }
 }
 
 /// A knot of a robot that moves freely under its joints' efforts.

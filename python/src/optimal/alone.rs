@@ -58,8 +58,7 @@ fn action_alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
         return action_alone(constrained.get().action.bind(of.py()), t);
     }
     if of.is_instance_of::<ControlRate>() {
-        let what = "action: a ControlRate is no function of CasADi: use its action, and add the cost in CasADi";
-        return Err(ProblemError::new_err(what));
+        return Err(control_rate_error());
     }
     if of.is_instance_of::<Action>() || of.is_instance_of::<DifferentialAction>() || !residuals(of).is_empty() {
         let found = of.get_type().name()?;
@@ -76,7 +75,15 @@ fn action_alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
     }
 }
 
+fn control_rate_error() -> PyErr {
+    let what = "action: a ControlRate is no function of CasADi: use its action, and add the cost in CasADi";
+    ProblemError::new_err(what)
+}
+
 fn robot_alone(Described { robot, knot }: &Described, t: Option<usize>) -> PyResult<Alone> {
+    if knot.change.is_some() {
+        return Err(control_rate_error());
+    }
     let mut knot = knot.clone();
     if let Some(t) = t {
         knot.costs = knot.costs_at.remove(&t).unwrap_or(knot.costs);

@@ -27,7 +27,9 @@ pub(super) fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> 
         constrained.boxed(boxed(constrained.action.bind(model.py()), terminal, fault)?.action, fault)
     } else if let Ok(rate) = model.cast::<ControlRate>() {
         let rate = rate.get();
-        rate.boxed(boxed(rate.action.bind(model.py()), terminal, fault)?.action)?
+        let Boxed { action, described } = boxed(rate.action.bind(model.py()), terminal, fault)?;
+        let described = described.and_then(|described| described.with_change(rate.change()));
+        return Ok(Boxed { action: rate.boxed(action)?, described });
     } else if let Ok(action) = model.cast::<Action>() {
         action.get().boxed(terminal, fault)
     } else if let Ok(action) = model.cast::<DifferentialAction>() {
@@ -49,5 +51,8 @@ pub(super) fn residuals(model: &Bound<'_, PyAny>) -> Vec<Py<PyAny>> {
         )*};
     }
     of_a_robot!(FreeDynamics, ContactDynamics, ImpulseDynamics, FreeInverseDynamics, ContactInverseDynamics);
+    if let Ok(rate) = model.cast::<ControlRate>() {
+        return residuals(rate.get().action.bind(model.py()));
+    }
     Vec::new()
 }

@@ -118,8 +118,8 @@ impl Problem {
     /// Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
     /// infinite bound is written as null.
     ///
-    /// Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate`, or if
-    /// knots belong to different robots.
+    /// Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate` around one
+    /// of these, or if knots belong to different robots.
     fn to_json(&self) -> PyResult<String> {
         serde_json::to_string(&self.data()?).map_err(|error| ProblemError::new_err(error.to_string()))
     }

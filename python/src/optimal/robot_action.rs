@@ -8,7 +8,7 @@ use condyle::optimal as rust;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::ActionModel;
-use rust::robot::{Dynamics, Knot};
+use rust::robot::{ControlChange, Dynamics, Knot};
 use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -163,6 +163,13 @@ impl Described {
         let mut copy = self.clone();
         copy.knot.dynamics.set_dt(dt);
         copy
+    }
+
+    /// Returns the same action with a cost of the change of its controls; `None` if it has one already, because a
+    /// description has at most one.
+    pub(super) fn with_change(&self, change: ControlChange) -> Option<Arc<Self>> {
+        let (robot, knot) = (self.robot.clone(), Knot { change: Some(change), ..self.knot.clone() });
+        self.knot.change.is_none().then(|| Arc::new(Self { robot, knot }))
     }
 
     /// Returns whether a shift changes the action, because some costs or limits apply at single knots.

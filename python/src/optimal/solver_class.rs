@@ -1,5 +1,14 @@
 //! Macros that write the classes of solvers, with the methods that all solvers have.
 
+use super::outcomes::multipliers_by_knot;
+use super::problem::{Problem, lock};
+use super::recorder::{address, kept};
+use crate::exceptions::problem_error;
+use condyle::optimal as rust;
+use pyo3::prelude::*;
+use rust::record::Call;
+use std::sync::Mutex;
+
 /// Defines a solver class. The macro writes the methods that all solvers have. The constructor and the methods of only
 /// one class are arguments of the macro.
 macro_rules! solver {
@@ -295,3 +304,23 @@ macro_rules! plain_solver {
 }
 
 pub(super) use {plain_solver, solver};
+
+/// Sets the multipliers of the limit `name` in a solver, and records the call. `set` is the method of the solver.
+pub(super) fn set_multipliers<S>(
+    problem: &Py<Problem>,
+    solver: &Mutex<S>,
+    name: &str,
+    values: &Bound<'_, PyAny>,
+    set: impl FnOnce(&mut S, &mut rust::Problem, &str, &[Vec<f64>]) -> Result<(), rust::Error>,
+) -> PyResult<()> {
+    let problem = problem.get();
+    let mut inner = lock("problem", &problem.inner)?;
+    let recorded = address(solver);
+    let mut solver = lock("solver", solver)?;
+    let values = multipliers_by_knot(&mut inner, name, values)?;
+    problem.recorder.note_of(recorded, || Call::SetMultipliers {
+        name: name.to_owned(),
+        values: values.iter().map(|y| kept(y)).collect(),
+    });
+    set(&mut solver, &mut inner, name, &values).map_err(problem_error)
+}

@@ -1,7 +1,7 @@
 //! Solvers and their solutions.
 
 use super::evaluation::solution as give;
-use super::outcomes::{give_outcome, multipliers_by_knot};
+use super::outcomes::give_outcome;
 use super::policy::Policy;
 use super::problem::{Problem, lock};
 use super::recorder::{address, kept};
@@ -9,7 +9,7 @@ use super::run::{Observer, Start, observe, run};
 use super::settings::{
     dict, read_only, set_constraints, set_fddp, set_interior_point, show_constraints, show_fddp, show_interior_point,
 };
-use super::solver_class::{plain_solver, solver};
+use super::solver_class::{plain_solver, set_multipliers, solver};
 use crate::arrays::{Give, vector};
 use crate::exceptions::{problem_error, wrong_word};
 use condyle::optimal as rust;
@@ -270,14 +270,7 @@ AugmentedLagrangian, set_constraints, show_constraints {
     ///
     /// Raises `ProblemError` if no limit has this name, or a number is not finite; then all multipliers are kept.
     fn set_multipliers(&self, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
-        let mut problem = lock("problem", &self.problem.get().inner)?;
-        let mut solver = lock("solver", &self.solver)?;
-        let values = multipliers_by_knot(&mut problem, name, values)?;
-        self.problem.get().recorder.note_of(address(&self.solver), || Call::SetMultipliers {
-            name: name.to_owned(),
-            values: values.iter().map(|y| kept(y)).collect(),
-        });
-        solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
+        set_multipliers(&self.problem, &self.solver, name, values, rust::AugmentedLagrangian::set_multipliers)
     }
 }
 }
@@ -445,14 +438,7 @@ InteriorPoint, set_interior_point, show_interior_point {
     ///
     /// Raises `ProblemError` if no limit has this name, or a number is not finite; then all multipliers are kept.
     fn set_multipliers(&self, name: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
-        let mut problem = lock("problem", &self.problem.get().inner)?;
-        let mut solver = lock("solver", &self.solver)?;
-        let values = multipliers_by_knot(&mut problem, name, values)?;
-        self.problem.get().recorder.note_of(address(&self.solver), || Call::SetMultipliers {
-            name: name.to_owned(),
-            values: values.iter().map(|y| kept(y)).collect(),
-        });
-        solver.set_multipliers(&mut problem, name, &values).map_err(problem_error)
+        set_multipliers(&self.problem, &self.solver, name, values, rust::InteriorPoint::set_multipliers)
     }
 }
 }

@@ -56,6 +56,14 @@ fn lengths(argument: &str, given: &Bound<'_, PyAny>, rows: usize) -> PyResult<us
     }
 }
 
+impl Plan {
+    /// Returns a plan of a robot for this number of contacts.
+    pub(crate) fn from_rust(model: &Bound<'_, Model>, inner: rust::Plan, contacts: usize) -> Self {
+        let nu = inner.controls();
+        Self { inner, made_for: MadeFor::with_geometry(model.get()), contacts, nu, model: model.clone().unbind() }
+    }
+}
+
 #[pymethods]
 impl Plan {
     #[new]
@@ -87,8 +95,7 @@ impl Plan {
             times,
         };
         let inner = rust::Plan::new(robot, contacts, data).map_err(controller_error)?;
-        let made_for = MadeFor::with_geometry(model.get());
-        Ok(Self { inner, made_for, contacts, nu, model: model.clone().unbind() })
+        Ok(Self::from_rust(model, inner, contacts))
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {

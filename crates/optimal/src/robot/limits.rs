@@ -10,7 +10,7 @@ use super::residuals::view::ResidualView;
 use crate::Error;
 use crate::lq::LqKnot;
 use crate::problem::{Bounded, Multipliers, Part, Soft, Visit, leave_a_value};
-use condyle_dynamics::Model;
+use condyle_dynamics::{Mat3, Model};
 
 /// Residual within bounds: lower ≤ r(x, u) ≤ upper. Equal bounds make an equality. If both lists of bounds are empty,
 /// the limit is r(x, u) = 0.
@@ -214,6 +214,22 @@ impl Limits {
         self.sets.chosen_mut().set(t, LimitSet::new(model, capabilities, all, t)?);
         self.multipliers = Multipliers::new(self.most());
         Ok(())
+    }
+
+    /// Turns the friction cone of the limit called `name` to the rotation R, at all knots of all models. Returns
+    /// whether there is such a limit. Allocates nothing.
+    pub(super) fn turn_cone(&mut self, name: &str, R: Mat3<f64>) -> Result<bool, Error> {
+        let mut found = false;
+        for set in self.sets.all_mut().iter_mut().flat_map(PerKnot::all_mut) {
+            for (limit, plan) in set.terms.with_plans_mut().filter(|(limit, _)| limit.name == name) {
+                if !limit.residual.turn_cone(R, plan.rows.len(), &mut plan.W) {
+                    let what = "it is no friction cone of a force".to_owned();
+                    return Err(Error::Limit { name: name.to_owned(), knot: None, what });
+                }
+                found = true;
+            }
+        }
+        Ok(found)
     }
 
     /// Returns the limit sets of all knots and all models.

@@ -90,7 +90,7 @@ pub use integrators::{ControlPolynomial, Integrated, Integrator};
 pub use limits::Limit;
 pub use motion::{ContactForce, KnotMotion};
 pub use own_constraint::OwnConstraint;
-pub use problem::{ControlBounds, Dynamics, Knot, RobotProblem};
+pub use problem::{ControlBounds, ControlChange, Dynamics, Knot, RobotProblem};
 pub use residuals::autodiff::{GenericResidual, RobotState};
 pub use residuals::cones::{FrictionCone, WrenchCone};
 pub use residuals::distance::{Geometry, GeometryPair, Shape};

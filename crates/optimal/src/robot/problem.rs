@@ -12,8 +12,7 @@ use super::dynamics::inverse::ControlledAcceleration;
 use super::dynamics::inverse_contact::ControlledContactAcceleration;
 use super::integrators::{ControlPolynomial, Integrated, Integrator};
 use super::limits::Limit;
-use crate::ActionModel;
-use crate::{Error, Problem};
+use crate::{ActionModel, ControlRate, Error, Problem};
 use condyle_dynamics::Model;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -83,6 +82,36 @@ pub struct Knot {
     /// controls.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "ControlPolynomial::is_constant"))]
     pub controls: ControlPolynomial,
+    /// Cost of the change of the controls since the knot before; `None` without such a cost.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub change: Option<ControlChange>,
+}
+
+/// Cost, and limits, of the change u − p of the controls since the knot before, as in [`ControlRate`]. All knots of a
+/// problem need the same weights, and the initial state of the problem is (q, v, p).
+///
+/// ```
+/// use condyle_dynamics::robots;
+/// use condyle_optimal::robot::{ControlChange, Dynamics, Integrator, Knot, RobotProblem};
+/// let step = Dynamics::Free { actuation: None, integrator: Integrator::SemiImplicitEuler, dt: 0.05 };
+/// let [knot, terminal] = [step, Dynamics::Terminal].map(|dynamics| Knot {
+///     change: Some(ControlChange { weights: vec![1e-2; 7], bounds: None }),
+///     ..Knot::new(dynamics, vec![])
+/// });
+/// let (x0, knot_models) = (vec![0.0; 21], vec![0; 20]);
+/// let data = RobotProblem { model: robots::arm7(), x0, knots: vec![knot], knot_models, terminal };
+/// assert_eq!(data.build()?.nx(), 21);
+/// # Ok::<(), condyle_optimal::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct ControlChange {
+    /// Weight of each control, at least 0.
+    pub weights: Vec<f64>,
+    /// Bounds on u − p; `None` without bounds. A knot without controls ignores them.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub bounds: Option<ControlBounds>,
 }
 
 /// Bounds on the controls of a knot, nu entries each, infinite for an unbounded control. If the controls follow a
@@ -205,11 +234,11 @@ impl RobotProblem {
 
 impl Knot {
     /// Returns a knot with constant controls and with the same costs at every index of the horizon. The knot has no
-    /// limits and no bounds.
+    /// limits, no bounds, and no cost of the change of its controls.
     pub fn new(dynamics: Dynamics, costs: Vec<Cost>) -> Self {
         let (costs_at, limits_at) = (BTreeMap::new(), BTreeMap::new());
         let controls = ControlPolynomial::Constant;
-        Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None, controls }
+        Self { dynamics, costs, costs_at, limits: vec![], limits_at, bounds: None, controls, change: None }
     }
 
     /// Returns the contact called `name` of the knot's dynamics, as a mutable reference; `None` if it does not exist.
@@ -224,9 +253,22 @@ impl Knot {
 
     /// Returns the action of this knot. Allocates.
     ///
+    /// # Errors
     /// The errors of the action's constructor; [`Error::Length`] for bounds with a length other than nu;
-    /// [`Error::Actuation`] for a control polynomial at a knot without controls.
+    /// [`Error::Actuation`] for a control polynomial at a knot without controls; the errors of [`ControlRate::new`].
     pub fn build(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
+        let action = self.build_bare(model)?;
+        let Some(change) = &self.change else { return Ok(action) };
+        let has_controls = action.nu() > 0;
+        let action = ControlRate::new(action, &change.weights)?;
+        Ok(match &change.bounds {
+            Some(ControlBounds { lower, upper }) if has_controls => Box::new(action.limited(lower, upper)?),
+            _ => Box::new(action),
+        })
+    }
+
+    /// Returns the action without the cost of the change of its controls.
+    fn build_bare(&self, model: &Arc<Model>) -> Result<Box<dyn ActionModel>, Error> {
         let (model, costs) = (model.clone(), self.costs.clone());
         let drives = |actuation: &Option<DMatrix<f64>>| match actuation {
             None => Ok(Actuation::joints(&model)),

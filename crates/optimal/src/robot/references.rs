@@ -195,6 +195,45 @@ impl Problem {
         Ok(found)
     }
 
+    /// Turns the friction cone of the limit called `name` at all knots that have it: `rotation` maps the axes of the
+    /// surface, whose z axis is the normal, to the axes of the contact's rows. Returns whether a knot has the limit.
+    /// Allocates nothing.
+    ///
+    /// ```
+    /// # use condyle_dynamics::{ContactConstraint, Mat3, robots};
+    /// # use condyle_optimal::Problem;
+    /// # use condyle_optimal::robot::{Contact, ContactDynamics, FreeDynamics, FrictionCone, Limit, Residual};
+    /// # let model = std::sync::Arc::new(robots::quadruped());
+    /// # let x0 = [vec![0.0; 6], vec![1.0], vec![0.0; 30]].concat();
+    /// # let foot = Contact::new("foot", ContactConstraint::point(model.frame("LF_foot")?));
+    /// let cone = FrictionCone::new(0.5);
+    /// let (lower, upper) = cone.bounds();
+    /// let grip = Limit::new("grip", Residual::FrictionCone { contact: "foot".into(), cone }, lower, upper);
+    /// # let knot = ContactDynamics::running(model.clone(), &[foot], 0.02, vec![])?;
+    /// let knot = Box::new(knot.with_limits(vec![grip])?);
+    /// # let end = Box::new(FreeDynamics::terminal(model, vec![])?);
+    /// let mut problem = Problem::new(x0, vec![knot], vec![0; 5], end)?;
+    /// assert!(problem.turn_cones("grip", Mat3::identity())?);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Limit`] if the matrix is no rotation, or the limit is no friction cone of a force.
+    pub fn turn_cones(&mut self, name: &str, rotation: Mat3<f64>) -> Result<bool, Error> {
+        if !rotation.is_rotation() {
+            let what = "the rotation is none: expected three unit vectors at right angles".to_owned();
+            return Err(Error::Limit { name: name.to_owned(), knot: None, what });
+        }
+        let mut found = false;
+        self.each_action(&mut |action| {
+            if let Some(robot) = robot_of(action) {
+                found |= robot.terms.limits.turn_cone(name, rotation)?;
+            }
+            Ok(())
+        })?;
+        Ok(found)
+    }
+
     /// Returns the targets of the cost called `name` at all knots, as [`set_references`](Self::set_references) takes
     /// them, and the number of entries of a row. Rows of knots without this cost are NaN. Returns `None` if no knot has
     /// the cost, or if its residual has no target. Allocates.

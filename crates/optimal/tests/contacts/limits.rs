@@ -1,12 +1,12 @@
 //! Limits of a knot: the values of the terms that limits add to the cost, and the exact derivatives of these terms.
 
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
-use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
+use condyle_dynamics::{Mat3, Model, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, ContactDynamics, Cost, FrameName, FreeAcceleration, FreeDynamics, FreeInverseDynamics,
-    ImpulseDynamics, Integrated, Integrator, Limit, Residual,
+    FrictionCone, ImpulseDynamics, Integrated, Integrator, Limit, Residual,
 };
-use condyle_optimal::{ActionModel, Error, GroupModel, LqKnot};
+use condyle_optimal::{ActionModel, Error, GroupModel, LqKnot, Problem};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
@@ -245,4 +245,38 @@ fn what_does_not_fit_is_refused_by_the_limits_name() {
     let effort = Limit::new("effort", Residual::JointEffort { reference: vec![0.0; 7] }, vec![0.0; 7], vec![1.0; 7]);
     let error = end.with_limits(vec![effort]).map(|_| ()).unwrap_err().to_string();
     assert_eq!(error, "limit `effort`: there is no effort at this knot");
+}
+
+/// Checks that a problem whose friction cones are turned in place has the bits of a problem that is made with turned
+/// cones, and that other limits are refused.
+#[test]
+fn friction_cones_turn_in_place() {
+    let (model, mut rng) = (Arc::new(robots::quadruped()), StdRng::seed_from_u64(31));
+    let (R, count) = (rotation(&mut rng), 9);
+    let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
+    let problem = |rotation: Mat3<f64>| {
+        let cone = FrictionCone { rotation, facets: 8, inner: true, ..FrictionCone::new(0.6) };
+        let (lower, upper) = cone.bounds();
+        let residual = Residual::FrictionCone { contact: contacts[0].name.clone(), cone };
+        let effort = Residual::Control { reference: vec![0.0; 12] };
+        let limits = [Limit::new("grip", residual, lower, upper), Limit::equality("effort", effort)];
+        let knot = ContactDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
+        let knot = Box::new(knot.with_limits(limits.to_vec()).unwrap());
+        let x0 = [neutral(&model), vec![0.0; 18]].concat();
+        Problem::new(x0, vec![knot], vec![0; count], Box::new(FreeDynamics::terminal(model.clone(), vec![]).unwrap()))
+    };
+    let (mut turned, mut made) = (problem(Mat3::identity()).unwrap(), problem(R).unwrap());
+    assert!(turned.turn_cones("grip", R).unwrap() && !turned.turn_cones("grasp", R).unwrap());
+    let xs: Vec<f64> = (0..=count).flat_map(|_| random_state(&model, &mut rng)).collect();
+    let us = random(12 * count, 10.0, &mut rng);
+    let [one, other] = [&mut turned, &mut made].map(|problem| {
+        let mut knots = problem.lq_knots();
+        problem.calc_diff(&xs, &us, &mut knots);
+        knots
+    });
+    assert!(one == other);
+    let wrong = turned.turn_cones("effort", R).unwrap_err().to_string();
+    assert_eq!(wrong, "limit `effort`: it is no friction cone of a force");
+    let scaled = turned.turn_cones("grip", Mat3 { x: Vec3::new(2.0, 0.0, 0.0), ..Mat3::identity() }).unwrap_err();
+    assert!(scaled.to_string().contains("the rotation is none"), "{scaled}");
 }

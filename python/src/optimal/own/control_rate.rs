@@ -6,6 +6,7 @@ use condyle::optimal as rust;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::ActionModel;
+use rust::robot::{ControlBounds, ControlChange};
 
 /// An action of any kind, with a cost of the change of the controls from knot to knot, ½ Σ wᵢ (uᵢ − pᵢ)², where p are
 /// the controls of the knot before.
@@ -72,6 +73,12 @@ impl ControlRate {
 }
 
 impl ControlRate {
+    /// Returns the cost and the limits as data.
+    pub(in crate::optimal) fn change(&self) -> ControlChange {
+        let bounds = self.bounds.clone().map(|[lower, upper]| ControlBounds { lower, upper });
+        ControlChange { weights: self.weights.clone(), bounds }
+    }
+
     /// Adds the cost and the limits to a copy of the action.
     pub(in crate::optimal) fn boxed(&self, action: Box<dyn ActionModel>) -> PyResult<Box<dyn ActionModel>> {
         let has_controls = action.nu() > 0;

@@ -82,15 +82,20 @@ impl FrictionCone {
     pub fn rows(&self) -> Vec<[f64; 3]> {
         self.assert_facets();
         let mut rows = Vec::new();
+        self.each_row(|row| rows.push(row));
+        rows
+    }
+
+    /// Calls `visit` with each row of the matrix A. Allocates nothing.
+    pub(crate) fn each_row(&self, mut visit: impl FnMut([f64; 3])) {
         for side in 0..self.facets / 2 {
             let angle = 2.0 * core::f64::consts::PI * side as f64 / self.facets as f64;
             for sign in [1.0, -1.0] {
                 let along = Vec3::new(sign * angle.cos(), sign * angle.sin(), -self.slope());
-                rows.push((self.rotation * along).to_array()); // ±t − μ n
+                visit((self.rotation * along).to_array()); // ±t − μ n
             }
         }
-        rows.push((self.rotation * Vec3::new(0.0, 0.0, 1.0)).to_array());
-        rows
+        visit((self.rotation * Vec3::new(0.0, 0.0, 1.0)).to_array());
     }
 
     #[track_caller]

@@ -381,6 +381,19 @@ impl Residual {
         }
     }
 
+    /// Turns the friction cone of a contact force to the rotation R, and writes the matrix W of
+    /// [`force_rows`](Self::force_rows) again. Returns whether the residual is a friction cone. Allocates nothing.
+    pub(crate) fn turn_cone(&mut self, R: Mat3<f64>, rows: usize, W: &mut [f64]) -> bool {
+        let Self::FrictionCone { cone, .. } = self else { return false };
+        cone.rotation = R;
+        let mut entries = W.iter_mut();
+        cone.each_row(|row| {
+            let held = held(rows).iter().map(|&k| row.get(k).copied().unwrap_or(0.0));
+            entries.by_ref().zip(held).for_each(|(to, from)| *to = from);
+        });
+        true
+    }
+
     /// Returns the matrix W, row after row, of a residual r = W f, where f is a contact's force. W has as many columns
     /// as the contact has rows.
     pub(crate) fn force_rows(&self, rows: usize) -> Vec<f64> {

@@ -89,6 +89,11 @@ impl<T: Term> Terms<T> {
         self.all.iter().zip(&self.plans)
     }
 
+    /// Returns all terms with the plans of their residuals, to change both.
+    pub(crate) fn with_plans_mut(&mut self) -> impl Iterator<Item = (&mut T, &mut Plan)> {
+        self.all.iter_mut().zip(&mut self.plans)
+    }
+
     /// Returns the terms whose weight is not 0.
     fn weighty(&self) -> impl Iterator<Item = (&T, &Plan)> {
         self.with_plans().filter(|(term, _)| term.weight() != 0.0)
