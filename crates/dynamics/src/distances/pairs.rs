@@ -70,7 +70,7 @@ pub(crate) struct Pair {
     pub geometries: [usize; 2],
     /// First column of the path between both bodies, and the index after the last.
     pub path: [usize; 2],
-    /// How the distance is computed.
+    /// Method of computing the distance.
     method: Method,
 }
 
