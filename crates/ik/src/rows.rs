@@ -341,7 +341,7 @@ impl ResolvedTask {
                 damping * square
             }
             TaskKind::Damping => {
-                (0..objective.n).for_each(|i| objective.single(i, weight * self.task.factor(i), 0.0));
+                actuated.iter().for_each(|&i| objective.single(i, weight * self.task.factor(i), 0.0));
                 0.0
             }
             TaskKind::Manipulability(_) => {

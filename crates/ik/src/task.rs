@@ -17,7 +17,7 @@ pub enum TaskKind {
     Com,
     /// Positions of all joints except free-flyers: e = q_t ⊖ q.
     Posture,
-    /// Rest: nv numbers, e = 0. Its weight makes all velocities small.
+    /// Rest of all joints except free-flyers: e = 0. The weight of this task makes velocities small.
     Damping,
     /// Manipulability m = √det(J Jᵀ) of a frame, with its Jacobian J: the desired displacement of the joints is
     /// α ∂(ln m)/∂q. The factors select rows of J. Free-flyers and joints with several coordinates do not count.
