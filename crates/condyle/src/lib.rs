@@ -27,6 +27,7 @@
 //! | frames | [`forward_kinematics`], [`Placements`], [`frame_jacobian`], [`kinematics`], [`centroidal`] |
 //! | derivatives | [`rnea_derivatives`], [`aba_derivatives`], [`gradient`], [`hessian`], [`mod@derivatives`] |
 //! | contacts, loops, impacts | [`ConstraintSet`], [`ContactConstraint`], [`constrained_dynamics`], [`constraints`] |
+//! | distances | [`distances`]: `DistancePairs`, `Distances`, `Geometry`, `Shape` |
 //! | many states | [`Batch`], [`batch`], [`level`] |
 //! | simulation, identification | [`simulation`], [`regressors`] |
 //! | algebra and numbers | [`Scalar`], [`Se3`], [`Motion`], [`Force`], [`spatial`], [`conventions`] |
@@ -126,6 +127,8 @@ pub mod derivatives {
         passive_torque_derivatives, rnea_hessian, rnea_second_derivatives, static_torque_derivative,
     };
 }
+
+pub use condyle_dynamics::distances;
 
 /// Forward dynamics by divide and conquer, for chains of hundreds of bodies on several threads.
 pub mod divide_conquer {

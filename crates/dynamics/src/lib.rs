@@ -42,6 +42,7 @@ mod data;
 mod derivatives;
 #[cfg(feature = "std")]
 mod differentiate;
+pub mod distances;
 mod divide_conquer;
 mod lanes;
 mod passes;
@@ -94,7 +95,7 @@ pub use calls::second_derivatives::{
 };
 pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
 pub use condyle_model::{
-    Actuator, Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, FrameParent, GravityCompensation,
+    Actuator, Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, FrameName, FrameParent, GravityCompensation,
     IntegrateArgument, Joint, JointOptions, Keyframe, Limits, Mimic, Model, ModelBuilder, ModelConstraint,
     ModelConstraintKind, Place, Spring, Transmission, WORLD, Warning, WarningKind, difference, difference_jacobian,
     distance, inertial_parameters, integrate, integrate_jacobian, interpolate, neutral, normalize,

@@ -130,6 +130,14 @@ pub enum Error {
         /// Description of the fault, with the names and the numbers.
         what: String,
     },
+    /// A geometry, or a pair of geometries, is invalid.
+    #[error("{geometry}: {what}")]
+    Geometry {
+        /// Position in the list of pairs, or name of the geometry.
+        geometry: String,
+        /// Description of the fault, with the field and the numbers.
+        what: String,
+    },
     /// A strict loader treats a warning as an error.
     #[error("{}{warning}", file_of(file, warning))]
     Strict {

@@ -66,6 +66,8 @@ mod configuration;
 mod constraint;
 mod equality;
 mod error;
+mod frame_name;
+mod geometry;
 pub mod inertial_parameters;
 mod io;
 #[doc(hidden)]
@@ -102,6 +104,8 @@ pub use configuration::{
 pub use configuration::{difference_jacobian_groups, integrate_jacobian_groups};
 pub use constraint::{ModelConstraint, ModelConstraintKind};
 pub use error::Error;
+pub use frame_name::FrameName;
+pub use geometry::{Geometry, GeometryPair, Shape};
 #[cfg(feature = "loaders")]
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};

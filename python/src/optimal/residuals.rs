@@ -428,8 +428,12 @@ fn sphere(model: &Bound<'_, Model>, name: &str, given: &Bound<'_, PyAny>) -> PyR
     let (radius, frame) = (given.getattr("radius")?, given.getattr("frame")?);
     let wrong = |_| PyTypeError::new_err(format!("{name}.radius: expected a number, found {}", found_type(&radius)));
     let radius = radius.extract().map_err(wrong)?;
-    let frame = if frame.is_none() { None } else { Some(frame_name(model, &frame)?) };
-    Ok(robot::Geometry { frame, shape: robot::Shape::sphere(center, radius) })
+    let shape = robot::Shape::sphere(center, radius);
+    Ok(if frame.is_none() {
+        robot::Geometry::in_world(shape)
+    } else {
+        robot::Geometry::on(frame_name(model, &frame)?, shape)
+    })
 }
 
 /// Reads six numbers, linear first; returns zeros if no numbers are given.

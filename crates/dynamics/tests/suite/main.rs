@@ -19,6 +19,7 @@ mod constrained_derivatives;
 mod coriolis;
 mod counted;
 mod derivatives;
+mod distances;
 mod divide_conquer;
 mod energy;
 mod factorisation;

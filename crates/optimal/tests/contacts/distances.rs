@@ -323,16 +323,16 @@ fn a_wrong_geometry_is_refused_by_its_field() {
         error
     };
     let world = |center: [f64; 3], radius| Geometry::in_world(Shape::sphere(center, radius));
-    let text = "cost `apart`: its pairs[1].first.radius is -0.1, expected at least 0";
+    let text = "cost `apart`: its pairs[1].first: radius is -0.1, expected at least 0";
     assert_eq!(said(Geometry::on("tool", Shape::sphere([0.0; 3], -0.1)), good()), text);
-    let text = "cost `apart`: its pairs[1].second.radius holds a NaN";
+    let text = "cost `apart`: its pairs[1].second: radius holds a NaN";
     assert_eq!(said(good(), world([0.0; 3], f64::NAN)), text);
-    let text = "cost `apart`: its pairs[1].second.center holds an infinite number";
+    let text = "cost `apart`: its pairs[1].second: center holds an infinite number";
     assert_eq!(said(good(), world([0.0, f64::INFINITY, 0.0], 0.1)), text);
-    let text = "cost `apart`: its pairs[1] has no frame: expected at least one geometry on the robot";
+    let text = "cost `apart`: its pairs[1]: has no frame: expected at least one geometry on the robot";
     assert_eq!(said(world([0.0; 3], 0.1), world([1.0; 3], 0.1)), text);
     let unknown = said(good(), Geometry::on("tol", Shape::sphere([0.0; 3], 0.1)));
-    assert!(unknown.starts_with("cost `apart`: its pairs[1].second.frame: "), "{unknown}");
+    assert!(unknown.starts_with("cost `apart`: its pairs[1].second: frame: "), "{unknown}");
     assert!(unknown.contains("`tol`") && unknown.contains("`tool`"), "{unknown}");
     let residual = Residual::Distances { pairs: vec![GeometryPair::new(good(), world([1.0; 3], 0.1))] };
     let short = Limit::new("short", residual, vec![0.0; 2], vec![1.0; 1]);

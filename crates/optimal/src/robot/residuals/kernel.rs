@@ -6,12 +6,13 @@ use super::layout::{Plan, ROWS, STRIDE, row_width};
 use super::residual::Residual;
 use super::terms::KnotTerms;
 use crate::robot::knot_data::{KnotData, WIDEST, unpack, unpack_matrix};
+use condyle_dynamics::distances::prepared::{Method, NUMBERS, PreparedPair, round_distance};
 use condyle_dynamics::{
     Data, Model, Placements, ReferenceFrame, Velocities, centroidal_derivatives, centroidal_map, forward_kinematics,
     forward_velocities,
 };
-use condyle_spatial::block::{Block, Strided, gather_rows};
-use condyle_spatial::{Act, Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
+use condyle_spatial::block::{Block, Strided, gather_rows, scatter_rows};
+use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
 /// Group of knots whose residuals read the same quantities.
 pub(crate) struct KnotGroup<'a> {
@@ -122,7 +123,7 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
         };
         group.each(|group, [list, i], residual, plan| {
             if let Residual::Distances { .. } = residual {
-                return write_distances(placements, group, [list, i], plan, (t, r, row));
+                return write_distances(placements, group, [list, i], plan, (r, row));
             }
             let target = |k: usize| group.terms.get(k).and_then(|terms| terms.0[list].kinematic(i));
             let numbers: [_; WIDEST] =
@@ -153,30 +154,63 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
 }
 
 /// Computes the distances of residual i of a list, and the rows of their Jacobian. All knots of the group have the
-/// pairs of bodies of `plan`, but the geometries may differ.
+/// pairs of bodies and the methods of `plan`, but the geometries may differ.
 fn write_distances<S: Block<Number = f64>>(
     placements: Placements<'_, S>,
     group: &mut KnotGroup<'_>,
     [list, i]: [usize; 2],
     plan: &Plan,
-    (t, r, row): (&mut [S; 12], &mut [S; STRIDE], &mut [S]),
+    (r, row): (&mut [S; STRIDE], &mut [S]),
 ) {
     let nv = row.len();
     for (k, pair) in plan.pairs.iter().enumerate() {
-        let numbers: [&[f64]; WIDEST] = core::array::from_fn(|knot| {
+        let of = |knot: usize| {
             let terms = group.terms.get(knot).unwrap_or(&group.terms[0]);
-            terms.0[list].kinematic(i).map_or(&pair.numbers[..], |(.., plan)| &plan.pairs[k].numbers)
-        });
-        gather_rows(&numbers[..group.terms.len()], &mut t[..pair.numbers.len()]);
-        let [first, second] = pair.bodies;
-        sphere_distance(placements, first, second, t, r, group.slopes, row);
+            terms.0[list].kinematic(i).map_or(pair, |(.., plan)| &plan.pairs[k])
+        };
+        let (bodies, count) = (pair.bodies(), group.terms.len());
+        if pair.method() == Method::Other {
+            witnesses(placements, bodies, &of, count, r);
+        } else {
+            let (numbers, mut t) =
+                (core::array::from_fn::<_, WIDEST, _>(|knot| of(knot).numbers()), [S::zero(); NUMBERS]);
+            gather_rows(&numbers.each_ref().map(<[f64; NUMBERS]>::as_slice)[..count], &mut t);
+            round_distances(placements, bodies, pair.method(), &t, r);
+        }
         let at = plan.slot * STRIDE + k;
         unpack(&r[..1], group.data, |data| &mut data.residuals.kinematic[list].r[at..]);
         if group.slopes {
+            distance_row(placements, bodies, r, row);
             let at = plan.slot * ROWS * nv + k * nv;
             unpack(row, group.data, |data| &mut data.residuals.kinematic[list].rows[at..]);
         }
     }
+}
+
+/// Computes the distance of a pair for one knot after another. Writes distance, witness point and normal to `r`.
+fn witnesses<'a, S: Block<Number = f64>>(
+    placements: Placements<'_, S>,
+    bodies: [usize; 2],
+    of: &dyn Fn(usize) -> &'a PreparedPair,
+    count: usize,
+    r: &mut [S; STRIDE],
+) {
+    let (mut lanes, mut poses) = ([S::zero(); 24], [[0.0; 24]; WIDEST]);
+    for (body, lanes) in bodies.iter().zip(lanes.chunks_exact_mut(12)) {
+        let Se3 { rotation, translation } = placements.body(*body);
+        for (k, column) in rotation.columns().into_iter().chain([translation]).enumerate() {
+            lanes[3 * k..][..3].copy_from_slice(&column.to_array());
+        }
+    }
+    scatter_rows(&lanes, &mut poses.each_mut().map(<[f64; 24]>::as_mut_slice)[..count]);
+    let mut found = [[0.0; 7]; WIDEST];
+    for (knot, found) in found[..count].iter_mut().enumerate() {
+        let vector = |k: usize| Vec3::new(poses[knot][k], poses[knot][k + 1], poses[knot][k + 2]);
+        let pose = |k| Se3::new(Mat3 { x: vector(k), y: vector(k + 3), z: vector(k + 6) }, vector(k + 9));
+        let (distance, p, n) = of(knot).distance(&[pose(0), pose(12)]);
+        *found = [distance, p.x, p.y, p.z, n.x, n.y, n.z];
+    }
+    gather_rows(&found.each_ref().map(<[f64; 7]>::as_slice)[..count], &mut r[..7]);
 }
 
 kernel! {
@@ -348,32 +382,27 @@ kernel! {
     }
 }
 
-/// Square of the distance below which two centres coincide (m²). Above it, the square of a distance has full precision.
-const COINCIDENT: f64 = 1e-300;
+kernel! {
+    /// Computes the signed distance of two spheres or capsules on bodies, a witness point and the normal. `t` contains
+    /// the numbers of both shapes.
+    fn round_distances<S>(
+        placements: Placements<'_, S>, bodies: [usize; 2], method: Method, t: &[S; NUMBERS], r: &mut [S; STRIDE],
+    ) {
+        let (distance, p, n) = round_distance(method, t, bodies.map(|body| placements.body(body)));
+        r[..7].copy_from_slice(&[distance, p.x, p.y, p.z, n.x, n.y, n.z]);
+    }
+}
 
 kernel! {
-    /// Computes the signed distance ‖p₁ − p₂‖ − radius₁ − radius₂ of two spheres on bodies, and the row nᵀ (J₁ − J₂) of
-    /// its Jacobian. `t` contains the centres in the bodies' coordinates, and the sum of the radii.
-    fn sphere_distance<S>(
-        placements: Placements<'_, S>, first: usize, second: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
-        row: &mut [S],
+    /// Computes the row nᵀ (J₁ − J₂) of a distance's Jacobian. `r` contains the distance, a witness point and n.
+    fn distance_row<S>(
+        placements: Placements<'_, S>, bodies: [usize; 2], r: &[S; STRIDE], row: &mut [S],
     ) {
-        let p = placements.body(first).act(vector(t, 0));
-        let d = p - placements.body(second).act(vector(t, 3));
-        let square = d.norm_squared();
-        let distance = square.sqrt();
-        r[0] = distance - t[6];
-        if slopes {
-            row.fill(S::zero());
-            let coincident = square.lt(S::splat(COINCIDENT));
-            let inverse = S::select(coincident, S::one(), distance).recip();
-            let entry = |d: S, z: f64| S::select(coincident, S::splat(z), d * inverse);
-            let n = Vec3::new(entry(d.x, 0.0), entry(d.y, 0.0), entry(d.z, 1.0));
-            // the line of the force n contains both centres, so one moment about the origin serves for both bodies
-            let f = Force::at_point(p, n);
-            placements.add_body_efforts(first, f, row); // J₁ᵀ n
-            placements.add_body_efforts(second, -f, row);
-        }
+        row.fill(S::zero());
+        // the line of the force n contains both witness points, so one moment about the origin serves for both bodies
+        let f = Force::at_point(Vec3::new(r[1], r[2], r[3]), Vec3::new(r[4], r[5], r[6]));
+        placements.add_body_efforts(bodies[0], f, row); // J₁ᵀ n
+        placements.add_body_efforts(bodies[1], -f, row);
     }
 }
 

@@ -2,10 +2,11 @@
 //! offset of its entries.
 #![allow(non_snake_case)] // names follow the literature: W
 
-use super::distance::PairPlan;
+use super::distance::prepare;
 use super::residual::{Part, Residual};
 use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::Model;
+use condyle_dynamics::distances::prepared::PreparedPair;
 use core::ops::{Add, BitOr, Range};
 use nalgebra::DMatrix;
 
@@ -21,7 +22,7 @@ pub(crate) struct Plan {
     /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
     /// Pairs of geometries whose distances are the entries of the residual; empty for other residuals.
-    pub pairs: Vec<PairPlan>,
+    pub pairs: Vec<PreparedPair>,
     /// Range in λ of the rows of the residual's contact.
     pub rows: Range<usize>,
     /// Whether the knot has contacts.
@@ -42,7 +43,7 @@ impl Plan {
             _ => residual.force_rows(rows.len()),
         };
         let pairs = match residual {
-            Residual::Distances { pairs } => PairPlan::all(model, pairs)?,
+            Residual::Distances { pairs } => prepare(model, pairs)?,
             _ => Vec::new(),
         };
         let in_contact = !capabilities.contacts.is_empty();
@@ -55,12 +56,13 @@ impl Plan {
         self.n.div_ceil(STRIDE)
     }
 
-    /// Returns whether two kinematic residuals of the same kind read the same frame and the same pairs of bodies.
+    /// Returns whether two kinematic residuals of the same kind read the same frame and the same pairs of bodies, whose
+    /// distances are computed by the same methods.
     pub(crate) fn reads_the_bodies_of(&self, other: &Self) -> bool {
-        let bodies = |plan: &Self, k: usize| plan.pairs[k].bodies;
+        let pair = |plan: &Self, k: usize| (plan.pairs[k].bodies(), plan.pairs[k].method());
         self.frame == other.frame
             && self.pairs.len() == other.pairs.len()
-            && (0..self.pairs.len()).all(|k| bodies(self, k) == bodies(other, k))
+            && (0..self.pairs.len()).all(|k| pair(self, k) == pair(other, k))
     }
 }
 

@@ -3,7 +3,6 @@
 pub(super) mod autodiff;
 pub(super) mod cones;
 pub(super) mod distance;
-pub(super) mod frame_name;
 pub(super) mod gravity_residual;
 pub(super) mod kernel;
 pub(super) mod layout;

@@ -1,11 +1,11 @@
 //! Residuals of costs and limits.
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
-use super::distance::{GeometryPair, PairPlan};
-use super::frame_name::FrameName;
+use super::distance::prepare;
 use super::own::{Inputs, OwnResidual};
 use super::target::check_rotation;
 use crate::robot::outputs::{Capabilities, Output};
+use condyle_dynamics::distances::{FrameName, GeometryPair};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
 /// Residual: a vector r(x, u) that a cost makes small or a limit bounds.
@@ -111,12 +111,12 @@ pub enum Residual {
         up: Vec3<f64>,
     },
     /// Signed distances between geometries on the robot and obstacles in the world, or other geometries of the same
-    /// robot (m). Each pair of geometries has one entry. For two spheres with centres p₁ and p₂ the entry is r = ‖p₁ −
-    /// p₂‖ − radius₁ − radius₂, which is negative while the spheres overlap.
+    /// robot (m). Each pair has one entry r = n·(p₁ − p₂), which is negative while the geometries overlap.
+    /// The points p₁ and p₂ on the surfaces and the unit normal n are defined in
+    /// [`distances`](condyle_dynamics::distances), with the shapes of which the distance is exact.
     ///
-    /// The Jacobian of an entry is nᵀ (∂p₁/∂q − ∂p₂/∂q) with the unit vector n from p₂ to p₁. If the centres coincide,
-    /// no such vector exists. Then n is the world's z axis, so that the derivatives stay finite and move the spheres
-    /// apart.
+    /// The Jacobian of an entry is nᵀ (∂p₁/∂q − ∂p₂/∂q), for points that are fixed to their bodies. If the centres of
+    /// two spheres coincide, n is the world's z axis, so that the derivatives stay finite and move the spheres apart.
     ///
     /// A [`Limit`](crate::robot::Limit) with lower bounds and infinite upper bounds keeps the geometries apart. It
     /// applies only at knots, so a short Δt or a margin must exclude collisions between two knots.
@@ -362,7 +362,7 @@ impl Residual {
                 return Err("only an impact changes velocities at once".to_owned());
             }
             Self::ImpulseCenterOfMass => 3,
-            Self::Distances { pairs } => PairPlan::all(model, pairs)?.len(),
+            Self::Distances { pairs } => prepare(model, pairs)?.len(),
             Self::Own(own) => own.check(model, nu).map(|()| own.size())?,
         };
         match self.output() {

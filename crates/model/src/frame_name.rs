@@ -1,18 +1,21 @@
 //! Names of frames, which do not depend on a particular robot.
 
-use condyle_dynamics::{Frame, FrameKind, Model};
+use crate::body::{Frame, FrameKind};
+use crate::error::Error;
+use crate::model::Model;
+use alloc::borrow::ToOwned;
+use alloc::string::String;
 
 /// Name of a frame. When an action is created, it looks up the index of the frame in its robot. An unknown name is an
 /// error.
 ///
 /// ```
-/// use condyle_dynamics::robots;
-/// use condyle_optimal::robot::FrameName;
+/// use condyle_model::{FrameName, robots};
 /// let arm = robots::arm7();
 /// let tool = FrameName::from("tool");
 /// assert_eq!(tool.number(&arm)?, arm.frame("tool")?);
 /// assert!(tool.number(&robots::quadruped()).is_err());
-/// # Ok::<(), condyle_dynamics::Error>(())
+/// # Ok::<(), condyle_model::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -42,8 +45,8 @@ impl FrameName {
     /// Returns the index of the frame in a robot.
     ///
     /// # Errors
-    /// [`condyle_dynamics::Error::UnknownFrame`], whose message contains the most similar name.
-    pub fn number(&self, model: &Model) -> Result<usize, condyle_dynamics::Error> {
+    /// [`Error::UnknownFrame`], whose message contains the most similar name.
+    pub fn number(&self, model: &Model) -> Result<usize, Error> {
         let is_it = |frame: &Frame| frame.name == self.name && Some(frame.kind) == self.kind;
         model.frames().iter().position(is_it).map_or_else(|| model.frame(&self.name), Ok)
     }

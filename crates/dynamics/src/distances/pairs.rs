@@ -1,0 +1,341 @@
+//! Pairs of geometries, prepared for one robot.
+
+use super::results::Distances;
+use super::round::{Witness, norm};
+use super::solid::{Solid, distance, is_exact};
+use crate::passes::frames::Placements;
+use alloc::vec::Vec;
+use condyle_linalg::{check, check_index};
+use condyle_model::{Error, Geometry, GeometryPair, Model, Shape};
+use condyle_spatial::{Act, Force, Se3, Vec3};
+
+/// Geometry of a pair that is replaced by a capsule, because the exact distance of the pair is not available.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Replacement {
+    /// Index of the pair.
+    pub pair: usize,
+    /// Index of the geometry in the pair: 0 for the first, 1 for the second.
+    pub side: usize,
+    /// Cylinder or ellipsoid that is replaced.
+    pub shape: Shape,
+    /// Capsule that contains the shape.
+    pub capsule: Shape,
+}
+
+/// Geometry that is prepared for distances.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    /// Geometry as the caller gave it.
+    geometry: Geometry,
+    /// Shape that is used: the geometry's shape, or the capsule that replaces it.
+    shape: Shape,
+    /// Index of the body; 0 is the world.
+    pub(crate) body: usize,
+    /// Pose of the geometry's frame in its body.
+    frame: Se3<f64>,
+    /// Shape in the coordinates of the body.
+    pub(crate) solid: Solid,
+    /// Centre of the bounding sphere in the coordinates of the body, and its radius.
+    bound: (Vec3<f64>, f64),
+}
+
+impl Placed {
+    /// Gives the shape a pose in the geometry's frame.
+    fn place(&mut self, placement: Se3<f64>) {
+        self.geometry.placement = placement;
+        let pose = self.frame * placement;
+        self.solid = Solid::new(&self.shape, &pose);
+        let (center, radius) = self.shape.bounding_sphere();
+        self.bound = (pose.act(center), radius);
+    }
+}
+
+/// Coordinate that changes a distance.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PathColumn {
+    /// Index of the joint column.
+    pub column: usize,
+    /// Index of the coordinate in the tangent of q.
+    pub coordinate: usize,
+    /// Ratio of the column, with a minus sign if the column moves the second body.
+    pub ratio: f64,
+}
+
+/// Pair of geometries, as indices.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pair {
+    /// Indices of both geometries.
+    pub geometries: [usize; 2],
+    /// First column of the path between both bodies, and the index after the last.
+    pub path: [usize; 2],
+}
+
+/// Pairs of geometries, prepared for one robot: poses in bodies, and the joints between both bodies of each pair.
+///
+/// Equal geometries in several pairs are moved to the world once. See the [module](super) for equations and an example.
+#[derive(Clone, Debug)]
+pub struct DistancePairs {
+    pub(crate) geometries: Vec<Placed>,
+    pub(crate) pairs: Vec<Pair>,
+    pub(crate) path: Vec<PathColumn>,
+    replacements: Vec<Replacement>,
+    cutoff: f64,
+    pub(crate) nv: usize,
+    bodies: usize,
+}
+
+impl DistancePairs {
+    /// Prepares pairs of geometries for a robot.
+    ///
+    /// # Errors
+    /// Returns [`Error::Geometry`], with the index of the pair and the field, for an unknown frame and for numbers that
+    /// are not finite or have the wrong sign. Other causes are a pair without a frame and a pair of two half-spaces.
+    pub fn new(model: &Model, pairs: &[GeometryPair]) -> Result<Self, Error> {
+        let mut all = Self {
+            geometries: Vec::new(),
+            pairs: Vec::with_capacity(pairs.len()),
+            path: Vec::new(),
+            replacements: Vec::new(),
+            cutoff: f64::INFINITY,
+            nv: model.nv(),
+            bodies: model.nodes().len(),
+        };
+        for (pair, both) in pairs.iter().enumerate() {
+            let [first, second] = both.resolve(model, pair)?;
+            let exact = is_exact(&both.first.shape, &both.second.shape);
+            let mut geometries = [0; 2];
+            for (side, (geometry, body, pose)) in
+                [(&both.first, first.0, first.1), (&both.second, second.0, second.1)].into_iter().enumerate()
+            {
+                let shape = if exact { geometry.shape } else { geometry.shape.containing_capsule() };
+                if shape != geometry.shape {
+                    all.replacements.push(Replacement { pair, side, shape: geometry.shape, capsule: shape });
+                }
+                geometries[side] = all.add(geometry, shape, body, pose);
+            }
+            let begin = all.path.len();
+            all.add_path(model, [first.0, second.0]);
+            all.pairs.push(Pair { geometries, path: [begin, all.path.len()] });
+        }
+        Ok(all)
+    }
+
+    /// Adds a geometry unless an equal one exists. Returns its index.
+    fn add(&mut self, geometry: &Geometry, shape: Shape, body: usize, pose: Se3<f64>) -> usize {
+        let same = |placed: &Placed| placed.shape == shape && placed.geometry == *geometry;
+        if let Some(index) = self.geometries.iter().position(same) {
+            return index;
+        }
+        let mut placed = Placed {
+            geometry: geometry.clone(),
+            shape,
+            body,
+            frame: pose * geometry.placement.inverse(),
+            solid: Solid::new(&shape, &pose),
+            bound: (Vec3::zero(), 0.0),
+        };
+        let (center, radius) = shape.bounding_sphere();
+        placed.bound = (pose.act(center), radius);
+        self.geometries.push(placed);
+        self.geometries.len() - 1
+    }
+
+    /// Adds the columns between two bodies. A column that moves both bodies does not change their distance.
+    fn add_path(&mut self, model: &Model, bodies: [usize; 2]) {
+        let supports = bodies.map(|body| model.support(&model.nodes()[body]));
+        for (side, sign) in [(0, 1.0), (1, -1.0)] {
+            for &c in supports[side].iter().filter(|c| !supports[1 - side].contains(c)) {
+                let column = &model.columns()[c];
+                let ratio = sign * column.ratio;
+                self.path.push(PathColumn { column: c, coordinate: column.coordinate, ratio });
+            }
+        }
+    }
+
+    /// Returns the number of pairs.
+    pub fn len(&self) -> usize {
+        self.pairs.len()
+    }
+
+    /// Returns whether there are no pairs.
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
+    /// Returns the number of degrees of freedom of the robot, which is the length of a gradient.
+    pub fn nv(&self) -> usize {
+        self.nv
+    }
+
+    /// Returns the geometries that a capsule replaces, because the exact distance of their pair is not available.
+    pub fn replacements(&self) -> &[Replacement] {
+        &self.replacements
+    }
+
+    /// Returns the number of different geometries.
+    pub fn geometry_count(&self) -> usize {
+        self.geometries.len()
+    }
+
+    /// Returns a geometry, with its latest placement.
+    ///
+    /// # Panics
+    /// Panics if the geometry does not exist.
+    #[track_caller]
+    pub fn geometry(&self, geometry: usize) -> &Geometry {
+        check_index("geometry", geometry, self.geometries.len(), "geometries");
+        &self.geometries[geometry].geometry
+    }
+
+    /// Returns the indices of both geometries of a pair.
+    ///
+    /// # Panics
+    /// Panics if the pair does not exist.
+    #[track_caller]
+    pub fn geometries_of(&self, pair: usize) -> [usize; 2] {
+        check_index("pair", pair, self.pairs.len(), "pairs");
+        self.pairs[pair].geometries
+    }
+
+    /// Returns the index of the first geometry with a name; `None` if no geometry has this name.
+    pub fn find(&self, name: &str) -> Option<usize> {
+        self.geometries.iter().position(|placed| placed.geometry.name == name)
+    }
+
+    /// Sets the placement of a geometry: the pose of its shape in the world for an obstacle, or in its frame. The next
+    /// evaluation uses it. All pairs of the geometry follow. Allocates nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
+    /// use condyle_dynamics::{Data, Mat3, Se3, forward_kinematics, robots};
+    /// let arm = robots::arm7();
+    /// let tool = Geometry::on("tool", Shape::sphere([0.0; 3], 0.05));
+    /// let ball = Geometry::in_world(Shape::sphere([0.0; 3], 0.1)).named("ball");
+    /// let mut pairs = DistancePairs::new(&arm, &[GeometryPair::new(tool, ball)])?;
+    /// let (mut data, mut distances) = (Data::new(&arm), Distances::new(&pairs));
+    /// let placements = forward_kinematics(&arm, &mut data, &[0.3; 7]);
+    /// let at_tool = Se3::new(Mat3::identity(), placements.frame(arm.frame("tool")?).translation);
+    /// pairs.place(pairs.find("ball").unwrap(), at_tool); // the obstacle moved to the tool
+    /// pairs.values(placements, &mut distances);
+    /// assert!((distances.distance(0) + 0.15).abs() < 1e-12);
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// Panics if the geometry does not exist, or if the placement has a number that is not finite.
+    #[track_caller]
+    pub fn place(&mut self, geometry: usize, placement: Se3<f64>) {
+        check_index("geometry", geometry, self.geometries.len(), "geometries");
+        let Se3 { rotation, translation } = placement;
+        let finite = rotation.is_rotation() && translation.to_array().iter().all(|x| x.is_finite());
+        assert!(finite, "placement: expected a rotation and a finite translation, found {placement:?}");
+        self.geometries[geometry].place(placement);
+    }
+
+    /// Sets the largest distance of interest (m); infinite at first. Pairs whose bounding spheres are farther apart are
+    /// not computed: their result is a lower bound, and [`Distances::is_near`] returns `false` for them.
+    ///
+    /// # Panics
+    /// Panics if the distance is NaN.
+    #[track_caller]
+    pub fn set_cutoff(&mut self, distance: f64) {
+        assert!(!distance.is_nan(), "distance: expected a number, found NaN");
+        self.cutoff = distance;
+    }
+
+    /// Returns the largest distance of interest (m).
+    pub fn cutoff(&self) -> f64 {
+        self.cutoff
+    }
+
+    /// Computes distances, witness points and normals of all pairs. Costs O(pairs) and allocates nothing.
+    ///
+    /// # Panics
+    /// Panics if the placements belong to a robot with another number of bodies, or if `distances` was made for other
+    /// pairs.
+    #[track_caller]
+    pub fn values(&self, placements: Placements<'_, f64>, distances: &mut Distances) {
+        self.check(placements, distances);
+        self.evaluate(placements, distances);
+    }
+
+    /// Computes distances, witness points, normals and gradients of all pairs. The equation is in the [module](super).
+    /// Costs O(pairs · depth) and allocates nothing.
+    ///
+    /// # Panics
+    /// Panics if the placements belong to a robot with another number of bodies, or if `distances` was made for other
+    /// pairs.
+    #[track_caller]
+    pub fn gradients(&self, placements: Placements<'_, f64>, distances: &mut Distances) {
+        self.check(placements, distances);
+        self.evaluate(placements, distances);
+        let columns = &placements.world.S;
+        distances.gradients.fill(0.0);
+        for (k, pair) in self.pairs.iter().enumerate().filter(|&(k, _)| distances.near[k]) {
+            let row = &mut distances.gradients[k * self.nv..][..self.nv];
+            // the line of the force n contains both witness points, so one moment serves for both bodies
+            let f = Force::at_point(distances.points[k][0], distances.normals[k]);
+            for path in &self.path[pair.path[0]..pair.path[1]] {
+                row[path.coordinate] += path.ratio * columns[path.column].dot(f); // nᵀ (J₁ − J₂)
+            }
+        }
+    }
+
+    /// Panics unless placements and results fit these pairs.
+    #[track_caller]
+    fn check(&self, placements: Placements<'_, f64>, distances: &Distances) {
+        check("placements", placements.model.nodes().len(), self.bodies);
+        check("distances", distances.distances.len(), self.pairs.len());
+        check("distances", distances.solids.len(), self.geometries.len());
+    }
+
+    /// Computes distances, witness points and normals.
+    fn evaluate(&self, placements: Placements<'_, f64>, distances: &mut Distances) {
+        for (placed, (solid, bound)) in self.geometries.iter().zip(&mut distances.solids) {
+            if placed.body == 0 {
+                (*solid, *bound) = (placed.solid, placed.bound.0);
+            } else {
+                let pose = placements.body(placed.body);
+                (*solid, *bound) = (placed.solid.moved(&pose), pose.act(placed.bound.0));
+            }
+        }
+        for (k, &Pair { geometries: [a, b], .. }) in self.pairs.iter().enumerate() {
+            let bounds = [a, b].map(|g| (distances.solids[g].1, self.geometries[g].bound.1));
+            let far = self.beyond(bounds);
+            let Witness { distance, points, normal } =
+                far.unwrap_or_else(|| distance(&distances.solids[a].0, &distances.solids[b].0));
+            distances.near[k] = far.is_none();
+            distances.distances[k] = distance;
+            distances.points[k] = points;
+            distances.normals[k] = normal;
+        }
+    }
+
+    /// Returns the distance of two bounding spheres if it is larger than the largest distance of interest.
+    fn beyond(&self, [(p, radius), (q, its)]: [(Vec3<f64>, f64); 2]) -> Option<Witness<f64>> {
+        let reach = self.cutoff + radius + its;
+        let d = p - q;
+        if reach == f64::INFINITY || reach < 0.0 || d.norm_squared() <= reach * reach {
+            return None;
+        }
+        let length = norm(d);
+        let witness = Witness { distance: length, points: [p, q], normal: d.scale(1.0 / length) };
+        Some(witness.enlarged(radius, its))
+    }
+}
+
+impl Distances {
+    /// Allocates the results of prepared pairs.
+    pub fn new(pairs: &DistancePairs) -> Self {
+        let n = pairs.len();
+        Self {
+            solids: pairs.geometries.iter().map(|placed| (placed.solid, Vec3::zero())).collect(),
+            distances: vec![0.0; n],
+            points: vec![[Vec3::zero(); 2]; n],
+            normals: vec![Vec3::zero(); n],
+            near: vec![false; n],
+            gradients: vec![0.0; n * pairs.nv()],
+            nv: pairs.nv(),
+        }
+    }
+}

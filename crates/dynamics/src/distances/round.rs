@@ -1,0 +1,175 @@
+//! Distance of spheres and capsules: closest points of two segments, for any scalar.
+//!
+//! A segment consists of the points p(s) = c + s h with −1 ≤ s ≤ 1; h = 0 is a point. With w = c₁ − c₂, the squared
+//! distance is a convex quadratic of (s, t):
+//!
+//! ```text
+//! |w + s h₁ − t h₂|²
+//! ```
+//!
+//! Its minimum over the square is in the interior, or on one of four sides. On a side, one parameter is ±1, and the
+//! other follows from a division and a clamp. In the interior, w + s h₁ − t h₂ is parallel to n = h₁ × h₂. So
+//!
+//! ```text
+//! s = (h₂ × w)·n / |n|²     t = (h₁ × w)·n / |n|²
+//! ```
+//!
+//! All five candidates are computed, and the smallest is the result. This is exact for parallel and degenerate
+//! segments, for which the sides contain a minimum. Source: Ericson, *Real-Time Collision Detection* (2005), section
+//! 5.1.9, for the parameters on a side.
+
+use condyle_spatial::{Scalar, Vec3};
+
+/// Segment with a radius, in the world: a sphere or a capsule.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Round<S> {
+    /// Middle of the segment (m).
+    pub center: Vec3<S>,
+    /// Vector from the middle to an end; 0 for a sphere (m).
+    pub half: Vec3<S>,
+    /// Radius (m).
+    pub radius: S,
+}
+
+/// Distance, both witness points and the normal from the second to the first shape, in one frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Witness<S> {
+    /// Signed distance (m).
+    pub distance: S,
+    /// Witness point on each shape: points[0] − points[1] = distance · normal.
+    pub points: [Vec3<S>; 2],
+    /// Unit vector along which the first shape leaves the second shape.
+    pub normal: Vec3<S>,
+}
+
+impl<S: Scalar> Witness<S> {
+    /// Returns the result for the two shapes in reverse order.
+    #[inline(always)]
+    pub(crate) fn swapped(self) -> Self {
+        let [a, b] = self.points;
+        Self { points: [b, a], normal: -self.normal, ..self }
+    }
+
+    /// Returns the result after the first and the second shape are enlarged by radii.
+    #[inline(always)]
+    pub(crate) fn enlarged(self, first: S, second: S) -> Self {
+        let ([a, b], n) = (self.points, self.normal);
+        let points = [a - n.scale(first), b + n.scale(second)];
+        Self { distance: self.distance - first - second, points, normal: n }
+    }
+}
+
+/// Square of the distance below which two points coincide (m²). Above it, the square of a distance has full precision.
+const COINCIDENT: f64 = 1e-300;
+/// Square of the ratio of distance and size below which two segments touch. Below it, the direction of the difference
+/// consists of rounding errors.
+const TOUCHING: f64 = 1e-26;
+/// Square of the sine of an angle below which two segments count as parallel. Then a minimum is on a side, up to
+/// rounding errors.
+const PARALLEL: f64 = 1e-30;
+
+/// Returns x, limited to [−1, 1].
+#[inline(always)]
+fn clamp<S: Scalar>(x: S) -> S {
+    let (low, high) = (S::splat(-1.0), S::one());
+    let x = S::select(x.lt(low), low, x);
+    S::select(high.lt(x), high, x)
+}
+
+/// Returns a / b, or 0 if b is 0.
+#[inline(always)]
+fn ratio<S: Scalar>(a: S, b: S) -> S {
+    let zero = b.lt(S::splat(COINCIDENT));
+    S::select(zero, S::zero(), a / S::select(zero, S::one(), b))
+}
+
+/// Returns a where the mask holds, and b elsewhere.
+#[inline(always)]
+fn choose<S: Scalar>(mask: S::Mask, a: Vec3<S>, b: Vec3<S>) -> Vec3<S> {
+    Vec3::new(S::select(mask, a.x, b.x), S::select(mask, a.y, b.y), S::select(mask, a.z, b.z))
+}
+
+/// Returns a vector that is perpendicular to h: its product with the axis on which h has the smallest entry. Returns
+/// (0, 0, 1) for h = 0.
+#[inline(always)]
+fn perpendicular<S: Scalar>(h: Vec3<S>) -> Vec3<S> {
+    let (o, i) = (S::zero(), S::one());
+    let (x, y, z) = (h.x.abs(), h.y.abs(), h.z.abs());
+    let x_least = S::and(x.lt(y), x.lt(z));
+    let e = choose::<S>(x_least, Vec3::new(i, o, o), choose::<S>(y.lt(z), Vec3::new(o, i, o), Vec3::new(o, o, i)));
+    let point = h.norm_squared().lt(S::splat(COINCIDENT));
+    choose::<S>(point, Vec3::new(o, o, i), h.cross(e))
+}
+
+/// Returns the distance of two spheres.
+#[inline(always)]
+pub(crate) fn spheres<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witness<S> {
+    let d = first.center - second.center;
+    let square = d.norm_squared();
+    let coincident = square.lt(S::splat(COINCIDENT));
+    let distance = S::select(coincident, S::zero(), square).sqrt();
+    let inverse = S::select(coincident, S::one(), distance).recip();
+    let normal = choose::<S>(coincident, Vec3::new(S::zero(), S::zero(), S::one()), d.scale(inverse));
+    let points = [first.center, second.center];
+    Witness { distance, points, normal }.enlarged(first.radius, second.radius)
+}
+
+/// Returns the distance of two capsules.
+///
+/// The distance is exact, also if the capsules overlap: the difference of two segments is a parallelogram, which has no
+/// interior. So the penetration is the sum of the radii less the distance of the segments. If the segments cross, the
+/// normal is perpendicular to both.
+#[inline(always)]
+pub(crate) fn capsules<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witness<S> {
+    let (h1, h2, w) = (first.half, second.half, first.center - second.center);
+    let (a, e, b) = (h1.norm_squared(), h2.norm_squared(), h1.dot(h2));
+    let (c, f) = (h1.dot(w), h2.dot(w));
+    let n = h1.cross(h2);
+    let square = n.norm_squared();
+
+    let one = S::one();
+    let (mut s, mut t, mut d) = (one, clamp(ratio(b + f, e)), Vec3::zero());
+    d = d + w + h1 - h2.scale(t); // the side s = 1
+    let mut least = d.norm_squared();
+    let mut consider = |u: S, v: S, skip: Option<S::Mask>| {
+        let x = w + h1.scale(u) - h2.scale(v);
+        let found = x.norm_squared();
+        let found = skip.map_or(found, |skip| S::select(skip, S::splat(f64::INFINITY), found));
+        let better = found.lt(least);
+        s = S::select(better, u, s);
+        t = S::select(better, v, t);
+        d = choose::<S>(better, x, d);
+        least = S::select(better, found, least);
+    };
+    consider(-one, clamp(ratio(f - b, e)), None); // the side s = −1
+    consider(clamp(ratio(b - c, a)), one, None); // the side t = 1
+    consider(clamp(ratio(-b - c, a)), -one, None); // the side t = −1
+    let parallel = square.lt(a * e * S::splat(PARALLEL) + S::splat(COINCIDENT));
+    let inverse = S::select(parallel, one, square).recip();
+    let u = h2.cross(w).dot(n) * inverse;
+    let v = h1.cross(w).dot(n) * inverse;
+    let outside = S::or(one.lt(u.abs()), one.lt(v.abs()));
+    consider(clamp(u), clamp(v), Some(S::or(parallel, outside))); // the interior
+
+    let size = a + e + w.norm_squared();
+    let touch = least.lt(size * S::splat(TOUCHING) + S::splat(COINCIDENT));
+    let distance = S::select(touch, S::zero(), least).sqrt();
+    let across = choose::<S>(parallel, perpendicular(choose::<S>(a.lt(e), h2, h1)), n);
+    let across = choose::<S>(across.dot(d).lt(S::zero()), -across, across);
+    let direction = choose::<S>(touch, across, d);
+    let normal = direction.scale(direction.norm_squared().sqrt().recip());
+    let points = [first.center + h1.scale(s), second.center + h2.scale(t)];
+    Witness { distance, points, normal }.enlarged(first.radius, second.radius)
+}
+
+/// Returns the square root of a number. It is a method of [`Scalar`], because `core` has no square root.
+#[inline(always)]
+pub(super) fn root(x: f64) -> f64 {
+    Scalar::sqrt(x)
+}
+
+/// Returns the length of a vector.
+#[inline(always)]
+pub(super) fn norm(x: Vec3<f64>) -> f64 {
+    root(x.norm_squared())
+}
