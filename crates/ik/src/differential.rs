@@ -3,21 +3,13 @@
 use crate::active_set::{ActiveSet, Constraint, Unsolved};
 use crate::bounds::Bounds;
 use crate::error::{Error, finite, length, poses};
+use crate::held::Held;
 use crate::rows::{Kinematics, Targets, Tasks, value};
+use crate::separation::Separation;
 use crate::settings::Settings;
 use crate::task::Task;
 use condyle_dynamics::{Model, integrate, neutral};
 use std::fmt;
-
-/// Limit that holds a step back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Held {
-    /// Lower bound of this coordinate of v: its limit of position, velocity or acceleration.
-    Lower(usize),
-    /// Upper bound of this coordinate of v.
-    Upper(usize),
-}
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +17,9 @@ pub enum Held {
 pub enum Status {
     /// The velocity solves the programs of all priorities.
     Solved,
+    /// The velocity solves the programs, but pairs that are too near do not move apart as fast as their limit asks: the
+    /// limits of the joints do not allow it.
+    Relaxed,
     /// The velocity solves the programs of the priorities before this one; the next program was not solved, for
     /// numerical reasons. If the priority is 0, the velocity is the nearest to 0 that the limits of the joints allow.
     Stopped {
@@ -37,6 +32,7 @@ impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Solved => f.write_str("solved"),
+            Self::Relaxed => f.write_str("pairs that are too near move apart slower than their limit asks"),
             Self::Stopped { priority } => write!(f, "priority {priority} was not solved, for numerical reasons"),
         }
     }
@@ -80,6 +76,7 @@ pub struct DifferentialIk {
     kinematics: Kinematics,
     tasks: Tasks,
     bounds: Bounds,
+    separation: Option<Separation>,
     program: ActiveSet,
     step: Step,
     /// Scratch: the solution of the priorities before, nv numbers.
@@ -98,10 +95,13 @@ impl DifferentialIk {
         let (resolved, frames) = Tasks::new(model, tasks)?;
         let bounds = Bounds::new(model, settings.limits.as_ref())?;
         let nv = model.nv();
+        let separation = settings.distances.as_ref().map(|limits| Separation::new(model, limits, settings.dt));
+        let separation = separation.transpose()?;
+        let pairs = separation.as_ref().map_or(0, |separation| separation.pairs.len());
         let held: usize = resolved.priorities.iter().map(|p| p.r.capacity() + nv).sum();
         Ok(Self {
             kinematics: Kinematics::new(model, &frames, resolved.reads[1]),
-            program: ActiveSet::new(nv, held, 0),
+            program: ActiveSet::new(nv, held, pairs),
             step: Step {
                 v: vec![0.0; nv],
                 status: Status::Solved,
@@ -114,6 +114,7 @@ impl DifferentialIk {
             model: model.clone(),
             settings,
             bounds,
+            separation,
         })
     }
 
@@ -146,19 +147,31 @@ impl DifferentialIk {
     /// [`Error`] for lists of the wrong length, for numbers that are not finite, and for rotations that are not valid.
     pub fn step(&mut self, q: &[f64], v0: &[f64], targets: &Targets) -> Result<&Step, Error> {
         self.check(q, v0, targets)?;
-        let Self { model, settings, kinematics, tasks, bounds, program, step, x, .. } = self;
+        let Self { model, settings, kinematics, tasks, bounds, separation, program, step, x, .. } = self;
         kinematics.update(model, q);
         tasks.update(model, q, kinematics, targets, settings.damping);
         step.errors.copy_from_slice(&tasks.errors);
         bounds.write(q, v0, settings.dt, &mut program.lower, &mut program.upper);
         program.E.clear();
         program.e.clear();
+        program.A.clear();
+        program.b.clear();
+        if let Some(separation) = separation {
+            let placements = kinematics.data.placements(model).expect("computed by the update");
+            separation.write(placements, program);
+        }
         step.status = Status::Solved;
         step.held.clear();
         let last = tasks.priorities.len() - 1;
         for (priority, objective) in tasks.priorities.iter().enumerate() {
             objective.write(&mut program.H, &mut program.c);
-            match program.solve() {
+            let mut solved = program.solve();
+            if priority == 0 && matches!(solved, Err(Unsolved::Infeasible(_))) && program.relax() {
+                step.status = Status::Relaxed;
+                objective.write(&mut program.H, &mut program.c);
+                solved = program.solve();
+            }
+            match solved {
                 Ok(()) => x.copy_from_slice(&program.x),
                 Err(Unsolved::Infeasible(_) | Unsolved::Numerical) => {
                     if priority == 0 {
@@ -175,7 +188,8 @@ impl DifferentialIk {
                 match *constraint {
                     Constraint::Lower(i) => step.held.push(Held::Lower(i)),
                     Constraint::Upper(i) => step.held.push(Held::Upper(i)),
-                    Constraint::Equality(_) | Constraint::Row(_) => {}
+                    Constraint::Row(i) => step.held.extend(separation.as_ref().map(|s| Held::Pair(s.rows[i]))),
+                    Constraint::Equality(_) => {}
                 }
             }
             if priority < last {
@@ -232,14 +246,20 @@ impl DifferentialIk {
         result
     }
 
+    /// Returns the smallest distance of all pairs before the last step, and the index of its pair. Returns `None`
+    /// without pairs, and if all pairs are beyond the range of the limits.
+    pub fn nearest(&self) -> Option<(usize, f64)> {
+        self.separation.as_ref().and_then(Separation::nearest)
+    }
+
     /// Returns the last step.
     pub fn last(&self) -> &Step {
         &self.step
     }
 
-    /// Returns a limit in words, with the name of the joint.
+    /// Returns a limit in words, with the name of the joint or of the geometries.
     pub fn describe(&self, held: Held) -> String {
-        held.describe(&self.model)
+        held.describe(&self.model, self.separation.as_ref().map(|separation| &separation.pairs))
     }
 
     fn check(&self, q: &[f64], v0: &[f64], targets: &Targets) -> Result<(), Error> {
@@ -259,11 +279,4 @@ impl DifferentialIk {
         }
         Ok(())
     }
-}
-
-/// Returns the name of the joint with this coordinate of v.
-pub(crate) fn joint_name(model: &Model, coordinate: usize) -> &str {
-    let holds =
-        |b: &&condyle_dynamics::Body| b.mimic.is_none() && (b.idx_v..b.idx_v + b.joint.nv()).contains(&coordinate);
-    model.bodies().iter().skip(1).find(holds).map_or("", |b| &b.joint_name)
 }

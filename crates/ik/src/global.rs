@@ -6,10 +6,11 @@
 
 use crate::bounds::position_limits;
 use crate::descent::{Aim, Narrow, TARGET, Wide, write_target};
-use crate::differential::{Held, joint_name};
 use crate::error::{Error, length, poses};
+use crate::held::Held;
 use crate::search::{Search, Trial};
 use crate::search_settings::{Rank, SearchSettings};
+use condyle_dynamics::distances::{DistancePairs, Distances};
 use condyle_dynamics::{Data, Model, ReferenceFrame, Se3, distance, forward_kinematics, random_configuration};
 use condyle_linalg::threads;
 use condyle_spatial::level::{Level, level};
@@ -24,8 +25,8 @@ pub enum Outcome {
     Reached,
     /// No start reached the target. The posture is the nearest that was found, and limits of the joints hold.
     Unreached {
-        /// Limits of the joints that stop the posture from coming nearer; empty if the target is out of reach for other
-        /// reasons.
+        /// Limits of the joints that stop the posture from coming nearer, and the pair whose distance excludes a
+        /// posture that reaches the target. The list is empty if the target is out of reach for other reasons.
         held: Vec<Held>,
     },
 }
@@ -59,6 +60,25 @@ pub(crate) struct Table {
     pub poses: Vec<f64>,
 }
 
+/// Maximum number of draws for an entry of the table. They end at the first configuration whose pairs are far enough
+/// apart.
+const DRAWS: usize = 20;
+
+/// Memory with which distances are computed.
+pub(crate) struct Apart {
+    data: Data<f64>,
+    results: Distances,
+}
+
+impl Apart {
+    /// Returns the nearest pair at q if it is nearer than the settings allow.
+    pub(crate) fn collision(&mut self, ik: &GlobalIk, q: &[f64]) -> Option<usize> {
+        let pairs = ik.pairs.as_ref()?;
+        pairs.values(forward_kinematics(&ik.model, &mut self.data, q), &mut self.results);
+        self.results.nearest().filter(|&(_, d)| d < ik.settings.minimum_distance).map(|(pair, _)| pair)
+    }
+}
+
 /// Global inverse kinematics: postures for target poses of one or several frames.
 ///
 /// ```
@@ -78,6 +98,7 @@ pub struct GlobalIk {
     pub(crate) aim: Aim,
     pub(crate) settings: SearchSettings,
     pub(crate) table: Table,
+    pub(crate) pairs: Option<DistancePairs>,
 }
 
 impl GlobalIk {
@@ -96,8 +117,12 @@ impl GlobalIk {
         let upper = settings.upper.as_deref().unwrap_or(&model.limits().upper);
         let limits = position_limits(model, lower, upper)?.into_iter().enumerate();
         let limits = limits.filter_map(|(v, limit)| limit.map(|(q, lower, upper)| (q, v, lower, upper))).collect();
+        let pairs = match settings.pairs.is_empty() {
+            true => None,
+            false => Some(DistancePairs::new(model, &settings.pairs)?),
+        };
         let aim = Aim { frames, supports, weights: [1.0, settings.orientation_weight], limits };
-        let mut ik = Self { model: model.clone(), aim, settings, table: Table::default() };
+        let mut ik = Self { model: model.clone(), aim, settings, table: Table::default(), pairs };
         ik.fill_table();
         Ok(ik)
     }
@@ -142,15 +167,22 @@ impl GlobalIk {
 
     /// Returns a limit in words, with the name of the joint.
     pub fn describe(&self, held: Held) -> String {
-        held.describe(&self.model)
+        held.describe(&self.model, self.pairs.as_ref())
     }
 
     fn fill_table(&mut self) {
         let (model, mut rng) = (&self.model, StdRng::seed_from_u64(self.settings.seed));
         let mut data = Data::new(model);
         let mut numbers = [0.0; TARGET];
+        let mut apart = self.apart();
         for _ in 0..self.settings.table {
-            let q = self.draw(&mut rng);
+            let mut q = self.draw(&mut rng);
+            for _ in 1..DRAWS {
+                if apart.as_mut().and_then(|apart| apart.collision(self, &q)).is_none() {
+                    break;
+                }
+                q = self.draw(&mut rng);
+            }
             let placements = forward_kinematics(model, &mut data, &q);
             for &frame in &self.aim.frames {
                 write_target(&placements.frame(frame), &mut numbers);
@@ -158,6 +190,11 @@ impl GlobalIk {
             }
             self.table.q.extend(q);
         }
+    }
+
+    /// Returns the memory of distances; `None` without pairs.
+    pub(crate) fn apart(&self) -> Option<Apart> {
+        self.pairs.as_ref().map(|pairs| Apart { data: Data::new(&self.model), results: Distances::new(pairs) })
     }
 
     /// Returns a random configuration within the limits.
@@ -220,41 +257,35 @@ impl GlobalIk {
     }
 }
 
-impl Held {
-    /// Returns the limit in words, with the name of the joint.
-    pub(crate) fn describe(self, model: &Model) -> String {
-        let (i, side) = match self {
-            Self::Lower(i) => (i, "lower"),
-            Self::Upper(i) => (i, "upper"),
-        };
-        format!("{side} limit of joint `{}`", joint_name(model, i))
-    }
-}
-
 /// Ratio of a joint's pull to the largest pull, below which its limit does not count as holding the posture back.
 const PULL: f64 = 1e-3;
 
 impl GlobalIk {
-    /// Returns the best of the finished starts: by the rank of the settings if a start reached the target, otherwise by
-    /// the error.
+    /// Returns the best of the finished starts: by the rank of the settings if a start succeeded. Otherwise the start
+    /// with the least error is the best, among those whose pairs are far enough apart if there are any.
     pub(crate) fn best<'t>(&self, trials: &[&'t Trial], posture: &[f64]) -> &'t Trial {
-        let weighted = |t: &Trial| t.error[0] * t.error[0] + self.aim.weights[1] * t.error[1] * t.error[1];
         let mut tangent = vec![0.0; self.model.nv()];
         let mut cost = |t: &Trial| match self.settings.rank {
-            _ if !t.reached => weighted(t),
+            _ if !t.succeeded() => self.weighted(t.error),
             Rank::First => 0.0,
             Rank::Nearest => distance(&self.model, posture, &t.q, &mut tangent),
             Rank::Manipulability => -self.manipulability(&t.q),
         };
-        let any = trials.iter().any(|t| t.reached);
+        let class = |t: &Trial| (t.succeeded(), t.collision.is_none());
+        let first = trials.iter().map(|t| class(t)).max();
         let mut best: Option<(f64, &Trial)> = None;
-        for &trial in trials.iter().filter(|t| t.reached == any) {
+        for &trial in trials.iter().filter(|t| Some(class(t)) == first) {
             let cost = cost(trial);
             if best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, trial));
             }
         }
         best.expect("at least one start").1
+    }
+
+    /// Returns the square of an error with the weights of the settings.
+    pub(crate) fn weighted(&self, [linear, angular]: [f64; 2]) -> f64 {
+        self.aim.weights[0] * linear * linear + self.aim.weights[1] * angular * angular
     }
 
     /// Returns √det(J Jᵀ) of the first frame at q.

@@ -5,7 +5,7 @@
 //! ```text
 //! minimise     ½ Σ w f (J Δq − α e)²  +  ½ μ Σ w f (α e)² ‖Δq‖²  +  ½ ε ‖Δq‖²
 //! subject to   limits of positions, velocities and accelerations: bounds on Δq
-//!              ∂d/∂q Δq ≥ −γ T (d − d_min)          for the distance d of each pair of bodies
+//!              ∂d/∂q Δq ≥ −min(γ T, 1) (d − d_min)  for the distance d of each pair of bodies
 //! ```
 //!
 //! [`Task`]s have errors e with Jacobians J, weights w with factors f, gains α, damping μ, and strict priorities.
@@ -30,18 +30,22 @@ mod descent;
 mod differential;
 mod error;
 mod global;
+mod held;
 mod manipulability;
 mod rows;
 mod search;
 mod search_settings;
+mod separation;
 mod settings;
 mod task;
 
-pub use differential::{DifferentialIk, Held, Status, Step};
+pub use differential::{DifferentialIk, Status, Step};
 pub use error::Error;
 pub use global::{GlobalIk, Outcome, Posture};
+pub use held::Held;
 pub use rows::Targets;
 pub use search_settings::{Rank, SearchSettings};
+pub use separation::DistanceLimits;
 pub use settings::{JointLimits, Settings};
 pub use task::{Task, TaskKind};
 

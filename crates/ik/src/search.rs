@@ -1,7 +1,8 @@
 //! Search of one thread: starts of many targets in the lanes of a [`Descent`].
 
 use crate::descent::{Descent, TARGET, write_target};
-use crate::global::{GlobalIk, Outcome, Posture};
+use crate::global::{Apart, GlobalIk, Outcome, Posture};
+use crate::held::Held;
 use condyle_dynamics::{Se3, neutral, normalize};
 use condyle_spatial::block::Block;
 use rand::SeedableRng;
@@ -12,7 +13,17 @@ use rand::rngs::StdRng;
 pub(crate) struct Trial {
     pub q: Vec<f64>,
     pub error: [f64; 2],
+    /// Whether the error is within the tolerance.
     pub reached: bool,
+    /// Nearest pair, if it is too near.
+    pub collision: Option<usize>,
+}
+
+impl Trial {
+    /// Returns whether the start reached the target with all pairs far enough apart.
+    pub(crate) fn succeeded(&self) -> bool {
+        self.reached && self.collision.is_none()
+    }
 }
 
 /// Number of entries of the table from which a search starts.
@@ -58,6 +69,7 @@ pub(crate) struct Search<'a, S> {
     first: usize,
     /// Scratch: distances of the table's entries from a target.
     distances: Vec<(f64, usize)>,
+    apart: Option<Apart>,
 }
 
 /// Iterations without a clear fall of the error, after which a start is given up, and the factor of a clear fall.
@@ -80,6 +92,7 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
             fresh: 0,
             first: 0,
             distances: Vec::new(),
+            apart: ik.apart(),
         }
     }
 
@@ -196,7 +209,7 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         let (settings, nq) = (&self.ik.settings, self.ik.model.nq());
         let error = self.descent.errors(lane);
         let reached = error[0] <= settings.tolerance[0] && error[1] <= self.ik.rotation_tolerance();
-        let weighted = error[0] * error[0] + self.ik.aim.weights[1] * error[1] * error[1];
+        let weighted = self.ik.weighted(error);
         if weighted < CLEAR * CLEAR * job.least {
             (job.least, job.fell) = (weighted, job.iteration);
         }
@@ -209,7 +222,8 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         self.jobs[lane] = None;
         let mut q = self.q[lane * nq..][..nq].to_vec();
         normalize(&self.ik.model, &mut q);
-        self.progress[job.target].trials[job.start] = Some(Trial { q, error, reached });
+        let collision = self.apart.as_mut().and_then(|apart| apart.collision(self.ik, &q));
+        self.progress[job.target].trials[job.start] = Some(Trial { q, error, reached, collision });
         self.conclude(job.target, answers);
     }
 
@@ -222,7 +236,7 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         for trial in &progress.trials {
             let Some(trial) = trial else { break };
             count += 1;
-            found += usize::from(trial.reached);
+            found += usize::from(trial.succeeded());
             if found == settings.solutions {
                 break;
             }
@@ -232,9 +246,14 @@ impl<'a, S: Block<Number = f64>> Search<'a, S> {
         }
         let trials: Vec<&Trial> = progress.trials[..count].iter().flatten().collect();
         let best = self.ik.best(&trials, self.posture);
-        let outcome = match best.reached {
-            true => Outcome::Reached,
-            false => Outcome::Unreached { held: self.ik.held(&best.q, self.target(target)) },
+        let outcome = if best.succeeded() {
+            Outcome::Reached
+        } else {
+            let mut held = self.ik.held(&best.q, self.target(target));
+            // The pair that excludes the start with the least error.
+            let least = trials.iter().min_by(|a, b| self.ik.weighted(a.error).total_cmp(&self.ik.weighted(b.error)));
+            held.extend(least.and_then(|trial| trial.collision).map(Held::Pair));
+            Outcome::Unreached { held }
         };
         answers[target] = Some(Posture { q: best.q.clone(), outcome, error: best.error, starts: count });
         self.progress[target] = Progress { done: true, ..Progress::default() };

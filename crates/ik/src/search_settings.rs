@@ -3,6 +3,7 @@
 use crate::error::{Error, length};
 use crate::settings::positive;
 use condyle_dynamics::Model;
+use condyle_dynamics::distances::GeometryPair;
 
 /// Order by which a search chooses among the postures that reach a target.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +51,10 @@ pub struct SearchSettings {
     pub lower: Option<Vec<f64>>,
     /// Maximum position, nq numbers; `None` takes the limits of the model.
     pub upper: Option<Vec<f64>>,
+    /// Pairs of geometries that must be apart; empty for none.
+    pub pairs: Vec<GeometryPair>,
+    /// Minimum distance of each pair (m).
+    pub minimum_distance: f64,
 }
 
 impl Default for SearchSettings {
@@ -66,6 +71,8 @@ impl Default for SearchSettings {
             threads: 1,
             lower: None,
             upper: None,
+            pairs: Vec::new(),
+            minimum_distance: 0.0,
         }
     }
 }
@@ -87,6 +94,10 @@ impl SearchSettings {
             if value == 0 {
                 return Err(Error::Setting { name, value: 0.0, allowed: "at least 1" });
             }
+        }
+        if !self.minimum_distance.is_finite() {
+            let value = self.minimum_distance;
+            return Err(Error::Setting { name: "minimum_distance", value, allowed: "finite" });
         }
         for (name, list) in [("lower", &self.lower), ("upper", &self.upper)] {
             let Some(list) = list else { continue };

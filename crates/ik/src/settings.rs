@@ -1,6 +1,7 @@
 //! Settings of differential inverse kinematics, and limits of the joints.
 
 use crate::error::{Error, length};
+use crate::separation::DistanceLimits;
 use condyle_dynamics::Model;
 
 /// Limits of positions, velocities and accelerations, as bounds on the displacement Δq of one step of duration T.
@@ -54,11 +55,13 @@ pub struct Settings {
     pub damping: f64,
     /// Limits of the joints; `None` for no limits.
     pub limits: Option<JointLimits>,
+    /// Limits of distances; `None` for no limits.
+    pub distances: Option<DistanceLimits>,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { dt: 0.01, damping: 1e-8, limits: Some(JointLimits::default()) }
+        Self { dt: 0.01, damping: 1e-8, limits: Some(JointLimits::default()), distances: None }
     }
 }
 
@@ -74,6 +77,7 @@ impl Settings {
     pub(crate) fn check(&self, model: &Model) -> Result<(), Error> {
         positive("dt", self.dt)?;
         positive("damping", self.damping)?;
+        self.distances.as_ref().map_or(Ok(()), DistanceLimits::check)?;
         self.limits.as_ref().map_or(Ok(()), |limits| limits.check(model))
     }
 }

@@ -3,8 +3,9 @@
 #[path = "../../../tests/common/counting.rs"]
 mod counting;
 
-use condyle_dynamics::{neutral, robots};
-use condyle_ik::{DifferentialIk, Settings, Task};
+use condyle_dynamics::distances::{Geometry, GeometryPair, Shape};
+use condyle_dynamics::{Vec3, neutral, robots};
+use condyle_ik::{DifferentialIk, DistanceLimits, Settings, Task};
 use counting::allocated;
 
 #[test]
@@ -20,7 +21,11 @@ fn steps_allocate_nothing() {
         Task { priority: 2, ..Task::coupling(&[(&joint, 1.0)], 0.1) },
         Task { priority: 2, ..Task::damping() },
     ];
-    let mut ik = DifferentialIk::new(&model, &tasks, Settings::default()).unwrap();
+    let ball = |frame: &str| Geometry::on(frame, Shape::sphere(Vec3::zero(), 0.1));
+    let pairs = vec![GeometryPair::new(ball("left_hand"), ball("right_hand"))];
+    let distances = DistanceLimits { range: 10.0, ..DistanceLimits::new(pairs) };
+    let settings = Settings { distances: Some(distances), ..Settings::default() };
+    let mut ik = DifferentialIk::new(&model, &tasks, settings).unwrap();
     let mut q = neutral(&model);
     let mut targets = ik.hold(&q).unwrap();
     let v0 = vec![0.0; model.nv()];

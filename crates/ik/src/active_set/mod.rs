@@ -119,6 +119,19 @@ impl ActiveSet {
         &self.active
     }
 
+    /// Lowers the right sides of the rows until the point of the bounds that is nearest to 0 satisfies the rows.
+    /// Returns whether there are rows.
+    pub(crate) fn relax(&mut self) -> bool {
+        let n = self.n;
+        for i in 0..n {
+            self.x[i] = 0.0_f64.max(self.lower[i]).min(self.upper[i]);
+        }
+        for (row, b) in self.A.chunks_exact(n.max(1)).zip(&mut self.b) {
+            *b = b.min(dot(row, &self.x));
+        }
+        !self.b.is_empty()
+    }
+
     /// Solves the program. Afterwards x is within its bounds exactly, and satisfies equalities and rows up to rounding.
     pub(crate) fn solve(&mut self) -> Result<(), Unsolved> {
         let mut result = Ok(());
