@@ -12,7 +12,8 @@
 //! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
-//! - `optimal`, `wholebody`, `mpc`: the modules `condyle.optimal`, `condyle.wholebody` and `condyle.mpc`.
+//! - `optimal`, `wholebody`, `mpc`, `ik`: the modules `condyle.optimal`, `condyle.wholebody`, `condyle.mpc` and
+//!   `condyle.ik`.
 //!
 //! The doc comments of Python classes and functions become docstrings; `stubs.py` writes these to
 //! `condyle/_condyle.pyi`.
@@ -36,6 +37,7 @@ mod exceptions;
 mod factorisation;
 mod functions;
 mod hyper_dual;
+mod ik;
 mod inertial_parameters;
 mod joint;
 mod kinematics;
@@ -102,6 +104,8 @@ mod _condyle {
     use factorisation::{Cholesky, DivideConquer, Ltdl};
     #[pymodule_export]
     use hyper_dual::HyperDual;
+    #[pymodule_export]
+    use ik::{DifferentialIk, GlobalIk};
     #[pymodule_export]
     use inertial_parameters::{
         check, from_inertia, from_log_cholesky, log_cholesky, log_cholesky_jacobian, pseudo_inertia, to_inertia,

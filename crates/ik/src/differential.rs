@@ -8,6 +8,7 @@ use crate::rows::{Kinematics, Targets, Tasks, value};
 use crate::separation::Separation;
 use crate::settings::Settings;
 use crate::task::Task;
+use condyle_dynamics::distances::DistancePairs;
 use condyle_dynamics::{Model, integrate, neutral};
 use std::fmt;
 
@@ -247,9 +248,14 @@ impl DifferentialIk {
     }
 
     /// Returns the smallest distance of all pairs before the last step, and the index of its pair. Returns `None`
-    /// without pairs, and if all pairs are beyond the range of the limits.
+    /// without pairs. The distance of a pair beyond the range of the limits is a lower bound.
     pub fn nearest(&self) -> Option<(usize, f64)> {
         self.separation.as_ref().and_then(Separation::nearest)
+    }
+
+    /// Returns the pairs of the limits of distances. [`DistancePairs::place`] moves an obstacle.
+    pub fn pairs_mut(&mut self) -> Option<&mut DistancePairs> {
+        self.separation.as_mut().map(|separation| &mut separation.pairs)
     }
 
     /// Returns the last step.

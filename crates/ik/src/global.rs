@@ -119,7 +119,11 @@ impl GlobalIk {
         let limits = limits.filter_map(|(v, limit)| limit.map(|(q, lower, upper)| (q, v, lower, upper))).collect();
         let pairs = match settings.pairs.is_empty() {
             true => None,
-            false => Some(DistancePairs::new(model, &settings.pairs)?),
+            false => {
+                let mut pairs = DistancePairs::new(model, &settings.pairs)?;
+                pairs.set_cutoff(settings.minimum_distance.max(0.0));
+                Some(pairs)
+            }
         };
         let aim = Aim { frames, supports, weights: [1.0, settings.orientation_weight], limits };
         let mut ik = Self { model: model.clone(), aim, settings, table: Table::default(), pairs };
@@ -135,6 +139,12 @@ impl GlobalIk {
     /// Returns the settings.
     pub fn settings(&self) -> &SearchSettings {
         &self.settings
+    }
+
+    /// Returns the pairs that must be apart. [`DistancePairs::place`] moves an obstacle. The table of starts does not
+    /// change.
+    pub fn pairs_mut(&mut self) -> Option<&mut DistancePairs> {
+        self.pairs.as_mut()
     }
 
     /// Searches a posture for the target poses oXt of all frames, first from `posture`: nq numbers. If the settings

@@ -8,6 +8,7 @@ use condyle_dynamics::{
     Act, Data, Joint, Model, Motion, Quaternion, ReferenceFrame, Se3, Vec3, centroidal_map, difference,
     forward_kinematics, lie,
 };
+use condyle_linalg::{Vector, Vectorized, at_level};
 use nalgebra::DMatrix;
 
 /// Targets of the tasks. [`DifferentialIk::hold`](crate::DifferentialIk::hold) returns targets that keep the present
@@ -149,8 +150,12 @@ impl Objective {
     }
 
     /// Writes H = Rᵀ R + d and c = −Rᵀ r − g. Only the lower triangle of H is written.
-    #[inline(always)]
     pub(crate) fn write(&self, H: &mut [f64], c: &mut [f64]) {
+        at_level(Write { objective: self, H, c });
+    }
+
+    #[inline(always)]
+    fn write_inline(&self, H: &mut [f64], c: &mut [f64]) {
         let n = self.n;
         for j in 0..n {
             H[j * n + j..(j + 1) * n].fill(0.0);
@@ -165,6 +170,20 @@ impl Objective {
                 }
             }
         }
+    }
+}
+
+/// Writing of an objective, compiled for the vector instructions in use.
+struct Write<'a> {
+    objective: &'a Objective,
+    H: &'a mut [f64],
+    c: &'a mut [f64],
+}
+
+impl Vectorized for Write<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        self.objective.write_inline(self.H, self.c);
     }
 }
 
@@ -239,7 +258,7 @@ impl Tasks {
         let (nv, count) = (model.nv(), tasks.iter().map(|t| t.priority + 1).max().unwrap_or(1));
         let rows = |p: usize| {
             let rows = |task: &Task| match task.kind {
-                TaskKind::Posture | TaskKind::Damping | TaskKind::Manipulability(_) => 0,
+                TaskKind::Posture | TaskKind::Rest | TaskKind::Manipulability(_) => 0,
                 _ => task.kind.components(nv),
             };
             tasks.iter().filter(|task| task.priority == p).map(rows).sum()
@@ -340,7 +359,7 @@ impl ResolvedTask {
                 *error = [0.0, length.sqrt()];
                 damping * square
             }
-            TaskKind::Damping => {
+            TaskKind::Rest => {
                 actuated.iter().for_each(|&i| objective.single(i, weight * self.task.factor(i), 0.0));
                 0.0
             }

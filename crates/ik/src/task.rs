@@ -18,7 +18,7 @@ pub enum TaskKind {
     /// Positions of all joints except free-flyers: e = q_t ⊖ q.
     Posture,
     /// Rest of all joints except free-flyers: e = 0. The weight of this task makes velocities small.
-    Damping,
+    Rest,
     /// Manipulability m = √det(J Jᵀ) of a frame, with its Jacobian J: the desired displacement of the joints is
     /// α ∂(ln m)/∂q. The factors select rows of J. Free-flyers and joints with several coordinates do not count.
     Manipulability(String),
@@ -36,7 +36,7 @@ impl TaskKind {
     pub(crate) fn frame(&self) -> Option<&str> {
         match self {
             Self::Pose(f) | Self::Position(f) | Self::Orientation(f) | Self::Manipulability(f) => Some(f),
-            Self::Com | Self::Posture | Self::Damping | Self::Coupling { .. } => None,
+            Self::Com | Self::Posture | Self::Rest | Self::Coupling { .. } => None,
         }
     }
 
@@ -50,7 +50,7 @@ impl TaskKind {
         match self {
             Self::Com => "com",
             Self::Posture => "posture",
-            Self::Damping => "damping",
+            Self::Rest => "rest",
             Self::Coupling { .. } => "coupling",
             Self::Pose(f) | Self::Position(f) | Self::Orientation(f) | Self::Manipulability(f) => f,
         }
@@ -61,7 +61,7 @@ impl TaskKind {
         match self {
             Self::Pose(_) | Self::Manipulability(_) => 6,
             Self::Position(_) | Self::Orientation(_) | Self::Com => 3,
-            Self::Posture | Self::Damping => nv,
+            Self::Posture | Self::Rest => nv,
             Self::Coupling { .. } => 1,
         }
     }
@@ -132,8 +132,8 @@ impl Task {
         Self::new(TaskKind::Posture, 1e-6)
     }
     /// Creates a task that makes velocities small, weight 1e-6.
-    pub fn damping() -> Self {
-        Self::new(TaskKind::Damping, 1e-6)
+    pub fn rest() -> Self {
+        Self::new(TaskKind::Rest, 1e-6)
     }
     /// Creates a task that raises the manipulability of a frame, weight 1e-6 and gain 0.1.
     pub fn manipulability(frame: &str) -> Self {

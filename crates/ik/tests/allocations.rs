@@ -19,7 +19,7 @@ fn steps_allocate_nothing() {
         Task { priority: 2, ..Task::posture() },
         Task { priority: 2, ..Task::manipulability("left_hand") },
         Task { priority: 2, ..Task::coupling(&[(&joint, 1.0)], 0.1) },
-        Task { priority: 2, ..Task::damping() },
+        Task { priority: 2, ..Task::rest() },
     ];
     let ball = |frame: &str| Geometry::on(frame, Shape::sphere(Vec3::zero(), 0.1));
     let pairs = vec![GeometryPair::new(ball("left_hand"), ball("right_hand"))];

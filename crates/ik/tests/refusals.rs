@@ -107,7 +107,7 @@ fn searches_are_checked() {
 #[test]
 fn a_robot_without_joints_has_no_velocity() {
     let fixed = condyle_dynamics::ModelBuilder::new("fixed").build().unwrap();
-    let mut ik = DifferentialIk::new(&fixed, &[Task::posture(), Task::damping()], Settings::default()).unwrap();
+    let mut ik = DifferentialIk::new(&fixed, &[Task::posture(), Task::rest()], Settings::default()).unwrap();
     let targets = ik.hold(&[]).unwrap();
     assert!(ik.step(&[], &[], &targets).unwrap().v.is_empty());
     let refused = DifferentialIk::new(&fixed, &[Task::com()], Settings::default()).unwrap_err();

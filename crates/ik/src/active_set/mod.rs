@@ -22,6 +22,10 @@ use condyle_linalg::{Vector, Vectorized, at_level};
 /// default damping, and far below any displacement that matters.
 const TOLERANCE: f64 = 1e-11;
 
+/// Maximum violation of a constraint in programs with equalities. The equalities keep the results of earlier programs,
+/// whose rounding may contradict bounds that were active there.
+const TOLERANCE_WITH_EQUALITIES: f64 = 1e-8;
+
 /// Square of the ratio below which a normal depends linearly on the active normals. The compared numbers are the parts
 /// of the normal outside and inside the space of the active normals, in the norm of H⁻¹.
 const DEPENDENT: f64 = 1e-16;
@@ -187,7 +191,8 @@ impl ActiveSet {
     /// Returns the constraint with the largest violation, if any violation is above the tolerance.
     #[inline(always)]
     fn most_violated(&self) -> Option<Constraint> {
-        let (mut most, mut found) = (TOLERANCE, None);
+        let tolerance = if self.e.is_empty() { TOLERANCE } else { TOLERANCE_WITH_EQUALITIES };
+        let (mut most, mut found) = (tolerance, None);
         for i in 0..self.n {
             let below = (self.lower[i] - self.x[i]) / (1.0 + self.lower[i].abs());
             let above = (self.x[i] - self.upper[i]) / (1.0 + self.upper[i].abs());
@@ -288,7 +293,7 @@ impl ActiveSet {
             }
             multiplier += t;
             if full <= partial {
-                self.extend();
+                self.extend(outside);
                 self.active.push((constraint, multiplier));
                 return Ok(());
             }
@@ -296,21 +301,20 @@ impl ActiveSet {
         }
     }
 
-    /// Turns columns q to n of J so that d becomes (d₁, ‖d₂‖, 0), and adds this column to R.
+    /// Reflects columns q to n of J so that d becomes (d₁, α, 0) with |α| = ‖d₂‖, and adds this column to R. The
+    /// Householder vector is w = d₂ − α e₁, and J₂ w follows from z = J₂ d₂.
     #[inline(always)]
-    fn extend(&mut self) {
+    fn extend(&mut self, outside: f64) {
         let (n, q) = (self.n, self.active.len());
-        for k in (q + 1..n).rev() {
-            let (a, b) = (self.d[k - 1], self.d[k]);
-            if b == 0.0 {
-                continue;
-            }
-            let length = a.hypot(b);
-            let (c, s) = (a / length, b / length);
-            (self.d[k - 1], self.d[k]) = (length, 0.0);
-            let (left, right) = self.J[(k - 1) * n..(k + 1) * n].split_at_mut(n);
-            rotate(c, s, left, right);
+        let first = self.d[q];
+        let alpha = if first > 0.0 { -outside.sqrt() } else { outside.sqrt() };
+        self.d[q] = first - alpha; // w
+        let square = outside - alpha * first; // ½ wᵀ w
+        axpy(-alpha, &self.J[q * n..][..n], &mut self.z); // J₂ w = z − α J_q
+        for k in q..n {
+            axpy(-self.d[k] / square, &self.z, &mut self.J[k * n..][..n]); // J₂ ← J₂ − J₂ w (2 w / wᵀ w)ᵀ
         }
+        self.d[q] = alpha;
         self.R[q * n..][..=q].copy_from_slice(&self.d[..=q]);
     }
 
@@ -328,7 +332,7 @@ impl ActiveSet {
             if b == 0.0 {
                 continue;
             }
-            let length = a.hypot(b);
+            let length = (a * a + b * b).sqrt();
             let (c, s) = (a / length, b / length);
             for column in j..q {
                 let (x, y) = (self.R[column * n + j], self.R[column * n + j + 1]);
