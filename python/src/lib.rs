@@ -11,6 +11,7 @@
 //!   `regressors`, `simulation`: one Python function or type for each function or type of the library;
 //! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
+//! - `distances`: distances between shapes, for the module `condyle.distances`;
 //! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
 //! - `optimal`, `wholebody`, `mpc`, `ik`: the modules `condyle.optimal`, `condyle.wholebody`, `condyle.mpc` and
 //!   `condyle.ik`.
@@ -32,6 +33,7 @@ mod configuration;
 mod constrained;
 mod data;
 mod derivatives;
+mod distances;
 mod dlpack;
 mod exceptions;
 mod factorisation;
@@ -96,6 +98,8 @@ mod _condyle {
         frame_classical_acceleration_derivatives, frame_velocity_derivative, rnea_hessian, rnea_input_derivative,
         rnea_second_derivatives, static_torque_derivative,
     };
+    #[pymodule_export]
+    use distances::{FileCollisions, PreparedPairs};
     #[pymodule_export]
     use dlpack::{borrowed, lend};
     #[pymodule_export]

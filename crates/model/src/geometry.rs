@@ -173,7 +173,7 @@ impl Shape {
     }
 
     /// Checks the numbers of the shape. The text of an error begins with the name of the field.
-    fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), String> {
         let finite = |field: &str, numbers: &[f64]| match numbers.iter().find(|x| !x.is_finite()) {
             None => Ok(()),
             Some(x) if x.is_nan() => Err(format!("{field} holds a NaN")),
@@ -279,8 +279,8 @@ impl GeometryPair {
     /// Returns body and pose of both geometries, as [`Geometry::resolve`] does.
     ///
     /// # Errors
-    /// Returns [`Error::Geometry`] for an invalid geometry, for two geometries without a frame, and for two half-spaces.
-    /// `index` is the index of the pair in the caller's list; the message contains it.
+    /// Returns [`Error::Geometry`] for an invalid geometry, for two geometries without a frame, and for two
+    /// half-spaces. `index` is the index of the pair in the caller's list; the message contains it.
     pub fn resolve(&self, model: &Model, index: usize) -> Result<[(usize, Se3<f64>); 2], Error> {
         let wrong = |geometry: String, what: String| Error::Geometry { geometry, what };
         let named = |side: &str, geometry: &Geometry| match &*geometry.name {

@@ -1,9 +1,13 @@
 //! Reading and writing files of robots: URDF, MJCF, SDF, SRDF, and formats of serde.
 
+#[cfg(feature = "loaders")]
+pub(crate) mod collisions;
 #[cfg(feature = "serde")]
 mod description;
 #[cfg(feature = "loaders")]
 mod files;
+#[cfg(feature = "meshes")]
+pub(crate) mod fit;
 #[cfg(feature = "loaders")]
 mod known;
 #[cfg(feature = "loaders")]

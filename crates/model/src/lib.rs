@@ -107,6 +107,10 @@ pub use error::Error;
 pub use frame_name::FrameName;
 pub use geometry::{Geometry, GeometryPair, Shape};
 #[cfg(feature = "loaders")]
+pub use io::collisions::{CollisionMesh, Collisions};
+#[cfg(feature = "meshes")]
+pub use io::fit::Fit;
+#[cfg(feature = "loaders")]
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};
 pub use keyframe::Keyframe;

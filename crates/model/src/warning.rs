@@ -181,6 +181,17 @@ impl FromStr for WarningKind {
 }
 
 impl Warning {
+    /// Returns the warning with a further reason.
+    #[cfg(feature = "meshes")]
+    pub(crate) fn because(mut self, why: &str) -> Self {
+        if let Self::LeftOut { what, .. } = &mut self {
+            let known = what.len();
+            what.truncate(what.rfind(" (").unwrap_or(known));
+            *what += &format!(" ({why})");
+        }
+        self
+    }
+
     /// Returns the kind of the warning.
     pub fn kind(&self) -> WarningKind {
         match self {

@@ -189,13 +189,13 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
-    /// Returns the signed distances between pairs of spheres, r = ‖p₁ − p₂‖ − radius₁ − radius₂ with the centres p₁ and
-    /// p₂ in the world, one number for each pair (m). A distance is negative while the spheres overlap.
+    /// Returns the signed distances between pairs of geometries, r = n·(p₁ − p₂) with the nearest points p₁ and p₂ and
+    /// the unit normal n, one number for each pair (m). A distance is negative while the geometries overlap.
     ///
-    /// pairs: a list of pairs of `Sphere`s. At least one sphere of a pair is fixed to a frame of the robot; the other
-    ///     one is fixed to the world, or to a frame of the same robot.
+    /// pairs: a list of pairs of `Sphere`s or `condyle.distances.Geometry`s. At least one geometry of a pair is fixed
+    ///     to a frame of the robot; the other one is fixed to the world, or to a frame of the same robot.
     ///
-    /// A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
+    /// A `Limit` or a `Cost` of this residual keeps the geometries apart: if no bounds or activation are given, all
     /// distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
     /// pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
     ///
@@ -205,7 +205,7 @@ impl Residual {
     #[staticmethod]
     fn distances(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>) -> PyResult<Self> {
         let pairs = members_of("pairs", "pairs of spheres", pairs)?;
-        let pairs = pairs.iter().enumerate().map(|(k, pair)| sphere_pair(model, k, pair)).collect::<PyResult<_>>()?;
+        let pairs = pairs.iter().enumerate().map(|(k, pair)| geometry_pair(model, k, pair)).collect::<PyResult<_>>()?;
         Ok(Self::from(robot::Residual::Distances { pairs }))
     }
 
@@ -408,15 +408,25 @@ fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<ro
     Ok((&model.frames()[frame_index(model, frame)?]).into())
 }
 
-/// Reads pair k of spheres.
-fn sphere_pair(model: &Bound<'_, Model>, k: usize, pair: &Bound<'_, PyAny>) -> PyResult<robot::GeometryPair> {
+/// Reads pair k of spheres or geometries.
+fn geometry_pair(model: &Bound<'_, Model>, k: usize, pair: &Bound<'_, PyAny>) -> PyResult<robot::GeometryPair> {
     let wrong = || PyTypeError::new_err(format!("pairs[{k}]: expected a pair of spheres, found {}", found_type(pair)));
     let pair = pair.cast::<PyTuple>().map_err(|_| wrong())?;
     if pair.len() != 2 {
         return Err(PyTypeError::new_err(format!("pairs[{k}]: expected two spheres, found a tuple of {}", pair.len())));
     }
-    let [first, second] = [0, 1].map(|side| sphere(model, &format!("pairs[{k}][{side}]"), &pair.get_item(side)?));
+    let [first, second] = [0, 1].map(|side| geometry(model, &format!("pairs[{k}][{side}]"), &pair.get_item(side)?));
     Ok(robot::GeometryPair::new(first?, second?))
+}
+
+/// Reads a `Geometry` of `condyle.distances` or a `Sphere`; `name` names it in error messages.
+fn geometry(model: &Bound<'_, Model>, name: &str, given: &Bound<'_, PyAny>) -> PyResult<robot::Geometry> {
+    let module = given.py().import("condyle.distances")?;
+    if !given.is_instance(&module.getattr("Geometry")?)? {
+        return sphere(model, name, given);
+    }
+    let text: String = module.call_method1("_text", (model, given))?.extract()?;
+    serde_json::from_str(&text).map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
 /// Reads a `Sphere` of `condyle._types`; `name` names the sphere in error messages.

@@ -13,8 +13,8 @@
 //! polytope. The normals of its faces are the normals of the box's faces, and the products of the segment's direction
 //! and the box's edges.
 //!
-//! Sources: Ericson, *Real-Time Collision Detection* (2005), sections 4.4.1 (separating axes) and 5.1.3 (point and box);
-//! Gottschalk, Lin, Manocha, "OBBTree" (SIGGRAPH 1996), section 5.
+//! Sources: Ericson, *Real-Time Collision Detection* (2005), sections 4.4.1 (separating axes) and 5.1.3 (point and
+//! box); Gottschalk, Lin, Manocha, "OBBTree" (SIGGRAPH 1996), section 5.
 
 use super::round::{Witness, norm, root};
 use condyle_spatial::Vec3;

@@ -52,6 +52,10 @@ mod results;
 mod round;
 mod solid;
 
+#[cfg(feature = "meshes")]
+pub use condyle_model::Fit;
+#[cfg(feature = "loaders")]
+pub use condyle_model::{CollisionMesh, Collisions};
 pub use condyle_model::{FrameName, Geometry, GeometryPair, Shape};
 pub use pairs::{DistancePairs, Replacement};
 pub use results::Distances;

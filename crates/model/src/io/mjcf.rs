@@ -6,6 +6,7 @@ mod attributes;
 mod beside;
 #[cfg(feature = "meshes")]
 mod builtin;
+mod collisions;
 mod compiler;
 mod equality;
 mod expand;
@@ -192,6 +193,15 @@ struct Source<'a> {
 }
 
 fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
+    with_reader(files, options, |reader, root| root.accepted(reader.model(root)?, options.strict, &options.allow))
+}
+
+/// Calls `read` with a reader of the files, and the root element of the main file.
+fn with_reader<T>(
+    files: &Files,
+    options: &MjcfOptions,
+    read: impl for<'a> FnOnce(Reader<'a>, &'a Element) -> Result<T, Error>,
+) -> Result<T, Error> {
     let all: Vec<_> = files.files.iter().flatten().collect();
     let mut sources = Vec::new();
     for file in &all {
@@ -216,7 +226,7 @@ fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
         placed: Vec::new(),
         warnings,
     };
-    root.accepted(reader.model(root)?, options.strict, &options.allow)
+    read(reader, root)
 }
 
 struct Reader<'a> {

@@ -1,5 +1,6 @@
 //! Reader of SDF, the format of Gazebo. It reads kinematics, inertias, limits, springs and loops.
 
+mod collisions;
 mod convert;
 mod include;
 mod inertia;

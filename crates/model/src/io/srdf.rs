@@ -5,6 +5,7 @@ use super::xml::{Amount, Element, numbers};
 use crate::body::Body;
 use crate::configuration::neutral;
 use crate::error::Error;
+use crate::io::collisions::Collisions;
 use crate::joint::Joint;
 use crate::model::Model;
 use std::collections::HashMap;
@@ -108,6 +109,52 @@ impl Model {
             })?;
         }
         Ok(states)
+    }
+}
+
+impl Collisions {
+    /// Disables the pairs of links that an SRDF file lists as `<disable_collisions>`. Links of other robots have no
+    /// effect. All other elements are ignored, except `<enable_collisions>` and `<disable_default_collisions>`, which
+    /// are errors because they are not supported.
+    ///
+    /// # Errors
+    /// Returns [`Error::File`], [`Error::Xml`] or [`Error::Element`].
+    pub fn read_srdf(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let (path, mut amount) = (path.as_ref(), Amount::default());
+        let text = amount.read(path)?;
+        self.disable_all(&Element::parse(&text, &path.display().to_string(), &mut amount)?)
+    }
+
+    /// Disables the pairs of links that an SRDF string lists; see [`read_srdf`](Self::read_srdf).
+    ///
+    /// ```
+    /// use condyle_model::Collisions;
+    /// let mut collisions = Collisions::default();
+    /// let srdf = r#"<robot name="r"><disable_collisions link1="hand" link2="arm" reason="Never"/></robot>"#;
+    /// collisions.read_srdf_str(srdf)?;
+    /// assert_eq!(collisions.disabled(), [["arm", "hand"]]);
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Returns the errors of [`read_srdf`](Self::read_srdf).
+    pub fn read_srdf_str(&mut self, text: &str) -> Result<(), Error> {
+        self.disable_all(&Element::parse(text, "<string>", &mut Amount::default())?)
+    }
+
+    fn disable_all(&mut self, root: &Element) -> Result<(), Error> {
+        if root.tag != "robot" {
+            return Err(root.wrong("expected <robot>, the root of an SRDF"));
+        }
+        let refused =
+            root.children.iter().find(|e| matches!(&*e.tag, "enable_collisions" | "disable_default_collisions"));
+        if let Some(element) = refused {
+            return Err(element.wrong("is not supported: only <disable_collisions> is"));
+        }
+        for element in root.all("disable_collisions") {
+            self.disable(text(element, "link1")?, text(element, "link2")?);
+        }
+        Ok(())
     }
 }
 

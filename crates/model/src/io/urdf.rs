@@ -1,5 +1,6 @@
 //! Reader of URDF. It reads kinematics, inertias and limits, and never opens meshes.
 
+mod collisions;
 mod elements;
 mod joints;
 mod known;

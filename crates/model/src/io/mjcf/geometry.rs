@@ -151,7 +151,7 @@ pub(super) fn geom(
 }
 
 /// Returns the pose and the size of a primitive.
-fn sized(compiler: &Compiler, a: &Attributes, kind: &str) -> Result<(Se3<f64>, Vec<f64>), Error> {
+pub(super) fn sized(compiler: &Compiler, a: &Attributes, kind: &str) -> Result<(Se3<f64>, Vec<f64>), Error> {
     let length = match kind {
         "sphere" => 1,
         "capsule" | "cylinder" => 2,

@@ -17,15 +17,15 @@ use condyle_spatial::{Act, Inertia, Se3};
 /// around it.
 #[derive(Default)]
 pub(super) struct Parts<'a> {
-    inertial: Option<(&'a Element, Se3<f64>)>,
-    joints: Vec<(Attributes<'a>, Se3<f64>)>,
-    geoms: Vec<(Attributes<'a>, Se3<f64>)>,
-    sites: Vec<(Attributes<'a>, Se3<f64>)>,
-    cameras: Vec<(Attributes<'a>, Se3<f64>)>,
+    pub(super) inertial: Option<(&'a Element, Se3<f64>)>,
+    pub(super) joints: Vec<(Attributes<'a>, Se3<f64>)>,
+    pub(super) geoms: Vec<(Attributes<'a>, Se3<f64>)>,
+    pub(super) sites: Vec<(Attributes<'a>, Se3<f64>)>,
+    pub(super) cameras: Vec<(Attributes<'a>, Se3<f64>)>,
     /// `<frame>`s with a name, each with its own pose.
-    frames: Vec<(&'a Element, Se3<f64>)>,
+    pub(super) frames: Vec<(&'a Element, Se3<f64>)>,
     /// Child bodies, each with its own pose and the default class of its parent element.
-    bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
+    pub(super) bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
 }
 
 /// Body that has not been added yet.
@@ -69,7 +69,13 @@ impl<'a> Reader<'a> {
     }
 
     /// Sorts the content of an element by kind. `X` is the pose of the surrounding `<frame>`.
-    fn gather(&self, inside: &'a Element, X: Se3<f64>, class: &'a str, parts: &mut Parts<'a>) -> Result<(), Error> {
+    pub(super) fn gather(
+        &self,
+        inside: &'a Element,
+        X: Se3<f64>,
+        class: &'a str,
+        parts: &mut Parts<'a>,
+    ) -> Result<(), Error> {
         let defaults = |e: &Element| &self.source(e).defaults;
         let own = inside.attribute("childclass").map_or(Ok(class), |c| defaults(inside).known(inside, c))?;
         for e in &inside.children {
@@ -98,13 +104,37 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// Returns the name of the next body of the file.
+    pub(super) fn next_body(&mut self, element: &'a Element) -> Result<String, Error> {
+        self.bodies += 1;
+        self.name("body", element, &format!("body{}", self.bodies))
+    }
+
+    /// Returns the pose of an MJCF body in the frame with the body's name. The two frames differ only for a free joint
+    /// with `align`, whose frame has the principal axes of inertia.
+    pub(super) fn link_in_frame(&mut self, element: &'a Element, parts: &Parts<'a>) -> Result<Se3<f64>, Error> {
+        let [(a, _)] = &parts.joints[..] else { return Ok(Se3::identity()) };
+        if !is_free(a) || !self.is_aligned(a, element, parts)? {
+            return Ok(Se3::identity());
+        }
+        Ok(self.inertia(element, parts, true)?.1.inverse())
+    }
+
+    /// Returns whether the frame of a free joint has the principal axes of its body.
+    fn is_aligned(&self, a: &Attributes, body: &Element, parts: &Parts) -> Result<bool, Error> {
+        let align = match a.get("align") {
+            None => None,
+            Some(_) => a.flag("align", Some("auto"))?,
+        };
+        Ok(align.unwrap_or(self.compiler(body).align_free) && parts.bodies.is_empty())
+    }
+
     /// Adds a body of the file. Returns its elements, the body of the model that contains it, and its pose in that
     /// body's frame.
     fn body(&mut self, builder: &mut ModelBuilder, w: &Waiting<'a>) -> Result<(Parts<'a>, BodyId, Se3<f64>), Error> {
         let mut parts = Parts::default();
         self.gather(w.element, Se3::identity(), w.class, &mut parts)?;
-        self.bodies += 1;
-        let name = self.name("body", w.element, &format!("body{}", self.bodies))?;
+        let name = self.next_body(w.element)?;
         let (mut body, mut bXl) = (w.on, w.placement);
         let moves = body != WORLD || !parts.joints.is_empty();
         let count = parts.joints.len();
@@ -125,11 +155,7 @@ impl<'a> Reader<'a> {
                 if !w.top || count > 1 {
                     return Err(a.element.wrong("a free joint is the only joint of a body on the world"));
                 }
-                let align = match a.get("align") {
-                    None => None,
-                    Some(_) => a.flag("align", Some("auto"))?,
-                };
-                if align.unwrap_or(self.compiler(w.element).align_free) && parts.bodies.is_empty() {
+                if self.is_aligned(a, w.element, &parts)? {
                     jXl = axes.inverse(); // the principal axes become the body's frame
                 }
                 Se3::identity() // q is the pose of the MJCF body
