@@ -185,8 +185,8 @@ class Targets:
 
     __slots__ = ("com", "frames", "posture")
     frames: _Array
-    """The poses (n, 4, 4) of the frames, in the world or in the task's root: one for each task for a pose, a position or
-    an orientation, in the order of the tasks."""
+    """The poses (n, 4, 4) of the frames, in the world or in the task's root. There is one for each task for a pose, a
+    position or an orientation, in the order of the tasks."""
     com: _Array
     """The position of the centre of mass (m)."""
     posture: _Array
@@ -240,7 +240,7 @@ class Posture(NamedTuple):
     starts: int
     """The number of starts that were needed."""
     held: tuple[str, ...]
-    """What holds the posture back if the target is not reached: limits of joints, and pairs, in words."""
+    """The limits of joints and the pairs that hold back a posture that does not reach its target, in words."""
 
 
 class Postures(NamedTuple):
@@ -255,7 +255,7 @@ class Postures(NamedTuple):
     starts: NDArray[np.int64]
     """The number of starts of each target (n,)."""
     held: list[tuple[str, ...]]
-    """What holds back each posture that does not reach its target, in words."""
+    """The limits and pairs that hold back each posture that does not reach its target, in words."""
 
 
 def _encoded(model: Model, pairs: Iterable[GeometryPair]) -> str:
@@ -323,8 +323,8 @@ class DifferentialIk:
     def step(self, q: ArrayLike, targets: Targets, v0: ArrayLike | None = None) -> Step:
         """Computes the velocity of one step, as a `Step`.
 
-        q: position, nq numbers; v0: the velocity of the step before, nv numbers, which only limits of acceleration read;
-        None for 0.
+        q: position, nq numbers.
+        v0: the velocity of the step before, nv numbers, which only limits of acceleration read; None for 0.
 
         Raises `ValueError` and `ModelError` for numbers that are not finite and for rotations that are not valid; the
         message names them.
@@ -379,7 +379,7 @@ class GlobalIk:
     orientation_weight: the weight of squared rotation errors (rad²), relative to squared position errors (m²). With 0,
         only the positions of the targets count.
     starts, iterations: the largest number of starts of a target, and of iterations of a start.
-    solutions: the number of postures from which `rank` chooses; a search ends when so many starts succeeded.
+    solutions: the number of postures from which `rank` chooses; a search ends when this number of starts succeeded.
     rank: 'first', 'nearest' (to the given posture) or 'manipulability' (of the first frame).
     table: the number of configurations in the table; seed: the seed of the random configurations.
     threads: the number of threads that share many targets.
