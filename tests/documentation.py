@@ -22,6 +22,7 @@ CRATES = [
     "condyle",
     "condyle_dynamics",
     "condyle_model",
+    "condyle_ik",
     "condyle_mpc",
     "condyle_optimal",
     "condyle_spatial",

@@ -26,10 +26,11 @@ check condyle-model libm loaders meshes serde std threads urdf-rs
 check condyle-dynamics libm loaders meshes serde std threads urdf-rs
 check condyle-optimal "" loaders serde threads
 check condyle-wholebody "" clarabel loaders threads
+check condyle-ik "" loaders threads
 check condyle-mpc "" loaders threads
 check condyle-codegen "" cuda
 check condyle-meshes "" page
-check condyle "" clarabel loaders meshes mpc optimal serde threads urdf-rs wholebody
+check condyle "" clarabel ik loaders meshes mpc optimal serde threads urdf-rs wholebody
 
 cargo test --locked --package condyle-model --no-default-features --features libm --lib
 cargo test --locked --package condyle-model --features urdf-rs --test urdf_rs

@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-ORDER = ["spatial", "linalg", "meshes", "model", "dynamics", "optimal", "wholebody", "mpc", "", "codegen", "cli"]
+ORDER = ["spatial", "linalg", "meshes", "model", "dynamics", "optimal", "wholebody", "ik", "mpc", "", "codegen", "cli"]
 """Folders of the published crates below `crates/`. Each crate comes after its dependencies. The empty name means the
 crate `condyle`."""
 LARGEST = 10 * 1024 * 1024

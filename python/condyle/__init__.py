@@ -75,13 +75,13 @@ Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_ene
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
 Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, the SIMD level
-Modules: `optimal` (FDDP, DDP and their problems), `distances` (between shapes), `mpc` (controllers at a rate),
-    `wholebody` (control), `simulation`, `algebra` (poses, motions, forces), `conventions` (other libraries' numbers).
-    Further modules must be imported by name: `casadi`, `pinocchio` (Pinocchio's names of functions), `crocoddyl`
-    (Crocoddyl's problems), `codegen` (straight-line C), `cuda` (kernels) and `viz` (pictures)
+Modules: `optimal` (FDDP, DDP and their problems), `distances` (between shapes), `ik` (inverse kinematics), `mpc`
+    (controllers at a rate), `wholebody` (control), `simulation`, `algebra` (poses, motions, forces), `conventions`
+    (other libraries' numbers). Further modules must be imported by name: `casadi`, `pinocchio` (Pinocchio's names of
+    functions), `crocoddyl` (Crocoddyl's problems), `codegen` (straight-line C), `cuda` (kernels) and `viz` (pictures)
 """
 
-from . import algebra, conventions, distances, inertial_parameters, mpc, optimal, robots, simulation, wholebody
+from . import algebra, conventions, distances, ik, inertial_parameters, mpc, optimal, robots, simulation, wholebody
 from ._condyle import (
     LEVEL,
     WORLD,
@@ -315,6 +315,7 @@ __all__ = [
     "gradient",
     "gravity",
     "hessian",
+    "ik",
     "impulse_dynamics",
     "impulse_dynamics_derivatives",
     "inertial_parameters",

@@ -52,6 +52,14 @@ pub(crate) fn controller_error(error: condyle::wholebody::Error) -> PyErr {
     }
 }
 
+/// Converts an error of `condyle::ik` to a `ModelError`, or to a `ValueError` for an argument.
+pub(crate) fn ik_error(error: condyle::ik::Error) -> PyErr {
+    match error {
+        condyle::ik::Error::Model(error) => exception(error),
+        other => PyValueError::new_err(other.to_string()),
+    }
+}
+
 /// Converts an error of `condyle::mpc` to a `ProblemError` or a `ControllerError`.
 pub(crate) fn mpc_error(error: condyle::mpc::Error) -> PyErr {
     match error {

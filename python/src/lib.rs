@@ -13,7 +13,8 @@
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `distances`: distances between shapes, for the module `condyle.distances`;
 //! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
-//! - `optimal`, `wholebody`, `mpc`: the modules `condyle.optimal`, `condyle.wholebody` and `condyle.mpc`.
+//! - `optimal`, `wholebody`, `mpc`, `ik`: the modules `condyle.optimal`, `condyle.wholebody`, `condyle.mpc` and
+//!   `condyle.ik`.
 //!
 //! The doc comments of Python classes and functions become docstrings; `stubs.py` writes these to
 //! `condyle/_condyle.pyi`.
@@ -38,6 +39,7 @@ mod exceptions;
 mod factorisation;
 mod functions;
 mod hyper_dual;
+mod ik;
 mod inertial_parameters;
 mod joint;
 mod kinematics;
@@ -106,6 +108,8 @@ mod _condyle {
     use factorisation::{Cholesky, DivideConquer, Ltdl};
     #[pymodule_export]
     use hyper_dual::HyperDual;
+    #[pymodule_export]
+    use ik::{DifferentialIk, GlobalIk};
     #[pymodule_export]
     use inertial_parameters::{
         check, from_inertia, from_log_cholesky, log_cholesky, log_cholesky_jacobian, pseudo_inertia, to_inertia,

@@ -26,7 +26,7 @@ def test_example(path: Path, tmp_path: Path) -> None:
         pytest.importorskip("example_robot_data")
     if path.stem == "wholebody_clarabel":
         pytest.importorskip("clarabel")
-    if path.stem == "pictures":
+    if path.stem in ("pictures", "drag_target"):
         pytest.importorskip("viser")
     if path.stem == "coming_from_crocoddyl":
         pytest.importorskip("crocoddyl")  # the example is skipped if Crocoddyl is not installed

@@ -46,6 +46,8 @@
 //   walk              { gait, seconds (requested), command [3], mean [3], since (s), velocities, commands: [N][3], ticks: { times,
 //                     ms, budget_ms, over }, tilt (rad), fall: { time, what } or null }: a walk in the simulation; velocities
 //                     along the heading: forwards, to the left (m/s), turning (rad/s); missing for a plan
+//   posture           { reached, rotation (error in rad, or null), starts, held: [] of what holds the posture back, in words }:
+//                     the motion ends at a posture that was searched; missing for plans and walks
 //   version, command  version of the program that wrote the page; its command line, or null
 //
 // `#t=0.4` in the address opens the page paused at 0.4 s. While the player is paused, the address shows its time.
@@ -98,7 +100,7 @@ function header(data) {
     ...(data.frame ? [fact("end-effector", data.frame)] : []),
     ...(data.target ? [fact("target", `(${data.target.map((x) => x.toFixed(3).replace("-", "−")).join(", ")}) m`)] : []),
     fact("horizon", `${knots} × ${brief(1000 * data.dt)} ms = ${brief(last)} s`),
-    fact("iterations", String(data.iterations.at(-1)?.iteration ?? 0)),
+    data.posture ? fact("starts", String(data.posture.starts)) : fact("iterations", String(data.iterations.at(-1)?.iteration ?? 0)),
   );
 
   const badge = (state, text) => {
@@ -111,6 +113,15 @@ function header(data) {
   if (data.walk) {
     $("kind").textContent = "walk";
     walkHeader(data, fact, badge);
+    limitsBadge(data, badge);
+    return footer(data);
+  }
+  if (data.posture) {
+    $("kind").textContent = "posture";
+    const { reached, rotation, held } = data.posture;
+    const off = `${length(data.miss)}${rotation == null ? "" : ` and ${number(rotation, 2)} rad`} off`;
+    badge(reached ? "good" : "bad", `${reached ? "Target reached" : "Target missed"}: ${off}`);
+    for (const limit of held) badge("warn", `Held back by the ${limit.replaceAll("`", "")}`);
     limitsBadge(data, badge);
     return footer(data);
   }

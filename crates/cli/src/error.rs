@@ -23,6 +23,9 @@ pub(crate) enum Error {
     /// Error in the description of a controller: the robot, its feet, the gait or a setting.
     #[error(transparent)]
     Controller(#[from] condyle::mpc::Error),
+    /// Error in the description of a search for a posture.
+    #[error(transparent)]
+    Posture(#[from] condyle::ik::Error),
     /// Invalid value of an option.
     #[error("--{option}: {what}")]
     Option { option: &'static str, what: String },

@@ -1,5 +1,5 @@
-//! Program `condyle`: shows a robot's model, checks its numbers, measures computing times, plans motions, and lets
-//! robots walk in a simulation.
+//! Program `condyle`: shows a robot's model, checks its numbers, measures computing times, plans motions, finds
+//! postures, and lets robots walk in a simulation.
 
 #![allow(non_snake_case)] // names of variables are symbols of the literature
 
@@ -11,6 +11,7 @@ mod findings;
 mod gait;
 #[cfg(feature = "generate")]
 mod generate;
+mod ik;
 mod inspect;
 mod limits;
 mod lines;
@@ -50,6 +51,7 @@ enum Command {
     Budget(budget::Arguments),
     Check(check::Arguments),
     Plan(Box<plan::Arguments>),
+    Ik(Box<ik::Arguments>),
     Walk(Box<walk::Arguments>),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
@@ -78,6 +80,7 @@ fn main() -> ExitCode {
         Command::Budget(arguments) => budget::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Ik(arguments) => ik::run(&arguments),
         Command::Walk(arguments) => walk::run(&arguments),
         #[cfg(feature = "generate")]
         Command::Generate(arguments) => generate::run(&arguments),

@@ -83,16 +83,16 @@ pub(crate) struct Arguments {
 
 /// Whether the page shows meshes.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
-enum Show {
+pub(crate) enum Show {
     Auto,
     Never,
 }
 
 /// Numbers of one command-line argument, separated by commas.
 #[derive(Clone)]
-struct Numbers(Vec<f64>);
+pub(crate) struct Numbers(pub Vec<f64>);
 
-fn numbers(text: &str) -> Result<Numbers, String> {
+pub(crate) fn numbers(text: &str) -> Result<Numbers, String> {
     let number = |x: &str| match x.trim().parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
         _ => Err(format!("`{}` is not a finite number", x.trim())),

@@ -40,6 +40,7 @@
     feature = "wholebody",
     doc = "| whole-body control | [`wholebody`]: `WholeBodyController`, `Task`, `Plan` |"
 )]
+#![cfg_attr(feature = "ik", doc = "| inverse kinematics | [`ik`]: `DifferentialIk`, `GlobalIk`, `Task` |")]
 //!
 #![cfg_attr(all(feature = "optimal", feature = "wholebody"), doc = include_str!("guide.md"))]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -57,6 +58,8 @@ pub use plan::plan_of;
 /// others in modules by theme.
 #[doc(no_inline)]
 pub use condyle_dynamics as dynamics;
+#[cfg(feature = "ik")]
+pub use condyle_ik as ik;
 #[cfg(feature = "mpc")]
 pub use condyle_mpc as mpc;
 #[cfg(feature = "optimal")]
