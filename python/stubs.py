@@ -120,7 +120,7 @@ ARGUMENTS = {
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states
         Record.__getitem__.key""",
     "float": """
-        ArmMpc.knot WholeBodyMpc.knot
+        ArmMpc.clearance ArmMpc.knot WholeBodyMpc.knot
         Foot.point.friction Foot.sole.friction ArmMpc.horizon ArmMpc.latency Foot.point.radius Gait.bound.swing
         Gait.bound.double Gait.pace.swing Gait.pace.double Gait.step.swing Gait.step.double Gait.table.period
         Gait.trot.swing Gait.trot.double Gait.walk.swing Gait.walk.double WholeBodyMpc.horizon

@@ -34,7 +34,7 @@ pub(crate) use own::{Action, ConstrainedAction, ControlRate, DifferentialAction,
 pub(crate) use policy::Policy;
 pub(crate) use problem::{Problem, lock};
 pub(crate) use record::Record;
-pub(crate) use residuals::Residual;
+pub(crate) use residuals::{Residual, geometry_pairs};
 pub(crate) use rollouts::rollout_many;
 pub(crate) use schedule::Schedule;
 pub(crate) use solvers::{AugmentedLagrangian, Fddp, InteriorPoint};

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.distances import Geometry, Shape
 from condyle.mpc import ArmMpc, ArmWeights, Foot, Gait, PlanLimits, Weights, WholeBodyMpc
 from condyle.simulation import Ground, Simulation
 from condyle.wholebody import ControllerError, FrictionContact, Gains, Settings, Task, WholeBodyController
@@ -166,6 +167,32 @@ def test_an_arm_follows_a_path() -> None:
     simulation.set_state(REST[:7], REST[7:])
     assert simulation.run(2000, law) == "done"
     assert 0.0 < max(worst) < 3e-3
+
+
+def test_an_arm_moves_around_an_obstacle() -> None:
+    goal = pose()
+    goal[1, 3] += 0.3
+    ball = pose()[:3, 3] + [0.0, 0.15, 0.03]
+    tip, obstacle = Geometry(Shape.sphere([0.0] * 3, 0.03), "tool"), Geometry(Shape.sphere(ball, 0.08))
+    mpc, distances = ArmMpc(ARM, "tool", obstacles=[(tip, obstacle)], clearance=0.02), []
+    mpc.reset(REST, pose())
+    policy = mpc.policy()
+
+    def law(now: Any) -> None:
+        x = np.r_[now.q, now.v]
+        if round(1e3 * now.time) % 10 == 0 and now.time > 0.0:
+            mpc.update(now.time, x, goal)
+        now.tau[:] = policy(now.time, x)
+        tool = condyle.frame_placement(ARM, condyle.Data(ARM), now.q, "tool")[:3, 3]
+        distances.append((np.linalg.norm(tool - ball) - 0.11, np.linalg.norm(tool - goal[:3, 3])))
+
+    simulation = Simulation(ARM, dt=1e-3)
+    simulation.set_state(REST[:7], REST[7:])
+    assert simulation.run(2500, law) == "done"
+    nearest, _ = np.min(distances, axis=0)
+    assert nearest > 0.01 and distances[-1][1] < 5e-3
+    with pytest.raises(condyle.Error, match="pairs"):
+        ArmMpc(ARM, "tool", obstacles=[(obstacle, obstacle)])
 
 
 def test_exceptions_of_a_path_are_raised() -> None:

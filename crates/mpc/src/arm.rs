@@ -7,13 +7,16 @@ use crate::policy::Policy;
 use crate::report::Report;
 use crate::settings::{PlanLimits, PlanSettings, check_at_least};
 use condyle_dynamics::{Model, Se3};
-use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual, Target};
+use condyle_optimal::robot::{Activation, Cost, FreeDynamics, GeometryPair, Limit, Residual, Target};
 use condyle_optimal::{InteriorPoint, Problem};
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Name of the cost of the pose.
 const POSE: &str = "pose";
+/// Weights of the limit of distances: for each m, and for each m², by which a distance is too small. The first one is
+/// the gradient of the pose's cost at an error of 1 m, so that no error of the pose makes an obstacle give way.
+const DISTANCE_WEIGHTS: (f64, f64) = (1e5, 1e6);
 /// Numbers of a pose: the homogeneous matrix.
 const POSE_SIZE: usize = 16;
 
@@ -28,6 +31,11 @@ pub struct ArmSettings {
     pub weights: ArmWeights,
     /// Limits that the plan keeps.
     pub limits: PlanLimits,
+    /// Pairs of geometries that stay apart: the arm and obstacles, or two parts of the arm.
+    pub obstacles: Vec<GeometryPair>,
+    /// Smallest distance of each pair at each knot (m). It may give way at a high cost, because a measured state can be
+    /// nearer.
+    pub clearance: f64,
     /// Number of sweeps for the quadratic program of each linearisation.
     pub sweeps: usize,
     /// Least and largest number of linearisations in a tick. Further ones after the least number are made
@@ -48,6 +56,8 @@ impl Default for ArmSettings {
             knot: 0.02,
             weights: ArmWeights::default(),
             limits: PlanLimits::default(),
+            obstacles: Vec::new(),
+            clearance: 0.02,
             sweeps: 2,
             iterations: [1, 1],
             budget: f64::INFINITY,
@@ -105,8 +115,8 @@ impl ArmMpc {
     /// Creates a controller for a robot with a fixed base, whose frame `frame` follows poses. Allocates.
     ///
     /// # Errors
-    /// [`Error::Optimal`] for a frame that does not exist, or a robot with joints that move no mass;
-    /// [`Error::Setting`] for an invalid setting.
+    /// [`Error::Optimal`] for a frame that does not exist, an invalid pair of geometries, or a robot with joints that
+    /// move no mass; [`Error::Setting`] for an invalid setting.
     pub fn new(model: Arc<Model>, frame: &str, settings: ArmSettings) -> Result<Self, Error> {
         settings.check()?;
         let (nv, w) = (model.nv(), settings.weights);
@@ -120,7 +130,8 @@ impl ArmMpc {
         let state = Cost::new("state", 1.0, state, Activation::Weighted(weights));
         let weights = effort_limits(&model, 0).iter().map(|limit| w.effort / (limit * limit)).collect();
         let effort = Cost::new(EFFORT, 1.0, Residual::ControlGravity, Activation::Weighted(weights));
-        let limits = joint_limits(&model, 0, settings.limits, false);
+        let mut limits = joint_limits(&model, 0, settings.limits, false);
+        limits.extend(apart(&settings));
         let knot = FreeDynamics::running(model.clone(), settings.knot, vec![pose.clone(), state.clone(), effort])?;
         let of_states: Vec<_> = limits.iter().filter(|limit| limit.name != EFFORT).cloned().collect();
         let knot = Box::new(knot.with_limits(limits)?);
@@ -194,6 +205,15 @@ impl ArmMpc {
     }
 }
 
+/// Returns the limit of the distances to obstacles, if there are obstacles.
+fn apart(settings: &ArmSettings) -> Option<Limit> {
+    let ArmSettings { obstacles: pairs, clearance, .. } = settings;
+    let (count, (linear, quadratic)) = (pairs.len(), DISTANCE_WEIGHTS);
+    let (lower, upper) = (vec![*clearance; count], vec![f64::INFINITY; count]);
+    let limit = || Limit::new("obstacles", Residual::Distances { pairs: pairs.clone() }, lower, upper);
+    (count > 0).then(|| limit().softened(linear, quadratic))
+}
+
 /// Writes the poses of a path at all knots.
 fn refer(planner: &mut Planner, poses: &mut [f64], mut path: impl FnMut(f64) -> Se3<f64>) -> Result<(), Error> {
     for (&t, row) in planner.times.iter().zip(poses.chunks_exact_mut(POSE_SIZE)) {
@@ -213,6 +233,7 @@ impl From<&ArmSettings> for PlanSettings {
 impl ArmSettings {
     fn check(&self) -> Result<(), Error> {
         PlanSettings::from(self).check(self.horizon)?;
+        check_at_least("clearance", self.clearance)?;
         let w = &self.weights;
         let weights = [w.position, w.rotation, w.posture, w.velocity, w.effort];
         weights.into_iter().try_for_each(|weight| check_at_least("weights", weight))

@@ -1,5 +1,6 @@
 //! Tests of the controller of arms: a tool on a circle, limits, and bad input.
 
+use condyle_dynamics::distances::{Geometry, GeometryPair, Shape};
 use condyle_dynamics::simulation::{Settings as SimulationSettings, Simulation};
 use condyle_dynamics::{Data, Model, Se3, Vec3, forward_kinematics, robots};
 use condyle_mpc::{ArmMpc, ArmSettings, Error, TickStatus};
@@ -81,4 +82,50 @@ fn bad_input_is_refused() {
     assert!(error.contains("pose") && error.contains("NaN"), "{error}");
     assert_eq!(mpc.update(0.06, &start(), |_| begin).unwrap().status, TickStatus::Planned);
     assert_eq!(mpc.update(0.05, &start(), |_| begin).unwrap_err(), Error::Time { t: 0.05, last: 0.06 });
+}
+
+/// Moves the tool to the other side of a ball, on whose straight line it would touch the ball.
+#[test]
+fn the_arm_moves_around_an_obstacle() {
+    let arm = Arc::new(robots::arm7());
+    let (begin, by, ball) = (tool(&arm, &start()[..7]), Vec3::new(0.0, 0.3, 0.0), 0.08);
+    let center = begin.translation + by.scale(0.5) + Vec3::new(0.0, 0.0, 0.03);
+    let end = Se3 { translation: begin.translation + by, ..begin };
+    let obstacle = Geometry::in_world(Shape::sphere(center, ball));
+    let tip = Geometry::on("tool", Shape::sphere(Vec3::zero(), 0.03));
+    let obstacles = vec![GeometryPair::new(tip, obstacle)];
+    let [touching, apart] = [Vec::new(), obstacles].map(|obstacles| {
+        let settings = ArmSettings { obstacles, ..ArmSettings::default() };
+        let mut mpc = ArmMpc::new(arm.clone(), "tool", settings).unwrap();
+        mpc.reset(0.0, &start(), |_| begin).unwrap();
+        let mut simulation = Simulation::new(arm.clone(), SimulationSettings { dt: STEP, ..Default::default() });
+        simulation.set_state(&start()[..7], &[0.0; 7]).unwrap();
+        let (mut policy, mut tau, mut nearest) = (mpc.policy(), [0.0; 7], f64::INFINITY);
+        for step in 0..3000 {
+            let x = [simulation.q(), simulation.v()].concat();
+            if step % PERIOD == 0 && step > 0 {
+                mpc.update(STEP * step as f64, &x, |_| end).unwrap();
+            }
+            policy.control(STEP * step as f64, &x, &mut tau);
+            assert!(simulation.step(&tau, &[]).is_taken());
+            let away = tool(&arm, simulation.q()).translation - center;
+            nearest = nearest.min(away.norm_squared().sqrt() - ball - 0.03);
+        }
+        let miss = tool(&arm, simulation.q()).translation - end.translation;
+        assert!(miss.norm_squared().sqrt() < 5e-3, "{:?}", miss.to_array());
+        nearest
+    });
+    assert!(touching < 0.0 && apart > 0.01, "{touching} {apart}"); // the limit of 0.02 m holds at knots
+}
+
+#[test]
+fn invalid_obstacles_are_named() {
+    let arm = Arc::new(robots::arm7());
+    let ball = Geometry::in_world(Shape::sphere(Vec3::zero(), 0.1));
+    let on = |frame: &str| GeometryPair::new(Geometry::on(frame, Shape::sphere(Vec3::zero(), 0.1)), ball.clone());
+    let fails = |settings: ArmSettings| ArmMpc::new(arm.clone(), "tool", settings).unwrap_err().to_string();
+    let error = fails(ArmSettings { obstacles: vec![on("tool"), on("tol")], ..ArmSettings::default() });
+    assert!(error.contains("pairs[1]") && error.contains("tol"), "{error}");
+    let error = fails(ArmSettings { clearance: f64::NAN, ..ArmSettings::default() });
+    assert!(error.contains("clearance"), "{error}");
 }

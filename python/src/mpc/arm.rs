@@ -6,7 +6,7 @@ use super::settings::{Limits, give_report, read_arm_weights};
 use crate::arrays::{pose, vector};
 use crate::exceptions::mpc_error;
 use crate::model::Model;
-use crate::optimal::lock;
+use crate::optimal::{geometry_pairs, lock};
 use condyle::mpc as rust;
 use condyle::{Se3, Vec3};
 use pyo3::gc::{PyTraverseError, PyVisit};
@@ -24,6 +24,10 @@ use std::sync::Mutex;
 /// horizon, knot: the durations of the horizon and of a knot (s).
 /// weights: `ArmWeights`; None for the defaults.
 /// limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
+/// obstacles: pairs of geometries that stay apart, as for `Residual.distances`: the arm and obstacles, or two parts of
+///     the arm.
+/// clearance: the smallest distance of each pair at each knot (m). It may give way at a high cost, because a measured
+///     state can be nearer.
 /// sweeps: the number of sweeps for the quadratic program of each linearisation.
 /// iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
 ///     made only if the budget has time left for one more.
@@ -31,7 +35,8 @@ use std::sync::Mutex;
 /// latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
 /// threads: the number of threads of a tick.
 ///
-/// Raises `ControllerError` for a number outside its range, and `ProblemError` for a frame that does not exist.
+/// Raises `ControllerError` for a number outside its range, and `ProblemError` for a frame that does not exist or an
+/// invalid pair.
 ///
 /// >>> from condyle.mpc import ArmMpc
 /// >>> arm = condyle.robots.arm7()
@@ -50,9 +55,10 @@ pub(crate) struct ArmMpc {
 
 controller! { ArmMpc, 0 {
     #[new]
-    #[pyo3(signature = (model, frame, *, horizon=0.5, knot=0.02, weights=None, limits=Limits::MODEL, sweeps=2,
-        iterations=[1, 1], budget=None, latency=0.0, threads=1), text_signature = "(model, frame, *, horizon=0.5,
-        knot=0.02, weights=None, limits='model', sweeps=2, iterations=(1, 1), budget=None, latency=0.0, threads=1)")]
+    #[pyo3(signature = (model, frame, *, horizon=0.5, knot=0.02, weights=None, limits=Limits::MODEL,
+        obstacles=None, clearance=0.02, sweeps=2, iterations=[1, 1], budget=None, latency=0.0, threads=1),
+        text_signature = "(model, frame, *, horizon=0.5, knot=0.02, weights=None, limits='model', obstacles=(),
+        clearance=0.02, sweeps=2, iterations=(1, 1), budget=None, latency=0.0, threads=1)")]
     fn new(
         model: &Bound<'_, Model>,
         frame: &str,
@@ -60,16 +66,30 @@ controller! { ArmMpc, 0 {
         knot: f64,
         weights: Option<&Bound<'_, PyAny>>,
         limits: Limits,
+        obstacles: Option<&Bound<'_, PyAny>>,
+        clearance: f64,
         sweeps: usize,
         iterations: [usize; 2],
         budget: Option<f64>,
         latency: f64,
         threads: usize,
     ) -> PyResult<Self> {
+        let obstacles = obstacles.map_or_else(|| Ok(Vec::new()), |pairs| geometry_pairs(model, pairs))?;
         let weights = weights.map_or_else(|| Ok(rust::ArmWeights::default()), read_arm_weights)?;
         let (Limits(limits), budget) = (limits, budget.unwrap_or(f64::INFINITY));
-        let settings =
-            rust::ArmSettings { horizon, knot, weights, limits, sweeps, iterations, budget, latency, threads };
+        let settings = rust::ArmSettings {
+            horizon,
+            knot,
+            weights,
+            limits,
+            obstacles,
+            clearance,
+            sweeps,
+            iterations,
+            budget,
+            latency,
+            threads,
+        };
         let robot = model.get().inner.clone();
         let nx = robot.nq() + robot.nv();
         let inner = rust::ArmMpc::new(robot, frame, settings).map_err(mpc_error)?;

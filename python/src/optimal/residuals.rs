@@ -204,9 +204,7 @@ impl Residual {
     /// >>> clear = Limit("clear", Residual.distances(condyle.robots.arm7(), [(tool, ball)]), lower=[0.01])
     #[staticmethod]
     fn distances(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let pairs = members_of("pairs", "pairs of spheres", pairs)?;
-        let pairs = pairs.iter().enumerate().map(|(k, pair)| geometry_pair(model, k, pair)).collect::<PyResult<_>>()?;
-        Ok(Self::from(robot::Residual::Distances { pairs }))
+        Ok(Self::from(robot::Residual::Distances { pairs: geometry_pairs(model, pairs)? }))
     }
 
     /// Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of the
@@ -406,6 +404,12 @@ pub(super) fn put_written(
 fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
     let model = &model.get().inner;
     Ok((&model.frames()[frame_index(model, frame)?]).into())
+}
+
+/// Reads a list of pairs of spheres or geometries.
+pub(crate) fn geometry_pairs(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>) -> PyResult<Vec<robot::GeometryPair>> {
+    let pairs = members_of("pairs", "pairs of spheres", pairs)?;
+    pairs.iter().enumerate().map(|(k, pair)| geometry_pair(model, k, pair)).collect()
 }
 
 /// Reads pair k of spheres or geometries.
