@@ -145,7 +145,8 @@ ARGUMENTS = {
     "Sequence[tuple[str, float, float]]": "Gait.table.swings",
     "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
-    "bool": """_DistancePairs._evaluate.gradients _generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+    "bool": """_DistancePairs._evaluate.gradients
+        _generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
     "list[tuple[int, Residual]]": " ".join(
         f"{kind}Dynamics._from_parts.written"
