@@ -105,7 +105,7 @@ ARGUMENTS = {
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": """
         ArmMpc.frame Foot.point.frame Foot.sole.frame
-        _Collisions.format _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
+        _Collisions.kind _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
         _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
         text FrictionContact.frame Task.frame""",
     "str | int": """
