@@ -56,6 +56,7 @@ from ._types import (
     SweepResult,
 )
 from ._wholebody import Command, Gains, KktResiduals, References, Settings
+from .distances import Geometry
 
 __all__ = [
     "ARM7",
@@ -114,6 +115,8 @@ __all__ = [
     "WholeBodyController",
     "WholeBodyMpc",
     "WrenchCone",
+    "_Collisions",
+    "_DistancePairs",
     "_SpelledData",
     "_SpelledModel",
     "__version__",
@@ -1364,6 +1367,64 @@ def static_torque_derivative(
 
     q: position, nq numbers; f_ext: as for `rnea`, constant in the bodies' frames.
     """
+
+@final
+class _Collisions:
+    """Collision shapes of a robot's file; see `condyle.distances.Collisions`.
+
+    kind: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
+    """
+
+    def __new__(cls, kind: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
+    def _disable(self, first: str, second: str) -> None:
+        """Disables the pairs of two links."""
+
+    def _fit(self, kind: str) -> int:
+        """Replaces meshes by shapes. Returns their number."""
+
+    def _geometries(self) -> str:
+        """Returns the geometries in JSON."""
+
+    def _meshes(self) -> list[tuple[str, str, str]]:
+        """Returns name, link and file of each mesh."""
+
+    def _pairs(self, model: Model) -> str:
+        """Returns the pairs that can collide, in JSON."""
+
+    def _srdf(self, path: _Path | None, text: str | None) -> None:
+        """Disables the pairs of links that an SRDF lists."""
+
+    def _warnings(self) -> list[str]:
+        """Returns the warnings as text."""
+
+@final
+class _DistancePairs:
+    """Pairs of geometries, prepared for one robot; see `condyle.distances.DistancePairs`.
+
+    model: the robot; text: a list of pairs in JSON.
+    """
+
+    def __new__(cls, model: Model, text: str) -> _DistancePairs: ...
+    @property
+    def cutoff(self) -> float:
+        """The largest distance of interest (m)."""
+
+    @cutoff.setter
+    def cutoff(self, cutoff: float) -> None: ...
+    def __len__(self, /) -> int: ...
+    def _evaluate(self, model: Model, data: Data, q: ArrayLike, states: int, gradients: bool) -> list[_Array]:
+        """Computes distances (N, n), points (N, n, 2, 3), normals (N, n, 3) and, if `gradients`, gradients (N, n, nv) of n
+        pairs at N positions.
+        """
+
+    def _find(self, name: str) -> int | None:
+        """Returns the index of the geometry with a name, or None."""
+
+    def _place(self, geometry: int, placement: ArrayLike) -> None:
+        """Sets the placement of a geometry."""
+
+    def _replacements(self) -> list[tuple[int, int, str]]:
+        """Returns (pair, side, kind) of each geometry that a capsule replaces."""
 
 def _borrowed(capsule: Any) -> tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]:
     """Describes the array that a DLPack capsule lends. The caller must keep the capsule alive while it uses the array.
@@ -4546,14 +4607,14 @@ class Residual:
         """
 
     @staticmethod
-    def distances(model: Model, pairs: Sequence[tuple[Sphere, Sphere]]) -> Residual:
-        """Returns the signed distances between pairs of spheres, r = ‖p₁ − p₂‖ − radius₁ − radius₂ with the centres p₁ and
-        p₂ in the world, one number for each pair (m). A distance is negative while the spheres overlap.
+    def distances(model: Model, pairs: Sequence[tuple[Sphere | Geometry, Sphere | Geometry]]) -> Residual:
+        """Returns the signed distances between pairs of geometries, r = n·(p₁ − p₂) with the nearest points p₁ and p₂ and
+        the unit normal n, one number for each pair (m). A distance is negative while the geometries overlap.
 
-        pairs: a list of pairs of `Sphere`s. At least one sphere of a pair is fixed to a frame of the robot; the other
-            one is fixed to the world, or to a frame of the same robot.
+        pairs: a list of pairs of `Sphere`s or `condyle.distances.Geometry`s. At least one geometry of a pair is fixed
+            to a frame of the robot; the other one is fixed to the world, or to a frame of the same robot.
 
-        A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
+        A `Limit` or a `Cost` of this residual keeps the geometries apart: if no bounds or activation are given, all
         distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
         pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
 
