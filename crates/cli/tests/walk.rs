@@ -84,9 +84,10 @@ fn the_humanoid_steps() {
     assert!(summary["gait"].as_str().unwrap().starts_with("step"));
 }
 
-/// Writes an MJCF of a quadruped with spheres as feet, which have no body of their own, and a keyframe.
-fn mjcf(folder: &Path) -> String {
-    let leg = |name: &str, x: f64, y: f64| {
+/// Writes an MJCF of a robot with spheres as feet, which have no body of their own, and a keyframe. `hips` are the
+/// names and places of the legs, and `neck` is the text of further bodies with `joints` joints.
+fn mjcf(folder: &Path, hips: &[(&str, f64, f64)], neck: &str, joints: usize) -> String {
+    let leg = |&(name, x, y): &(&str, f64, f64)| {
         format!(
             r#"<body name="{name}_hip" pos="{x} {y} 0"><joint name="{name}_roll" axis="1 0 0" range="-1 1"/>
             <inertial pos="0 0 0" mass="0.5" diaginertia="1e-3 1e-3 1e-3"/>
@@ -97,13 +98,14 @@ fn mjcf(folder: &Path) -> String {
             <geom class="foot" pos="0 0 -0.25"/></body></body></body>"#
         )
     };
-    let legs = [leg("LF", 0.3, 0.15), leg("RF", 0.3, -0.15), leg("LH", -0.3, 0.15), leg("RH", -0.3, -0.15)].concat();
-    let stand = "0 0.7 -1.4 ".repeat(4);
+    let legs: String = hips.iter().map(leg).collect();
+    let stand = "0 0.7 -1.4 ".repeat(hips.len()) + &"0 ".repeat(joints);
     let text = format!(
         r#"<mujoco model="q"><compiler angle="radian"/>
-        <default><default class="foot"><geom type="sphere" size="0.02"/></default></default>
+        <default><joint actuatorfrcrange="-60 60"/>
+        <default class="foot"><geom type="sphere" size="0.02"/></default></default>
         <worldbody><geom type="plane" size="1 1 1"/><body name="trunk" pos="0 0 0.5"><freejoint/>
-        <inertial pos="0 0 0" mass="10" diaginertia="0.1 0.4 0.4"/>{legs}</body></worldbody>
+        <inertial pos="0 0 0" mass="10" diaginertia="0.1 0.4 0.4"/>{legs}{neck}</body></worldbody>
         <keyframe><key name="home" qpos="0 0 0.5 1 0 0 0 {stand}"/></keyframe></mujoco>"#
     );
     let file = folder.join("robot.xml");
@@ -111,10 +113,36 @@ fn mjcf(folder: &Path) -> String {
     file.to_str().unwrap().to_owned()
 }
 
+const FOUR: [(&str, f64, f64); 4] = [("LF", 0.3, 0.15), ("RF", 0.3, -0.15), ("LH", -0.3, 0.15), ("RH", -0.3, -0.15)];
+
+/// Checks that joints of nearly no inertia get an armature: the link between two joints about one axis has no mass.
+#[test]
+fn a_link_without_mass_is_no_obstacle() {
+    let neck = r#"<body name="neck" pos="0.3 0 0.1"><joint name="neck_a" axis="0 0 1"/>
+        <inertial pos="0 0 0" mass="1e-9" diaginertia="1e-12 1e-12 1e-12"/>
+        <body name="head"><joint name="neck_b" axis="0 0 1"/>
+        <inertial pos="0.05 0 0.05" mass="0.5" diaginertia="1e-3 1e-3 1e-3"/></body></body>"#;
+    let robot = mjcf(&folder("neck_file"), &FOUR, neck, 2);
+    let arguments = [&*robot, "--command", "0.3,0,0", "--seconds", "2", "--rate", "50"];
+    let [summary, _] = summary("neck", &arguments, 0);
+    assert_eq!(summary["armature_added"], serde_json::json!(["neck_a", "neck_b"]));
+}
+
+/// Checks that a robot with two balls as feet walks, though it cannot stand on them.
+#[test]
+fn two_balls_are_enough_to_walk() {
+    let robot = mjcf(&folder("balls_file"), &[("L", 0.0, 0.1), ("R", 0.0, -0.1)], "", 0);
+    let arguments = [&*robot, "--command", "0.2,0,0", "--seconds", "6", "--rate", "100"];
+    let [summary, _] = summary("balls", &arguments, 0);
+    assert_eq!(summary["gait"], "step, 0.2 s in the air, 0.02 s between swings");
+    let speed = numbers(&summary["mean_velocity"])[0];
+    assert!((speed - 0.2).abs() < 0.05, "{speed} m/s");
+}
+
 /// Checks that feet of an MJCF are found from its shapes, and its stand from a keyframe.
 #[test]
 fn an_mjcf_walks_from_its_keyframe() {
-    let robot = mjcf(&folder("mjcf_file"));
+    let robot = mjcf(&folder("mjcf_file"), &FOUR, "", 0);
     let arguments = [&*robot, "--command", "0,0,0.4", "--seconds", "2", "--rate", "50"];
     let [summary, _] = summary("mjcf", &arguments, 0);
     assert_eq!(summary["posture_source"], "keyframe `home`");

@@ -14,8 +14,8 @@ use crate::robot::{self, Format, Robot, RobotArguments, Root};
 use crate::terminal::{say, say_json};
 use crate::watch;
 use condyle::mpc::{Command, Gait, Pattern, Settings};
-use condyle::{Joint, Model};
-use feet::Given;
+use condyle::{Data, Joint, Model};
+use feet::{FoundFoot, Given};
 use record::{Push, Request, STEP};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,6 +23,9 @@ use walked::Walked;
 
 /// Armature of joints that move no inertia (kg m², kg).
 const ARMATURE: f64 = 1e-3;
+/// Inertia below which a joint gets the armature too, because its efforts would move it without bounds (kg m², kg). The
+/// lightest joints of real robots move 1e-5. The neck of an iCub moves 1e-16, because its links have no mass.
+const LIGHT: f64 = 1e-6;
 /// Largest accelerations of the command for a robot with two feet, and with more feet (m/s², m/s², rad/s²).
 const ACCELERATIONS: [[f64; 3]; 2] = [[0.3, 0.3, 1.0], [1.0, 1.0, 2.0]];
 /// Excess over a limit that is not reported (rad, rad/s, N m). The controller's limits of positions and speeds give
@@ -30,6 +33,11 @@ const ACCELERATIONS: [[f64; 3]; 2] = [[0.3, 0.3, 1.0], [1.0, 1.0, 2.0]];
 const EXCESS: f64 = 1e-3;
 /// Duration of a swing for a trunk at a height of 1 m (s). The factor gives 0.23 s for a Go2, and 0.42 s for a TALOS.
 const SWING: f64 = 0.42;
+/// The same for two feet that are balls. Only steps balance such a robot, so its steps are shorter.
+const SWING_ON_BALLS: f64 = 0.31;
+/// Time between two swings relative to a swing: of four feet or more, of two soles, and of two balls, on which the
+/// robot tips over.
+const SHARES: [f64; 3] = [0.17, 0.25, 0.1];
 /// Weight of the velocity to the left for a robot with two feet, which sways from foot to foot.
 const SWAY: f64 = 30.0;
 
@@ -240,7 +248,7 @@ fn load(arguments: &Arguments) -> Result<Robot, Error> {
 /// Chooses feet, posture and gait, and simulates the walk.
 fn walk(arguments: &Arguments) -> Result<Walked, Error> {
     let robot = load(arguments)?;
-    let (model, regular) = robot::regular(robot.model.clone(), ARMATURE)?;
+    let (model, regular) = regular(robot.model.clone())?;
     let solids = solids::read(&model, &robot);
     let mut stand = stand::begin(&model, arguments.posture.as_deref())?;
     let given = match (arguments.radius, arguments.sole) {
@@ -256,7 +264,7 @@ fn walk(arguments: &Arguments) -> Result<Walked, Error> {
     let feet_source = if names.is_empty() { "the lowest ends of limbs" } else { "given by --feet" }.to_owned();
     stand::bend(&model, &mut stand, &feet)?;
     stand::put_down(&model, &mut stand.q, &feet);
-    let (gait, gait_text) = gait(arguments, feet.len(), stand.q[2]);
+    let (gait, gait_text) = gait(arguments, &feet, stand.q[2]);
     let settings = settings(arguments, &gait, feet.len());
     let [vx, vy, wz] = arguments.command;
     let (model, command) = (Arc::new(model), Command { vx, vy, wz });
@@ -292,13 +300,37 @@ fn walk(arguments: &Arguments) -> Result<Walked, Error> {
     })
 }
 
+/// Adds an armature to joints that move no inertia, or nearly none. Returns their names.
+fn regular(model: Model) -> Result<(Model, Vec<String>), Error> {
+    let (model, mut names) = robot::regular(model, ARMATURE)?;
+    let mut data = Data::new(&model);
+    let inverse = condyle::minv(&model, &mut data, &condyle::neutral(&model));
+    let mut armature = model.armature().to_vec();
+    for body in &model.bodies()[2..] {
+        // 1/(M⁻¹)ᵢᵢ is the inertia that the effort of coordinate i moves
+        for k in body.idx_v..body.idx_v + body.joint.nv() {
+            let inertia = 1.0 / inverse[(k, k)];
+            if inertia < LIGHT || inertia.is_nan() {
+                armature[k] += ARMATURE;
+                names.push(body.joint_name.clone());
+            }
+        }
+    }
+    names.dedup();
+    Ok((model.with_armature(&armature)?, names))
+}
+
 /// Returns the gait and its description. `height` is the height of the trunk in the stand (m).
-fn gait(arguments: &Arguments, feet: usize, height: f64) -> (Gait, String) {
-    let name = arguments.gait.unwrap_or(if feet == 4 { GaitName::Trot } else { GaitName::Step });
+fn gait(arguments: &Arguments, feet: &[FoundFoot], height: f64) -> (Gait, String) {
+    let name = arguments.gait.unwrap_or(if feet.len() == 4 { GaitName::Trot } else { GaitName::Step });
     let Some(pattern) = name.pattern() else { return (Gait::Stand, "stand".to_owned()) };
+    let (factor, share) = match (feet.len(), feet.iter().any(|foot| foot.sole().is_none())) {
+        (2, true) => (SWING_ON_BALLS, SHARES[2]),
+        (2, false) => (SWING, SHARES[1]),
+        _ => (SWING, SHARES[0]),
+    };
     // A leg swings as a pendulum does: the duration of a swing grows with the root of the height.
-    let swing = arguments.swing.unwrap_or((SWING * height.max(0.05).sqrt() * 100.0).round() / 100.0);
-    let share = if feet == 2 { 0.25 } else { 0.17 };
+    let swing = arguments.swing.unwrap_or((factor * height.max(0.05).sqrt() * 100.0).round() / 100.0);
     let double = arguments.double.unwrap_or((share * swing * 100.0).round() / 100.0);
     let text = format!("{}, {swing} s in the air, {double} s between swings", name.name());
     (Gait::in_turn(pattern, swing, double), text)

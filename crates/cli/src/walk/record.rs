@@ -17,6 +17,8 @@ const EVERY: usize = 20;
 /// Limits that define a fall: the tilt of the trunk (rad), and its height relative to the stand.
 const TILTED: f64 = 0.8;
 const LOW: f64 = 0.55;
+/// Speed of a joint beyond which the simulated motion has no meaning (rad/s, m/s).
+const RUNAWAY: f64 = 1e4;
 /// Duration of a push (s).
 const PUSH_TIME: f64 = 0.1;
 /// Time after the command has reached its final value, from which mean velocities are computed (s).
@@ -185,6 +187,8 @@ pub(crate) fn simulate(request: &Request<'_>) -> Result<Walk, Error> {
         let status = simulation.step(&tau, if request.push.is_some() { &pushed } else { &[] });
         walk.fall = if !status.is_taken() {
             Some((t, format!("the simulation stopped: {status}")))
+        } else if let Some(what) = runaway(model, simulation.v()) {
+            Some((t, what))
         } else if trunk.tilt > TILTED {
             Some((t, format!("the trunk is tilted by {:.0}°", trunk.tilt.to_degrees())))
         } else if x[2] < LOW * request.q[2] {
@@ -205,6 +209,15 @@ pub(crate) fn simulate(request: &Request<'_>) -> Result<Walk, Error> {
     }
     bar.finish_and_clear();
     Ok(walk)
+}
+
+/// Describes a joint whose speed has no meaning, if there is one.
+fn runaway(model: &Model, v: &[f64]) -> Option<String> {
+    let fastest = (6..v.len()).max_by(|&a, &b| v[a].abs().total_cmp(&v[b].abs()))?;
+    let body = model.bodies().iter().find(|body| (body.idx_v..body.idx_v + body.joint.nv()).contains(&fastest))?;
+    let (name, speed) = (&body.joint_name, v[fastest].abs());
+    let what = format!("joint `{name}` moves at {speed:.0e} rad/s: check the inertias and effort limits of its links");
+    (speed >= RUNAWAY || speed.is_nan()).then_some(what)
 }
 
 /// Sums over the time steps since the last recorded state.

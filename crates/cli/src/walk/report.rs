@@ -33,7 +33,7 @@ pub(crate) fn text(walked: &Walked, violations: &[Violation]) -> String {
         text += &format!("  {angles}\n");
     }
     if !walked.regular.is_empty() {
-        text += &format!("joints that move no inertia got an armature: {}\n", walked.regular.join(", "));
+        text += &format!("joints that move hardly any inertia got an armature: {}\n", walked.regular.join(", "));
     }
     let (knots, knot_ms) = (settings.knots(), 1e3 * settings.knot);
     text += &format!("gait: {}\n", walked.gait_text);
