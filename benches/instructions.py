@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).resolve().parents[1]
 BASELINE = Path(__file__).with_suffix(".json")
-ROBOTS = ("arm7", "quadruped", "humanoid")
+ROBOTS = ("cart_pole", "quadrotor", "arm7", "quadruped", "humanoid")
 STATES, KNOTS, ITERATIONS = 16, 32, 5
 """Numbers of states, knots and iterations, equal to the numbers in instructions.rs."""
 PHASES = {

@@ -2,9 +2,13 @@
 //! callgrind, which finds the functions by name. Instruction counts are exact to 0.1 %, while times differ by 10 % from
 //! run to run.
 
-use condyle::optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
+use condyle::optimal::robot::{
+    Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, Integrator, Residual,
+};
 use condyle::optimal::{ActionModel, Fddp, Problem};
-use condyle::{Batch, ContactConstraint, Data, Model, neutral, random_configuration, robots};
+use condyle::{Batch, ContactConstraint, Data, Model, Se3, neutral, random_configuration, robots};
+use condyle_benches::{cart_pole, quadrotor};
+use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
@@ -113,8 +117,56 @@ fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, 
     (problem, x0.repeat(KNOTS + 1), u.repeat(KNOTS))
 }
 
+/// Time between two knots of a small robot (s).
+const DT: f64 = 0.03;
+
+/// Builds the optimal control problem of a body that flies to a pose, or of a cart with a pole that moves to its
+/// target. The rotors, and the force on the cart, act through a map.
+fn small(robot: &Arc<Model>) -> (Problem, Vec<f64>, Vec<f64>) {
+    let (nv, x0) = (robot.nv(), [neutral(robot), vec![0.0; robot.nv()]].concat());
+    let drives = match nv {
+        2 => DMatrix::from_column_slice(2, 1, &[1.0, 0.0]),
+        _ => DMatrix::from_fn(6, 4, |row, k| match row {
+            2 => 1.0,                               // thrust
+            3 => [0.0, 0.15, 0.0, -0.15][k],        // y f
+            4 => [-0.15, 0.0, 0.15, 0.0][k],        // −x f
+            5 => [0.015, -0.015, 0.015, -0.015][k], // drag
+            _ => 0.0,
+        }),
+    };
+    let drives = Actuation::matrix(robot, drives).expect("a map of this robot");
+    let weighted = Activation::Weighted((0..2 * nv).map(|k| if k < 3 { 0.1 } else { 100.0 }).collect());
+    let rest = |weight| Cost::new("rest", weight, Residual::State { reference: x0.clone() }, weighted.clone());
+    let effort = Residual::Control { reference: vec![0.0; drives.nu()] };
+    let effort = Cost::new("effort", 1e-5, effort, Activation::Quadratic);
+    let frame = robot.frames().last().expect("a robot has frames");
+    let there = |weight| match nv {
+        2 => {
+            let point = Residual::FrameTranslation { frame: frame.into(), target: [1.0, 0.0, 0.0].into() };
+            Cost::new("there", weight, point, Activation::Quadratic)
+        }
+        _ => {
+            let pose = Se3 { translation: [1.0, 0.5, 0.8].into(), ..Se3::identity() };
+            let pose = Residual::FramePlacement { frame: frame.into(), target: pose };
+            Cost::new("there", weight, pose, Activation::Quadratic)
+        }
+    };
+    let (nu, running) = (drives.nu(), vec![there(1e-2), rest(1e-5), effort]);
+    let model = FreeAcceleration::new(robot.clone(), drives, running).expect("costs of this robot");
+    let action = FreeDynamics::new(model, Integrator::SemiImplicitEuler, DT).expect("a step forward in time");
+    let end = FreeDynamics::terminal(robot.clone(), vec![there(1e2), rest(1e-3)]).expect("costs of this robot");
+    let problem = Problem::new(x0.clone(), vec![Box::new(action)], vec![0; KNOTS], Box::new(end));
+    (problem.expect("knots of one robot"), x0.repeat(KNOTS + 1), vec![0.0; KNOTS * nu])
+}
+
 fn main() {
-    let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
+    let robots = [
+        ("cart_pole", cart_pole()),
+        ("quadrotor", quadrotor()),
+        ("arm7", robots::arm7()),
+        ("quadruped", robots::quadruped()),
+        ("humanoid", robots::humanoid()),
+    ];
     let Some((_, m)) = std::env::args().nth(1).and_then(|name| robots.into_iter().find(|(robot, _)| *robot == name))
     else {
         println!("python3 benches/instructions.py runs this");
@@ -128,7 +180,8 @@ fn main() {
         ),
         _ => (&["left_sole", "right_sole"], &[("left_knee", 0.8), ("right_knee", 0.8)]),
     };
-    let (mut problem, xs, us) = motion(&Arc::new(m.clone()), feet, bent);
+    let robot = Arc::new(m.clone());
+    let (mut problem, xs, us) = if m.nv() < 7 { small(&robot) } else { motion(&robot, feet, bent) };
     let mut solver = Fddp::new(&problem);
     solver.settings.max_iterations = ITERATIONS;
     black_box(solver.solve(&mut problem, &xs, &us).expect("a warm start that fits"));

@@ -25,14 +25,16 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// Creates the schedule for a robot. Returns `None` if the robot has too few limbs.
+    /// Creates the schedule for a robot. Returns `None` if the robot has too few limbs, or if no step has two bodies: a
+    /// single body, for example a quadrotor, has the world as its second body of a step.
     pub(super) fn new(nodes: &[Node<f64>]) -> Option<Self> {
         // The first schedule treats all bodies as urgent, which determines the number of steps. In the second schedule,
         // bodies may wait for the lane of their parent if the number of steps stays the same.
         let hasty = Self::until(nodes, 0);
         let patient = Self::until(nodes, hasty.bodies.len() - 1);
         let schedule = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
-        (nodes.len() >= WORTH * (schedule.bodies.len() - 1)).then_some(schedule)
+        let steps = schedule.bodies.len() - 1;
+        (nodes.len() >= WORTH * steps && nodes.len() - 1 > steps).then_some(schedule)
     }
 
     /// Creates a schedule. If waiting would delay a body's subtree beyond step `last`, the body is urgent. Urgent

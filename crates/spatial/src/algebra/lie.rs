@@ -69,16 +69,34 @@ fn stumpff_far<S: Scalar>(t: S) -> [S; 6] {
     [l0, l1, l2, l3, l4, l5]
 }
 
-/// Computes k! cₖ(t) for t < 1 with Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)). The omitted terms are
-/// below double precision.
+/// Number of terms of the series of k! cₖ(t) in even powers of t, and in odd powers. The omitted terms are below double
+/// precision for t < 1.
+const TERMS: usize = 5;
+
+/// Returns the coefficients (−1)ʲ k!/(k + 2j)! of the series of k! cₖ(t), for even j and for odd j.
+const fn series_coefficients(k: u32) -> [[f64; 2]; TERMS] {
+    let (mut c, mut last, mut j) = ([[0.0; 2]; TERMS], 1.0, 0);
+    while j < 2 * TERMS {
+        c[j / 2][j % 2] = last;
+        j += 1;
+        let n = k + 2 * j as u32;
+        last /= -(((n - 1) * n) as f64);
+    }
+    c
+}
+
+/// Computes k! cₖ(t) for t < 1 as E(t²) + t O(t²), each with Horner's rule. Two short chains of products run in less
+/// time than one long chain.
 #[inline(always)]
 fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
-    let mut sum = S::one();
-    for j in 0..9 {
-        let last = K + 18 - 2 * j;
-        sum = (t * sum).mul_add(S::splat(-1.0 / f64::from((last - 1) * last)), S::one());
+    let c = const { series_coefficients(K) };
+    let square = t * t;
+    let (mut even, mut odd) = (S::splat(c[TERMS - 1][0]), S::splat(c[TERMS - 1][1]));
+    for j in (0..TERMS - 1).rev() {
+        even = even.mul_add(square, S::splat(c[j][0]));
+        odd = odd.mul_add(square, S::splat(c[j][1]));
     }
-    sum
+    odd.mul_add(t, even)
 }
 
 /// Computes the exponential of a rotation vector w: the rotation by the angle |w| about the axis w.
