@@ -82,7 +82,7 @@ struct Worker {
     /// Index of the knot, repeated.
     knot: Vec<usize>,
     knot_costs: Vec<f64>,
-    /// Whether each sequence has diverged, and the first knot that it did not reach; N + 1 if there is none.
+    /// Whether each sequence has diverged, and the first knot that it does not reach, or N + 1.
     failed: Vec<bool>,
     ends: Vec<usize>,
     /// Derivatives of the group at one knot, for each number of controls that occurs in the horizon.
@@ -223,9 +223,9 @@ impl Worker {
         }
     }
 
-    /// Computes the costs and the states of a group. After a sequence has diverged, its states in the scratch are x̂₀, so
-    /// that evaluations remain valid. A group with fewer sequences than lanes is filled up with such sequences: a robot
-    /// in contact is computed by other algorithms in a single state.
+    /// Computes the costs and the states of a group. After a sequence has diverged, its states in the scratch are x̂₀,
+    /// so that evaluations remain valid. A group with fewer sequences than lanes is filled up with such sequences,
+    /// because a single state of a robot in contact is computed by another algorithm.
     fn simulate(&mut self, given: Sequences<'_>, results: &mut RolloutResults<'_>) {
         let (count, nx, horizon) = (results.costs.len(), self.problem.nx(), self.problem.horizon());
         let width = self.width;
