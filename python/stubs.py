@@ -105,6 +105,7 @@ ARGUMENTS = {
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "str": """
         ArmMpc.frame Foot.point.frame Foot.sole.frame
+        _Collisions.format _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
         _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
         text FrictionContact.frame Task.frame""",
     "str | int": """
@@ -115,6 +116,7 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
+        _DistancePairs._evaluate.states _DistancePairs._place.geometry
         Schedule.model Schedule.switch.model
         count facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states
@@ -143,7 +145,7 @@ ARGUMENTS = {
     "Sequence[tuple[str, float, float]]": "Gait.table.swings",
     "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
-    "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+    "bool": """_DistancePairs._evaluate.gradients _generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
     "list[tuple[int, Residual]]": " ".join(
         f"{kind}Dynamics._from_parts.written"
@@ -161,6 +163,8 @@ ARGUMENTS = {
     'Literal["position", "velocity"]': "integrate_jacobian.argument",
     'Literal["from", "to"]': "difference_jacobian.argument",
     "_Path": "path original",
+    "_Path | None": "_Collisions.path _Collisions._srdf.path",
+    "str | None": "_Collisions.text _Collisions._srdf.text",
     "Sequence[_Kind]": "allow",
     "Sequence[_Path]": "packages",
     "_RootJoint": "root_joint",
@@ -185,7 +189,7 @@ ARGUMENTS = {
     "_Size": "Foot.sole.size WrenchCone.size Residual.center_of_pressure.size",
     "Activation": "activation",
     "Residual": "residual",
-    "Sequence[tuple[Sphere, Sphere]]": "Residual.distances.pairs",
+    "Sequence[tuple[Sphere | Geometry, Sphere | Geometry]]": "Residual.distances.pairs",
     "Sequence[Cost]": "costs",
     "Sequence[Limit]": "limits",
     "dict[int, Sequence[Cost]]": "costs_at",
@@ -238,6 +242,7 @@ ARGUMENTS = {
 # Types of results and properties, by `Class.name` or the function's name. An entry for a class holds for the methods of
 # this class. Without an entry, a function that takes `out` returns an array, and a static method returns its class.
 SETTABLE = {  # properties that can be assigned, with the type of the value
+    "_DistancePairs.cutoff": "float",
     "AugmentedLagrangian.inner": "Mapping[str, Any]",
     "AugmentedLagrangian.settings": "Mapping[str, Any]",
     "Fddp.settings": "Mapping[str, Any]",
@@ -268,7 +273,7 @@ RESULTS = {
         getAcceleration getClassicalAcceleration getFrameAcceleration getFrameClassicalAcceleration getFrameVelocity
         getVelocity""",
     "Force": "computeCentroidalMomentum _SpelledData.hg",
-    "list[_Array]": "_SpelledData.com",
+    "list[_Array]": "_DistancePairs._evaluate _SpelledData.com",
     "tuple[_Array, _Array, _Array]": "_SpelledData._state",
     "_Array | None": "Joint.axis FrictionContact.corners",
     "_Array | list[_Array]": "Problem.quasi_static",
@@ -276,6 +281,7 @@ RESULTS = {
         FrictionCone.bounds WrenchCone.bounds body_acceleration_derivatives frame_acceleration_derivatives
         frame_classical_acceleration_derivatives""",
     "float": """
+        _DistancePairs.cutoff
         HyperDual.eps1 HyperDual.eps1eps2 HyperDual.eps2 HyperDual.re Model.total_mass Simulation.time
         distance kinetic_energy mechanical_energy potential_energy
         FrictionContact.friction FrictionContact.max_force FrictionContact.min_force Plan.activation
@@ -284,6 +290,7 @@ RESULTS = {
     "tuple[float, float]": "Plan.span",
     "Data": "_SpelledData._ours",
     "int": """
+        _Collisions._fit _DistancePairs.__len__
         _SpelledData._given ConstraintSet.__len__ ConstraintSet.rows Joint.nq Joint.nv Ltdl.nonzeros Model.frame
         Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority
         AugmentedLagrangian.retime Fddp.retime InteriorPoint.retime Record.__len__ Schedule.model""",
@@ -291,6 +298,7 @@ RESULTS = {
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
     "str": """
+        _Collisions._geometries _Collisions._pairs
         Foot.frame
         Model.name Model.to_json Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame
         Task.kind""",
@@ -305,6 +313,7 @@ RESULTS = {
     "Command": "WholeBodyController.command WholeBodyController.step",
     "KktResiduals": "WholeBodyController.kkt_residuals",
     "None": """
+        _Collisions._disable _Collisions._srdf _DistancePairs._place
         ArmMpc.reset JointPolicy.release JointPolicy.stop WholeBodyMpc.command WholeBodyMpc.prepare WholeBodyMpc.reset
         WholeBodyMpc.set_gait WholeBodyMpc.terrain
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
@@ -326,7 +335,10 @@ RESULTS = {
     "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
-    "list[str]": "Model.body_names Model.joint_types Model.names",
+    "int | None": "_DistancePairs._find",
+    "list[tuple[int, int, str]]": "_DistancePairs._replacements",
+    "list[tuple[str, str, str]]": "_Collisions._meshes",
+    "list[str]": "_Collisions._warnings Model.body_names Model.joint_types Model.names",
     "list[ModelWarning]": "Model.warnings",
     "list[Spring]": "Model.springs",
     "list[GravityCompensation]": "Model.gravity_compensation",
@@ -583,9 +595,9 @@ from typing_extensions import disjoint_base
 def main() -> None:
     """Writes the stub file, or compares the text with the existing file."""
     sys.path.pop(0)  # the folder of the sources, where the module is not built
-    from condyle import _condyle, _inertia, _mpc, _types, _wholebody
+    from condyle import _condyle, _inertia, _mpc, _types, _wholebody, distances
 
-    text = stub(_condyle, _types, [_inertia, _mpc, _wholebody])
+    text = stub(_condyle, _types, [_inertia, _mpc, _wholebody, distances])
     if sys.argv[1:] != ["--check"]:
         FILE.write_text(text, encoding="utf-8")
     elif FILE.read_text(encoding="utf-8") != text:

@@ -18,6 +18,7 @@ Each time is the median of rounds.
 import argparse
 import json
 import statistics
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -44,10 +45,12 @@ LIMBS = {
 
 
 def robots() -> Path:
-    """Returns the folder of example-robot-data."""
-    from example_robot_data.robots_loader import getModelPath
-
-    return Path(getModelPath("panda_description/urdf/panda.urdf")) / "panda_description" / ".."
+    """Returns the folder of the robots of example-robot-data."""
+    folders = [Path(place) / "cmeel.prefix" / "share" / "example-robot-data" / "robots" for place in sys.path]
+    found = [folder for folder in folders if folder.is_dir()]
+    if not found:
+        raise SystemExit("the package example-robot-data is not installed")
+    return found[0]
 
 
 def median_time(run: Callable[[], Any], rounds: int = 7) -> float:

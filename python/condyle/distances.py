@@ -137,7 +137,7 @@ def _geometry(model: Model, geometry: Geometry) -> dict[str, Any]:
     found: dict[str, Any] = {"name": geometry.name, "shape": _encoded(geometry.shape)}
     if geometry.frame is not None:
         frame = geometry.frame
-        index = frame if isinstance(frame, int) else model.frame_id(frame)
+        index = frame if isinstance(frame, int) else model.frame(frame)
         found["frame"] = {"name": model.frames[index].name, "kind": model.frames[index].kind.title()}
     if geometry.placement is not None:
         pose = np.asarray(geometry.placement, dtype=float)

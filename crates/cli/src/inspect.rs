@@ -6,6 +6,7 @@ use crate::findings::{self, Finding};
 use crate::limits::LimitCounts;
 use crate::lines::{Kind, Lines};
 use crate::robot::{self, Robot, RobotArguments};
+use crate::shapes::Shapes;
 use crate::terminal::{Style, Table, heading, say, say_json, short, styled};
 use condyle::{Data, Model, forward_kinematics, neutral, tree::Body, tree::FrameKind};
 use serde::Serialize;
@@ -55,6 +56,7 @@ struct Report {
     mimics: Vec<Follower>,
     #[serde(flatten)]
     additions: Additions,
+    collisions: Shapes,
     warnings: Vec<Finding>,
 }
 
@@ -158,6 +160,7 @@ impl Report {
             },
             mimics: followers(robot, arguments, &lines),
             additions: Additions::new(model),
+            collisions: Shapes::new(robot, &arguments.robot.options),
             warnings: findings::of(model, &lines),
         }
     }
@@ -207,6 +210,7 @@ impl Report {
             }
         }
         *out += &self.additions.text();
+        *out += &self.collisions.text();
         *out += &heading("Warnings");
         if self.warnings.is_empty() {
             *out += &format!("  {}\n", styled(Style::Good, "none"));

@@ -25,6 +25,7 @@ mod record;
 mod report;
 mod robot;
 mod scene;
+mod shapes;
 mod states;
 mod task;
 mod terminal;

@@ -69,6 +69,30 @@ fn inspect_describes_the_model() {
     assert_eq!(fixed["nv"], 12);
 }
 
+/// Checks that the collision shapes are listed, with the nearest pair and with shapes that are left out.
+#[test]
+fn inspect_lists_collision_shapes() {
+    let folder = folder("shapes");
+    let ball = |x: f64| {
+        format!("<collision><origin xyz=\"{x} 0 0\"/><geometry><sphere radius=\"0.1\"/></geometry></collision>")
+    };
+    let mut urdf = chain(&[1.0, 1.0, 1.0]);
+    for (link, x) in [("link0", 0.0), ("link2", 0.5)] {
+        urdf = urdf.replace(&format!("<link name=\"{link}\">"), &format!("<link name=\"{link}\">{}", ball(x)));
+    }
+    let mesh = "<link name=\"base\"><collision><geometry><mesh filename=\"a.stl\"/></geometry></collision></link>";
+    std::fs::write(folder.join("robot.urdf"), urdf.replace("<link name=\"base\"/>", mesh)).unwrap();
+    let path = folder.join("robot.urdf");
+    let report = json(&["inspect", path.to_str().unwrap(), "--json"], 0);
+    let shapes = &report["collisions"];
+    assert_eq!(shapes["shapes"].as_array().unwrap().len(), 2);
+    assert_eq!((shapes["shapes"][1]["link"].as_str(), shapes["pairs"].as_u64()), (Some("link2"), Some(1)));
+    assert!((shapes["nearest"]["distance"].as_f64().unwrap() - 0.3).abs() < 1e-12, "{shapes}");
+    assert!(shapes["left_out"][0].as_str().unwrap().contains("the mesh `a.stl`"));
+    let text = said(&["inspect", path.to_str().unwrap()], 0);
+    assert!(text.contains("1 pair can collide; the nearest at the neutral position: link0_0 and link2_0, 0.3000 m"));
+}
+
 #[test]
 fn inspect_warns_with_line_numbers() {
     let folder = folder("odd");

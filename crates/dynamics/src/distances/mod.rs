@@ -45,6 +45,7 @@
 mod box_pair;
 mod boxes;
 mod curved;
+mod lanes;
 mod pairs;
 #[doc(hidden)]
 pub mod prepared;

@@ -1,5 +1,7 @@
 //! Pairs of geometries, prepared for one robot.
 
+use super::lanes::{self, PADDING, ROW, Slopes};
+use super::prepared::Method;
 use super::results::Distances;
 use super::round::{Witness, norm};
 use super::solid::{Solid, distance, is_exact};
@@ -31,11 +33,11 @@ pub(crate) struct Placed {
     shape: Shape,
     /// Index of the body; 0 is the world.
     pub(crate) body: usize,
-    /// Pose of the geometry's frame in its body.
+    /// Pose of the geometry's frame in the internal frame of its body, which is rotated to the joint axis.
     frame: Se3<f64>,
-    /// Shape in the coordinates of the body.
+    /// Shape in the internal frame of the body.
     pub(crate) solid: Solid,
-    /// Centre of the bounding sphere in the coordinates of the body, and its radius.
+    /// Centre of the bounding sphere in the internal frame of the body, and its radius.
     bound: (Vec3<f64>, f64),
 }
 
@@ -68,6 +70,8 @@ pub(crate) struct Pair {
     pub geometries: [usize; 2],
     /// First column of the path between both bodies, and the index after the last.
     pub path: [usize; 2],
+    /// Method of computing the distance.
+    method: Method,
 }
 
 /// Pairs of geometries, prepared for one robot: poses in bodies, and the joints between both bodies of each pair.
@@ -78,6 +82,11 @@ pub struct DistancePairs {
     pub(crate) geometries: Vec<Placed>,
     pub(crate) pairs: Vec<Pair>,
     pub(crate) path: Vec<PathColumn>,
+    /// Signs of columns for gradients in lanes: one row for each pair of bodies. Empty if coordinates drive several
+    /// columns.
+    signs: Vec<f64>,
+    /// Row of signs of each pair.
+    sign_of: Vec<u32>,
     replacements: Vec<Replacement>,
     cutoff: f64,
     pub(crate) nv: usize,
@@ -95,11 +104,15 @@ impl DistancePairs {
             geometries: Vec::new(),
             pairs: Vec::with_capacity(pairs.len()),
             path: Vec::new(),
+            signs: Vec::new(),
+            sign_of: Vec::new(),
             replacements: Vec::new(),
             cutoff: f64::INFINITY,
             nv: model.nv(),
             bodies: model.nodes().len(),
         };
+        let is_dense = model.columns().iter().enumerate().all(|(k, c)| c.coordinate == k && c.ratio == 1.0);
+        let mut rows = Vec::new();
         for (pair, both) in pairs.iter().enumerate() {
             let [first, second] = both.resolve(model, pair)?;
             let exact = is_exact(&both.first.shape, &both.second.shape);
@@ -111,11 +124,20 @@ impl DistancePairs {
                 if shape != geometry.shape {
                     all.replacements.push(Replacement { pair, side, shape: geometry.shape, capsule: shape });
                 }
-                geometries[side] = all.add(geometry, shape, body, pose);
+                let turned = Se3::new(model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
+                geometries[side] = all.add(geometry, shape, body, turned * pose);
             }
             let begin = all.path.len();
             all.add_path(model, [first.0, second.0]);
-            all.pairs.push(Pair { geometries, path: [begin, all.path.len()] });
+            let method = match geometries.map(|g| all.geometries[g].solid) {
+                [Solid::Sphere(_), Solid::Sphere(_)] => Method::Spheres,
+                [Solid::Sphere(_) | Solid::Capsule(_), Solid::Sphere(_) | Solid::Capsule(_)] => Method::Capsules,
+                _ => Method::Other,
+            };
+            all.pairs.push(Pair { geometries, path: [begin, all.path.len()], method });
+            if is_dense {
+                all.add_signs([first.0, second.0], begin, &mut rows);
+            }
         }
         Ok(all)
     }
@@ -150,6 +172,25 @@ impl DistancePairs {
                 self.path.push(PathColumn { column: c, coordinate: column.coordinate, ratio });
             }
         }
+    }
+
+    /// Adds the signs of the columns between two bodies, unless `rows` already contains the bodies.
+    fn add_signs(&mut self, bodies: [usize; 2], begin: usize, rows: &mut Vec<[usize; 2]>) {
+        let row = rows.iter().position(|row| *row == bodies).unwrap_or_else(|| {
+            let (first, stride) = (self.signs.len(), self.stride());
+            self.signs.resize(first + stride, 0.0);
+            for path in &self.path[begin..] {
+                self.signs[first + path.coordinate] = path.ratio;
+            }
+            rows.push(bodies);
+            rows.len() - 1
+        });
+        self.sign_of.push(row as u32);
+    }
+
+    /// Returns the padded number of columns.
+    fn stride(&self) -> usize {
+        self.nv.next_multiple_of(PADDING)
     }
 
     /// Returns the number of pairs.
@@ -270,13 +311,31 @@ impl DistancePairs {
         self.check(placements, distances);
         self.evaluate(placements, distances);
         let columns = &placements.world.S;
-        distances.gradients.fill(0.0);
-        for (k, pair) in self.pairs.iter().enumerate().filter(|&(k, _)| distances.near[k]) {
-            let row = &mut distances.gradients[k * self.nv..][..self.nv];
-            // the line of the force n contains both witness points, so one moment serves for both bodies
-            let f = Force::at_point(distances.points[k][0], distances.normals[k]);
-            for path in &self.path[pair.path[0]..pair.path[1]] {
-                row[path.coordinate] += path.ratio * columns[path.column].dot(f); // nᵀ (J₁ − J₂)
+        if !self.signs.is_empty() {
+            let stride = self.stride();
+            for (c, column) in columns.iter().enumerate() {
+                for (row, x) in column.to_array().into_iter().enumerate() {
+                    distances.columns[row * stride + c] = x;
+                }
+            }
+            let Distances { columns, found, gradients, .. } = distances;
+            let Self { signs, sign_of, nv, .. } = self;
+            lanes::gradients(&Slopes { columns, stride, signs, sign_of, results: found, nv: *nv }, gradients);
+        } else {
+            distances.gradients.fill(0.0);
+            for (k, pair) in self.pairs.iter().enumerate() {
+                let row = &mut distances.gradients[k * self.nv..][..self.nv];
+                // the line of the force n contains both witness points, so one moment serves for both bodies
+                let [_, x, y, z, nx, ny, nz, _] = distances.found[k];
+                let f = Force::at_point(Vec3::new(x, y, z), Vec3::new(nx, ny, nz));
+                for path in &self.path[pair.path[0]..pair.path[1]] {
+                    row[path.coordinate] += path.ratio * columns[path.column].dot(f); // nᵀ (J₁ − J₂)
+                }
+            }
+        }
+        if self.cutoff < f64::INFINITY {
+            for (k, _) in distances.near.iter().enumerate().filter(|(_, near)| !**near) {
+                distances.gradients[k * self.nv..][..self.nv].fill(0.0);
             }
         }
     }
@@ -291,23 +350,38 @@ impl DistancePairs {
 
     /// Computes distances, witness points and normals.
     fn evaluate(&self, placements: Placements<'_, f64>, distances: &mut Distances) {
-        for (placed, (solid, bound)) in self.geometries.iter().zip(&mut distances.solids) {
-            if placed.body == 0 {
-                (*solid, *bound) = (placed.solid, placed.bound.0);
-            } else {
-                let pose = placements.body(placed.body);
-                (*solid, *bound) = (placed.solid.moved(&pose), pose.act(placed.bound.0));
+        let Distances { solids, rounds, items, found, near, .. } = distances;
+        for (g, placed) in self.geometries.iter().enumerate() {
+            let X = if placed.body == 0 { Se3::identity() } else { placements.world.oX[placed.body] };
+            solids[g] = (placed.solid.moved(&X), X.act(placed.bound.0));
+            if let Solid::Sphere(round) | Solid::Capsule(round) = &solids[g].0 {
+                rounds[g] = lanes::row(round);
             }
         }
-        for (k, &Pair { geometries: [a, b], .. }) in self.pairs.iter().enumerate() {
-            let bounds = [a, b].map(|g| (distances.solids[g].1, self.geometries[g].bound.1));
-            let far = self.beyond(bounds);
-            let Witness { distance, points, normal } =
-                far.unwrap_or_else(|| distance(&distances.solids[a].0, &distances.solids[b].0));
-            distances.near[k] = far.is_none();
-            distances.distances[k] = distance;
-            distances.points[k] = points;
-            distances.normals[k] = normal;
+        let (mut front, mut back) = (0, items.len());
+        for (k, &Pair { geometries: [a, b], method, .. }) in self.pairs.iter().enumerate() {
+            let far = self.beyond([a, b].map(|g| (solids[g].1, self.geometries[g].bound.1)));
+            near[k] = far.is_none();
+            match (far, method) {
+                (None, Method::Spheres) => {
+                    items[front] = [k, a, b].map(|index| index as u32);
+                    front += 1;
+                }
+                (None, Method::Capsules) => {
+                    back -= 1;
+                    items[back] = [k, a, b].map(|index| index as u32);
+                }
+                _ => {
+                    let w = far.unwrap_or_else(|| distance(&solids[a].0, &solids[b].0));
+                    let (p, n) = (w.points[0], w.normal);
+                    found[k] = [w.distance, p.x, p.y, p.z, n.x, n.y, n.z, 0.0];
+                }
+            }
+        }
+        lanes::compute(&items[..front], rounds, true, found);
+        lanes::compute(&items[back..], rounds, false, found);
+        for (distance, row) in distances.distances.iter_mut().zip(&distances.found) {
+            *distance = row[0];
         }
     }
 
@@ -327,14 +401,16 @@ impl DistancePairs {
 impl Distances {
     /// Allocates the results of prepared pairs.
     pub fn new(pairs: &DistancePairs) -> Self {
-        let n = pairs.len();
+        let (n, stride) = (pairs.len(), pairs.stride());
         Self {
             solids: pairs.geometries.iter().map(|placed| (placed.solid, Vec3::zero())).collect(),
+            rounds: vec![[0.0; ROW]; pairs.geometries.len()],
+            items: vec![[0; 3]; n],
+            found: vec![[0.0; ROW]; n],
             distances: vec![0.0; n],
-            points: vec![[Vec3::zero(); 2]; n],
-            normals: vec![Vec3::zero(); n],
             near: vec![false; n],
-            gradients: vec![0.0; n * pairs.nv()],
+            columns: vec![0.0; 6 * stride],
+            gradients: vec![0.0; n * pairs.nv() + PADDING],
             nv: pairs.nv(),
         }
     }

@@ -1,5 +1,6 @@
 //! Results of distances at one position.
 
+use super::lanes::{Item, Row};
 use super::solid::Solid;
 use alloc::vec::Vec;
 use condyle_linalg::{check, check_index};
@@ -11,15 +12,21 @@ use nalgebra::DMatrix;
 pub struct Distances {
     /// Shapes in the world, and the centres of their bounding spheres. Written by: `evaluate`.
     pub(crate) solids: Vec<(Solid, Vec3<f64>)>,
+    /// Rows of the spheres and capsules in the world; zeros for other shapes. Written by: `evaluate`.
+    pub(crate) rounds: Vec<Row>,
+    /// Pairs of spheres within the cutoff from the front, and pairs of capsules from the back. Shape: pairs. Written
+    /// by: `evaluate`.
+    pub(crate) items: Vec<Item>,
+    /// Distance, point on the first shape and normal of each pair. Written by: `evaluate`.
+    pub(crate) found: Vec<Row>,
     /// Signed distances (m). Written by: `evaluate`.
     pub(crate) distances: Vec<f64>,
-    /// Witness points in the world (m). Written by: `evaluate`.
-    pub(crate) points: Vec<[Vec3<f64>; 2]>,
-    /// Unit vectors from the second to the first shape, in the world. Written by: `evaluate`.
-    pub(crate) normals: Vec<Vec3<f64>>,
     /// Whether each pair is within the cutoff. Written by: `evaluate`.
     pub(crate) near: Vec<bool>,
-    /// Gradients with respect to the tangent of q, one row per pair. Shape: pairs × nv. Written by: `gradients`.
+    /// Joint columns S in the world, one row for each component. Shape: 6 × padded nv. Written by: `gradients`.
+    pub(crate) columns: Vec<f64>,
+    /// Gradients with respect to the tangent of q, one row per pair, and padding after the last row. Shape: pairs × nv.
+    /// Written by: `gradients`.
     pub(crate) gradients: Vec<f64>,
     pub(crate) nv: usize,
 }
@@ -47,8 +54,10 @@ impl Distances {
     /// Panics if the pair does not exist.
     #[track_caller]
     pub fn points(&self, pair: usize) -> [Vec3<f64>; 2] {
-        check_index("pair", pair, self.points.len(), "pairs");
-        self.points[pair]
+        check_index("pair", pair, self.found.len(), "pairs");
+        let [d, x, y, z, ..] = self.found[pair];
+        let p = Vec3::new(x, y, z);
+        [p, p - self.normal(pair).scale(d)]
     }
 
     /// Returns the unit vector n in the world from the second to the first shape. If the first shape moves along n, the
@@ -58,8 +67,9 @@ impl Distances {
     /// Panics if the pair does not exist.
     #[track_caller]
     pub fn normal(&self, pair: usize) -> Vec3<f64> {
-        check_index("pair", pair, self.normals.len(), "pairs");
-        self.normals[pair]
+        check_index("pair", pair, self.found.len(), "pairs");
+        let [.., x, y, z, _] = self.found[pair];
+        Vec3::new(x, y, z)
     }
 
     /// Returns whether the distance of a pair was computed. Otherwise the bounding spheres of the pair are farther
@@ -85,7 +95,7 @@ impl Distances {
 
     /// Returns all gradients, one row after the other: pairs × nv numbers.
     pub fn gradients(&self) -> &[f64] {
-        &self.gradients
+        &self.gradients[..self.distances.len() * self.nv]
     }
 
     /// Returns the index and the distance (m) of the nearest pair; `None` without pairs.
@@ -119,7 +129,7 @@ impl Distances {
         check("weights", weights.len(), self.distances.len());
         let nv = self.nv;
         assert!(H.shape() == (nv, nv), "H: expected {nv} × {nv}, found {:?}", H.shape());
-        for (g, &weight) in self.gradients.chunks_exact(nv.max(1)).zip(weights) {
+        for (g, &weight) in self.gradients().chunks_exact(nv.max(1)).zip(weights) {
             for (column, &right) in H.as_mut_slice().chunks_exact_mut(nv.max(1)).zip(g) {
                 if right != 0.0 {
                     for (entry, &left) in column.iter_mut().zip(g) {

@@ -114,6 +114,29 @@ pub(crate) fn spheres<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witness
     Witness { distance, points, normal }.enlarged(first.radius, second.radius)
 }
 
+/// Nearest pair of points so far: their parameters, difference and squared distance.
+#[derive(Clone, Copy)]
+struct Nearest<S> {
+    s: S,
+    t: S,
+    d: Vec3<S>,
+    least: S,
+}
+
+impl<S: Scalar> Nearest<S> {
+    /// Replaces the pair by the pair with the parameters (s, t), if the latter is nearer.
+    #[inline(always)]
+    fn consider(&mut self, [w, h1, h2]: [Vec3<S>; 3], s: S, t: S) {
+        let d = w + h1.scale(s) - h2.scale(t);
+        let found = d.norm_squared();
+        let better = found.lt(self.least);
+        self.s = S::select(better, s, self.s);
+        self.t = S::select(better, t, self.t);
+        self.d = choose::<S>(better, d, self.d);
+        self.least = S::select(better, found, self.least);
+    }
+}
+
 /// Returns the distance of two capsules.
 ///
 /// The distance is exact, also if the capsules overlap: the difference of two segments is a parallelogram, which has no
@@ -128,28 +151,20 @@ pub(crate) fn capsules<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witnes
     let square = n.norm_squared();
 
     let one = S::one();
-    let (mut s, mut t, mut d) = (one, clamp(ratio(b + f, e)), Vec3::zero());
-    d = d + w + h1 - h2.scale(t); // the side s = 1
-    let mut least = d.norm_squared();
-    let mut consider = |u: S, v: S, skip: Option<S::Mask>| {
-        let x = w + h1.scale(u) - h2.scale(v);
-        let found = x.norm_squared();
-        let found = skip.map_or(found, |skip| S::select(skip, S::splat(f64::INFINITY), found));
-        let better = found.lt(least);
-        s = S::select(better, u, s);
-        t = S::select(better, v, t);
-        d = choose::<S>(better, x, d);
-        least = S::select(better, found, least);
-    };
-    consider(-one, clamp(ratio(f - b, e)), None); // the side s = −1
-    consider(clamp(ratio(b - c, a)), one, None); // the side t = 1
-    consider(clamp(ratio(-b - c, a)), -one, None); // the side t = −1
+    let t = clamp(ratio(b + f, e));
+    let d = w + h1 - h2.scale(t);
+    let mut best = Nearest { s: one, t, d, least: d.norm_squared() }; // the side s = 1
+    best.consider([w, h1, h2], -one, clamp(ratio(f - b, e))); // the side s = −1
+    best.consider([w, h1, h2], clamp(ratio(b - c, a)), one); // the side t = 1
+    best.consider([w, h1, h2], clamp(ratio(-b - c, a)), -one); // the side t = −1
     let parallel = square.lt(a * e * S::splat(PARALLEL) + S::splat(COINCIDENT));
     let inverse = S::select(parallel, one, square).recip();
     let u = h2.cross(w).dot(n) * inverse;
     let v = h1.cross(w).dot(n) * inverse;
-    let outside = S::or(one.lt(u.abs()), one.lt(v.abs()));
-    consider(clamp(u), clamp(v), Some(S::or(parallel, outside))); // the interior
+    // a point outside of the segments is replaced by a point of a side, which changes nothing
+    let outside = S::or(parallel, S::or(one.lt(u.abs()), one.lt(v.abs())));
+    best.consider([w, h1, h2], S::select(outside, best.s, u), S::select(outside, best.t, v)); // the interior
+    let Nearest { s, t, d, least } = best;
 
     let size = a + e + w.norm_squared();
     let touch = least.lt(size * S::splat(TOUCHING) + S::splat(COINCIDENT));

@@ -9,6 +9,7 @@
 //! So each direction gives a lower bound, and the normal of the result must attain the distance.
 
 use crate::common::{all_models, normal3, random_pose, random_rotation, rng};
+use crate::counting::allocations;
 use condyle_dynamics::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
 use condyle_dynamics::{Act, Data, Error, Mat3, Model, Se3, Vec3, forward_kinematics, integrate, neutral, robots};
 use nalgebra::DMatrix;
@@ -328,6 +329,31 @@ fn results_of_many_pairs() {
         }
     }
     assert!(far > 0 && far < pairs.len(), "{far}");
+}
+
+/// Checks that evaluations, changes of placements and copies of results do not allocate later.
+#[test]
+fn evaluations_do_not_allocate() {
+    for (seed, model) in all_models(1).iter().enumerate() {
+        let mut random = rng(seed as u64);
+        let mut pairs = DistancePairs::new(model, &pairs_on(model, &mut random)).unwrap();
+        let mut data = Data::new(model);
+        let mut distances = Distances::new(&pairs).clone();
+        let mut H = DMatrix::zeros(model.nv(), model.nv());
+        let weights = vec![1.0; pairs.len()];
+        let q = neutral(model);
+        for cutoff in [f64::INFINITY, 0.2] {
+            pairs.set_cutoff(cutoff);
+            let count = allocations(|| {
+                let placements = forward_kinematics(model, &mut data, &q);
+                pairs.place(0, Se3::identity());
+                pairs.values(placements, &mut distances);
+                pairs.gradients(placements, &mut distances);
+                distances.add_gauss_newton(&weights, &mut H);
+            });
+            assert_eq!(count, 0);
+        }
+    }
 }
 
 /// Checks that a replaced cylinder is reported, that its capsule contains it, and that equal geometries are shared.

@@ -13,6 +13,7 @@ mod inverse;
 mod limits;
 mod motion;
 mod own;
+mod shapes;
 mod together;
 
 use condyle_dynamics::{
