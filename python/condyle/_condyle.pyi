@@ -55,6 +55,7 @@ from ._types import (
     SweepResult,
 )
 from ._wholebody import Command, Gains, KktResiduals, References, Settings
+from .distances import Geometry
 
 __all__ = [
     "ARM7",
@@ -113,6 +114,10 @@ __all__ = [
     "WholeBodyController",
     "WholeBodyMpc",
     "WrenchCone",
+    "_Collisions",
+    "_DifferentialIk",
+    "_DistancePairs",
+    "_GlobalIk",
     "_SpelledData",
     "_SpelledModel",
     "__version__",
@@ -1363,6 +1368,64 @@ def static_torque_derivative(
     q: position, nq numbers; f_ext: as for `rnea`, constant in the bodies' frames.
     """
 
+@final
+class _Collisions:
+    """Collision shapes of a robot's file; see `condyle.distances.Collisions`.
+
+    format: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
+    """
+
+    def __new__(cls, format: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
+    def _disable(self, first: str, second: str) -> None:
+        """Disables the pairs of two links."""
+
+    def _fit(self, kind: str) -> int:
+        """Replaces meshes by shapes. Returns their number."""
+
+    def _geometries(self) -> str:
+        """Returns the geometries in JSON."""
+
+    def _meshes(self) -> list[tuple[str, str, str]]:
+        """Returns name, link and file of each mesh."""
+
+    def _pairs(self, model: Model) -> str:
+        """Returns the pairs that can collide, in JSON."""
+
+    def _srdf(self, path: _Path | None, text: str | None) -> None:
+        """Disables the pairs of links that an SRDF lists."""
+
+    def _warnings(self) -> list[str]:
+        """Returns the warnings as text."""
+
+@final
+class _DistancePairs:
+    """Pairs of geometries, prepared for one robot; see `condyle.distances.DistancePairs`.
+
+    model: the robot; text: a list of pairs in JSON.
+    """
+
+    def __new__(cls, model: Model, text: str) -> _DistancePairs: ...
+    @property
+    def cutoff(self) -> float:
+        """The largest distance of interest (m)."""
+
+    @cutoff.setter
+    def cutoff(self, cutoff: float) -> None: ...
+    def __len__(self, /) -> int: ...
+    def _evaluate(self, model: Model, data: Data, q: ArrayLike, states: int, gradients: bool) -> list[_Array]:
+        """Computes distances (N, n), points (N, n, 2, 3), normals (N, n, 3) and, if `gradients`, gradients (N, n, nv) of n
+        pairs at N positions.
+        """
+
+    def _find(self, name: str) -> int | None:
+        """Returns the index of the geometry with a name, or None."""
+
+    def _place(self, geometry: int, placement: ArrayLike) -> None:
+        """Sets the placement of a geometry."""
+
+    def _replacements(self) -> list[tuple[int, int, str]]:
+        """Returns (pair, side, kind) of each geometry that a capsule replaces."""
+
 def _borrowed(capsule: Any) -> tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]:
     """Describes the array that a DLPack capsule lends. The caller must keep the capsule alive while it uses the array.
     This function does not take ownership of the array.
@@ -1661,6 +1724,71 @@ class HyperDual:
 
     def tanh(self) -> HyperDual:
         """Returns the hyperbolic tangent of self."""
+
+@final
+class _DifferentialIk:
+    """Steps of differential inverse kinematics; see `condyle.ik.DifferentialIk`."""
+
+    def __new__(
+        cls,
+        model: Model,
+        tasks: Sequence[Task],
+        dt: float,
+        damping: float,
+        limits: Sequence[Limit],
+        distances: tuple[str, float, float, float] | None,
+    ) -> _DifferentialIk: ...
+    def _converge(
+        self, q: ArrayLike, frames: ArrayLike, com: ArrayLike, posture: ArrayLike, tolerance: list[float], steps: int
+    ) -> tuple[_Array, int, _Array]:
+        """Makes many steps: returns the last position, the number of steps and the errors there."""
+
+    def _describe(self, kind: str, index: int) -> str:
+        """Returns a limit in words."""
+
+    def _hold(self, q: ArrayLike) -> tuple[_Array, _Array, _Array]:
+        """Returns the poses of all frames, the centre of mass and the posture at q."""
+
+    def _nearest(self) -> tuple[int, float] | None:
+        """Returns the nearest pair before the last step, and its distance."""
+
+    def _place(self, name: str, placement: ArrayLike) -> bool:
+        """Sets the placement of the geometry with a name; returns whether it exists."""
+
+    def _step(
+        self, q: ArrayLike, v0: ArrayLike | None, frames: ArrayLike, com: ArrayLike, posture: ArrayLike
+    ) -> tuple[_Array, Literal["solved", "relaxed", "stopped"], _Array, list[tuple[str, int]]]:
+        """Makes a step: returns its velocity, status, errors and the limits that hold it back."""
+
+@final
+class _GlobalIk:
+    """Search for postures; see `condyle.ik.GlobalIk`."""
+
+    def __new__(
+        cls,
+        model: Model,
+        frames: bool,
+        tolerance: list[float],
+        orientation_weight: float,
+        counts: list[int],
+        rank: str,
+        seed: int,
+        limits: Sequence[Limit],
+        pairs: str,
+        minimum: float,
+    ) -> _GlobalIk: ...
+    def _describe(self, kind: str, index: int) -> str:
+        """Returns a limit in words."""
+
+    def _place(self, name: str, placement: ArrayLike) -> bool:
+        """Sets the placement of the geometry with a name; returns whether it exists."""
+
+    def _solve(
+        self, targets: ArrayLike, count: int, posture: ArrayLike
+    ) -> tuple[_Array, list[bool], _Array, list[int], list[list[tuple[str, int]]]]:
+        """Searches postures for targets: `count` times one pose for each frame. Returns positions, whether each target is
+        reached, errors, numbers of starts, and the limits that hold each posture back.
+        """
 
 def check(inertia: Inertia) -> None:
     """Checks that a body of positive density can have this inertia: its pseudo-inertia J must be positive definite. Raises
@@ -4544,14 +4672,14 @@ class Residual:
         """
 
     @staticmethod
-    def distances(model: Model, pairs: Sequence[tuple[Sphere, Sphere]]) -> Residual:
-        """Returns the signed distances between pairs of spheres, r = ‖p₁ − p₂‖ − radius₁ − radius₂ with the centres p₁ and
-        p₂ in the world, one number for each pair (m). A distance is negative while the spheres overlap.
+    def distances(model: Model, pairs: Sequence[tuple[Sphere | Geometry, Sphere | Geometry]]) -> Residual:
+        """Returns the signed distances between pairs of geometries, r = n·(p₁ − p₂) with the nearest points p₁ and p₂ and
+        the unit normal n, one number for each pair (m). A distance is negative while the geometries overlap.
 
-        pairs: a list of pairs of `Sphere`s. At least one sphere of a pair is fixed to a frame of the robot; the other
-            one is fixed to the world, or to a frame of the same robot.
+        pairs: a list of pairs of `Sphere`s or `condyle.distances.Geometry`s. At least one geometry of a pair is fixed
+            to a frame of the robot; the other one is fixed to the world, or to a frame of the same robot.
 
-        A `Limit` or a `Cost` of this residual keeps the spheres apart: if no bounds or activation are given, all
+        A `Limit` or a `Cost` of this residual keeps the geometries apart: if no bounds or activation are given, all
         distances have the lower bound 0. For a margin, give `lower`. Limits apply only at knots. If the centres of a
         pair coincide, the direction from p₂ to p₁ is undefined, and the derivatives use the world's z axis instead.
 
