@@ -108,10 +108,7 @@ ARGUMENTS = {
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
     "tuple[str, float, float, float] | None": "_DifferentialIk.distances",
-    "Sequence[Any]": "_DifferentialIk.tasks",
-    "Any": "_DifferentialIk.limits _GlobalIk.limits",
     "list[float]": "_DifferentialIk._converge.tolerance _GlobalIk.tolerance",
-    "list[str]": "_GlobalIk.frames",
     "str": """
         _DifferentialIk._describe.kind _GlobalIk._describe.kind _GlobalIk.rank _GlobalIk.pairs
         ArmMpc.frame Foot.point.frame Foot.sole.frame
@@ -232,7 +229,7 @@ ARGUMENTS = {
         AugmentedLagrangian.inner AugmentedLagrangian._make.settings Fddp._make.settings
         InteriorPoint._make.settings""",
     "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner InteriorPoint._make.inner",
-    "Sequence[Any]": "parts",
+    "Sequence[Any]": "parts _DifferentialIk.tasks",
     "float | str | None": "Fddp.settings",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"]': "forces",
@@ -246,9 +243,10 @@ ARGUMENTS = {
     "Plan": "plan",
     "References": "references",
     "Any": """
+        _DifferentialIk.limits _GlobalIk.limits
         _borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model
         Model.from_mujoco.model""",
-    "list[str]": "names _generate.frames inputs",
+    "list[str]": "names _generate.frames inputs _GlobalIk.frames",
     "list[ContactConstraint]": "_generate.constraints",
 }
 

@@ -64,8 +64,11 @@ def median_time(run: Callable[[], Any], rounds: int = 7) -> float:
 
 
 def near(model: condyle.Model, seed: int, way: float) -> Any:
-    """Returns a position on the way from the neutral position to a random position."""
-    return condyle.interpolate(model, condyle.neutral(model), condyle.random_configuration(model, seed), way)
+    """Returns a position on the way to a random position, from neutral or, outside of the limits, from mid-range."""
+    start, (lower, upper) = condyle.neutral(model), (model.limits.lower, model.limits.upper)
+    outside = (start < lower) | (start > upper)
+    start[outside] = 0.5 * (lower + upper)[outside]
+    return condyle.interpolate(model, start, condyle.random_configuration(model, seed), way)
 
 
 def capsules(frames: list[str], end: tuple[float, float, float]) -> list[Geometry]:

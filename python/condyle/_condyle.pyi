@@ -1732,10 +1732,10 @@ class _DifferentialIk:
     def __new__(
         cls,
         model: Model,
-        tasks: Sequence[Task],
+        tasks: Sequence[Any],
         dt: float,
         damping: float,
-        limits: Sequence[Limit],
+        limits: Any,
         distances: tuple[str, float, float, float] | None,
     ) -> _DifferentialIk: ...
     def _converge(
@@ -1767,13 +1767,13 @@ class _GlobalIk:
     def __new__(
         cls,
         model: Model,
-        frames: bool,
+        frames: list[str],
         tolerance: list[float],
         orientation_weight: float,
         counts: list[int],
         rank: str,
         seed: int,
-        limits: Sequence[Limit],
+        limits: Any,
         pairs: str,
         minimum: float,
     ) -> _GlobalIk: ...
