@@ -80,6 +80,9 @@ SPELLED = [  # the first two functions do not take `data`
 # Types of arguments, by `Class.name`, `function.name` or the argument's name. Arguments with default None may be None.
 ARGUMENTS = {
     "ArrayLike": """
+        _DifferentialIk._converge.frames _DifferentialIk._step.frames
+        _DifferentialIk._converge.com _DifferentialIk._converge.posture _DifferentialIk._step.com
+        _DifferentialIk._step.posture _GlobalIk._solve.targets _GlobalIk._solve.posture
         Model.with_damping.damping Model.with_damping.polynomial Model.with_friction.friction
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
         lower pi placement point rest stiffness
@@ -91,7 +94,8 @@ ARGUMENTS = {
     "float | ArrayLike": "Problem.set_weight.weight",
     'Literal["full_step"]': "stop",
     "int | None": "_casadi_hold_knot.t",
-    "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
+    "ArrayLike | None": """
+        _DifferentialIk._step.v0 Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement""",
     "Model": "model",
     "Data": "data",
     "_SpelledModel": " ".join(f"{name}.model" for name in ("_SpelledData", *SPELLED)),
@@ -103,7 +107,10 @@ ARGUMENTS = {
     "Force": "_SpelledData._leave.hg",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
+    "tuple[str, float, float, float] | None": "_DifferentialIk.distances",
+    "list[float]": "_DifferentialIk._converge.tolerance _GlobalIk.tolerance",
     "str": """
+        _DifferentialIk._describe.kind _GlobalIk._describe.kind _GlobalIk.rank _GlobalIk.pairs
         ArmMpc.frame Foot.point.frame Foot.sole.frame
         _Collisions.kind _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
         _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
@@ -116,12 +123,14 @@ ARGUMENTS = {
     "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
+        _DifferentialIk._describe.index _GlobalIk._describe.index _GlobalIk._solve.count
         _DistancePairs._evaluate.states _DistancePairs._place.geometry
         Schedule.model Schedule.switch.model
         count facets frame_id grain iterations k knot last max_iterations most moved n nu nv nx priority seed size steps
         sweeps threads Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states
         Record.__getitem__.key""",
     "float": """
+        _GlobalIk.orientation_weight _GlobalIk.minimum
         ArmMpc.clearance ArmMpc.knot WholeBodyMpc.knot
         Foot.point.friction Foot.sole.friction ArmMpc.horizon ArmMpc.latency Foot.point.radius Gait.bound.swing
         Gait.bound.double Gait.pace.swing Gait.pace.double Gait.step.swing Gait.step.double Gait.table.period
@@ -148,14 +157,15 @@ ARGUMENTS = {
     "Sequence[tuple[str, float, float]]": "Gait.table.swings",
     "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
-    "bool": """_DistancePairs._evaluate.gradients
-        _generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
-        Unicycle.terminal _lend.versioned rollout_many.gradients rollout_many.states""",
+    "bool": """
+        _DistancePairs._evaluate.gradients _generate.external_forces batch frames mimic progress strict verbose
+        weightless_meshes FrictionCone.inner Unicycle.terminal _lend.versioned rollout_many.gradients
+        rollout_many.states""",
     "list[tuple[int, Residual]]": " ".join(
         f"{kind}Dynamics._from_parts.written"
         for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")
     ),
-    "list[int]": "_lend.shape _lend.strides",
+    "list[int]": "_lend.shape _lend.strides _GlobalIk.counts",
     "Sequence[int]": """
         AugmentedLagrangian.retime.knot_models Fddp.retime.knot_models InteriorPoint.retime.knot_models
         Problem.set_knots.knot_models""",
@@ -223,7 +233,7 @@ ARGUMENTS = {
         AugmentedLagrangian.inner AugmentedLagrangian._make.settings Fddp._make.settings
         InteriorPoint._make.settings""",
     "dict[str, Any] | None": "Fddp._make.inner AugmentedLagrangian._make.inner InteriorPoint._make.inner",
-    "Sequence[Any]": "parts",
+    "Sequence[Any]": "parts _DifferentialIk.tasks",
     "float | str | None": "Fddp.settings",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"]': "forces",
@@ -237,9 +247,10 @@ ARGUMENTS = {
     "Plan": "plan",
     "References": "references",
     "Any": """
+        _DifferentialIk.limits _GlobalIk.limits
         _borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model
         Model.from_mujoco.model""",
-    "list[str]": "names _generate.frames inputs",
+    "list[str]": "names _generate.frames inputs _GlobalIk.frames",
     "list[ContactConstraint]": "_generate.constraints",
 }
 
@@ -278,7 +289,7 @@ RESULTS = {
         getVelocity""",
     "Force": "computeCentroidalMomentum _SpelledData.hg",
     "list[_Array]": "_DistancePairs._evaluate _SpelledData.com",
-    "tuple[_Array, _Array, _Array]": "_SpelledData._state",
+    "tuple[_Array, _Array, _Array]": "_SpelledData._state _DifferentialIk._hold",
     "_Array | None": "Joint.axis FrictionContact.corners",
     "_Array | list[_Array]": "Problem.quasi_static",
     "tuple[_Array, _Array]": """
@@ -299,9 +310,11 @@ RESULTS = {
         Model.joint Model.nbodies Model.nq Model.nv Problem.horizon Problem.ndx Problem.nx Task.priority
         AugmentedLagrangian.retime Fddp.retime InteriorPoint.retime Record.__len__ Schedule.model""",
     "bool": """
+        _DifferentialIk._place _GlobalIk._place
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
     "str": """
+        _DifferentialIk._describe _GlobalIk._describe
         _Collisions._geometries _Collisions._pairs
         Foot.frame
         Model.name Model.to_json Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame
@@ -334,6 +347,10 @@ RESULTS = {
         Schedule.forget Schedule.switch Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "Plan": "WholeBodyMpc.plan",
+    'tuple[_Array, Literal["solved", "relaxed", "stopped"], _Array, list[tuple[str, int]]]': "_DifferentialIk._step",
+    "tuple[_Array, int, _Array]": "_DifferentialIk._converge",
+    "tuple[int, float] | None": "_DifferentialIk._nearest",
+    "tuple[_Array, list[bool], _Array, list[int], list[list[tuple[str, int]]]]": "_GlobalIk._solve",
     "Report": "ArmMpc.report WholeBodyMpc.report",
     "JointPolicy": "ArmMpc.policy ArmMpc.update WholeBodyMpc.policy WholeBodyMpc.update",
     'Literal["plan", "open_loop", "damping"]': "JointPolicy.source",

@@ -18,6 +18,7 @@ Each time is the median of rounds.
 import argparse
 import json
 import statistics
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -44,10 +45,12 @@ LIMBS = {
 
 
 def robots() -> Path:
-    """Returns the folder of example-robot-data."""
-    from example_robot_data.robots_loader import getModelPath
-
-    return Path(getModelPath("panda_description/urdf/panda.urdf")) / "panda_description" / ".."
+    """Returns the folder of the robots of example-robot-data."""
+    folders = [Path(place) / "cmeel.prefix" / "share" / "example-robot-data" / "robots" for place in sys.path]
+    found = [folder for folder in folders if folder.is_dir()]
+    if not found:
+        raise SystemExit("the package example-robot-data is not installed")
+    return found[0]
 
 
 def median_time(run: Callable[[], Any], rounds: int = 7) -> float:
@@ -61,8 +64,11 @@ def median_time(run: Callable[[], Any], rounds: int = 7) -> float:
 
 
 def near(model: condyle.Model, seed: int, way: float) -> Any:
-    """Returns a position on the way from the neutral position to a random position."""
-    return condyle.interpolate(model, condyle.neutral(model), condyle.random_configuration(model, seed), way)
+    """Returns a position on the way to a random position, from neutral or, outside of the limits, from mid-range."""
+    start, (lower, upper) = condyle.neutral(model), (model.limits.lower, model.limits.upper)
+    outside = (start < lower) | (start > upper)
+    start[outside] = 0.5 * (lower + upper)[outside]
+    return condyle.interpolate(model, start, condyle.random_configuration(model, seed), way)
 
 
 def capsules(frames: list[str], end: tuple[float, float, float]) -> list[Geometry]:

@@ -41,7 +41,6 @@ from ._types import (
     Iteration,
     Limits,
     LqKnot,
-    ManyRollouts,
     Mimic,
     ModelWarning,
     Outcome,
@@ -116,7 +115,9 @@ __all__ = [
     "WholeBodyMpc",
     "WrenchCone",
     "_Collisions",
+    "_DifferentialIk",
     "_DistancePairs",
+    "_GlobalIk",
     "_SpelledData",
     "_SpelledModel",
     "__version__",
@@ -230,7 +231,6 @@ __all__ = [
     "rnea_hessian",
     "rnea_input_derivative",
     "rnea_second_derivatives",
-    "rollout_many",
     "static_torque",
     "static_torque_derivative",
     "to_inertia",
@@ -1372,10 +1372,10 @@ def static_torque_derivative(
 class _Collisions:
     """Collision shapes of a robot's file; see `condyle.distances.Collisions`.
 
-    kind: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
+    format: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
     """
 
-    def __new__(cls, kind: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
+    def __new__(cls, format: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
     def _disable(self, first: str, second: str) -> None:
         """Disables the pairs of two links."""
 
@@ -1724,6 +1724,71 @@ class HyperDual:
 
     def tanh(self) -> HyperDual:
         """Returns the hyperbolic tangent of self."""
+
+@final
+class _DifferentialIk:
+    """Steps of differential inverse kinematics; see `condyle.ik.DifferentialIk`."""
+
+    def __new__(
+        cls,
+        model: Model,
+        tasks: Sequence[Any],
+        dt: float,
+        damping: float,
+        limits: Any,
+        distances: tuple[str, float, float, float] | None,
+    ) -> _DifferentialIk: ...
+    def _converge(
+        self, q: ArrayLike, frames: ArrayLike, com: ArrayLike, posture: ArrayLike, tolerance: list[float], steps: int
+    ) -> tuple[_Array, int, _Array]:
+        """Makes many steps: returns the last position, the number of steps and the errors there."""
+
+    def _describe(self, kind: str, index: int) -> str:
+        """Returns a limit in words."""
+
+    def _hold(self, q: ArrayLike) -> tuple[_Array, _Array, _Array]:
+        """Returns the poses of all frames, the centre of mass and the posture at q."""
+
+    def _nearest(self) -> tuple[int, float] | None:
+        """Returns the nearest pair before the last step, and its distance."""
+
+    def _place(self, name: str, placement: ArrayLike) -> bool:
+        """Sets the placement of the geometry with a name; returns whether it exists."""
+
+    def _step(
+        self, q: ArrayLike, v0: ArrayLike | None, frames: ArrayLike, com: ArrayLike, posture: ArrayLike
+    ) -> tuple[_Array, Literal["solved", "relaxed", "stopped"], _Array, list[tuple[str, int]]]:
+        """Makes a step: returns its velocity, status, errors and the limits that hold it back."""
+
+@final
+class _GlobalIk:
+    """Search for postures; see `condyle.ik.GlobalIk`."""
+
+    def __new__(
+        cls,
+        model: Model,
+        frames: list[str],
+        tolerance: list[float],
+        orientation_weight: float,
+        counts: list[int],
+        rank: str,
+        seed: int,
+        limits: Any,
+        pairs: str,
+        minimum: float,
+    ) -> _GlobalIk: ...
+    def _describe(self, kind: str, index: int) -> str:
+        """Returns a limit in words."""
+
+    def _place(self, name: str, placement: ArrayLike) -> bool:
+        """Sets the placement of the geometry with a name; returns whether it exists."""
+
+    def _solve(
+        self, targets: ArrayLike, count: int, posture: ArrayLike
+    ) -> tuple[_Array, list[bool], _Array, list[int], list[list[tuple[str, int]]]]:
+        """Searches postures for targets: `count` times one pose for each frame. Returns positions, whether each target is
+        reached, errors, numbers of starts, and the limits that hold each posture back.
+        """
 
 def check(inertia: Inertia) -> None:
     """Checks that a body of positive density can have this inertia: its pseudo-inertia J must be positive definite. Raises
@@ -4867,45 +4932,6 @@ class WrenchCone:
 
     def rows(self) -> _Array:
         """Returns the matrix A, (facets + 13, 6)."""
-
-def rollout_many(
-    problem: Problem,
-    us: ArrayLike,
-    x0: ArrayLike | None = None,
-    *,
-    states: bool = True,
-    gradients: bool = False,
-    threads: int = 1,
-) -> ManyRollouts:
-    """Simulates many control sequences on the dynamics of a problem, with the costs of the problem.
-
-    Several sequences are computed together in SIMD lanes. The result of a sequence does not depend on the other ones.
-
-    problem: the problem. Its initial state is used where x0 is None.
-    us: the controls of B sequences, (B, N, nu); or (B, Σ nu), where the controls of all knots follow one another, as
-        for knots that differ in nu. Controls are not moved into their bounds.
-    x0: the initial state of all sequences, nx numbers; or of each sequence, (B, nx); None is the problem's.
-    states: whether to return the states.
-    gradients: whether to return the gradients of the costs.
-    threads: the number of threads.
-
-    Returns `ManyRollouts`. A sequence that diverges has an infinite cost and does not affect the others: its numbers
-    are not finite or exceed 1e30.
-
-    Other Python threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, ends the call.
-
-    Raises `ProblemError` if x0 is not finite or contains a rotation whose length is not 1, and for an action that
-    cannot be copied.
-
-    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual, rollout_many
-    >>> arm, x0 = condyle.robots.arm7(), np.zeros(14)
-    >>> effort = Cost("effort", 1e-4, Residual.control(np.zeros(7)))
-    >>> problem = Problem(x0, [FreeDynamics(arm, 0.02, [effort])], [0] * 25, FreeDynamics(arm, None, []))
-    >>> us = np.random.default_rng(0).normal(size=(1000, 25, 7))
-    >>> found = rollout_many(problem, us, gradients=True)
-    >>> found.costs.shape, found.xs.shape, found.du.shape
-    ((1000,), (1000, 26, 14), (1000, 25, 7))
-    """
 
 def joint_torque_regressor(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None

@@ -23,7 +23,6 @@ True
 Pairs of geometries of `condyle.distances` keep a robot away from itself and from obstacles.
 """
 
-import json
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -260,6 +259,8 @@ class Postures(NamedTuple):
 
 def _encoded(model: Model, pairs: Iterable[GeometryPair]) -> str:
     """Returns pairs in JSON."""
+    import json
+
     return json.dumps([{"first": _geometry(model, a), "second": _geometry(model, b)} for a, b in pairs])
 
 

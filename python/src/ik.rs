@@ -24,6 +24,10 @@ type LimitMembers<'py> =
 
 /// Limit that holds a step or a posture back: its kind, and the index of a coordinate or of a pair.
 type HeldMembers = (&'static str, usize);
+/// Numbers of a step: Δq, the status, the errors, and the limits that hold it.
+type StepMembers<'py> = (Bound<'py, PyAny>, &'static str, Bound<'py, PyAny>, Vec<HeldMembers>);
+/// Numbers of answers: postures, whether each is reached, errors, numbers of starts, and the limits that hold each.
+type AnswerMembers<'py> = (Bound<'py, PyAny>, Vec<bool>, Bound<'py, PyAny>, Vec<usize>, Vec<Vec<HeldMembers>>);
 
 fn list(name: &str, given: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
     given.map(|given| numbers(name, given)).transpose()
@@ -169,7 +173,7 @@ impl DifferentialIk {
         frames: &Bound<'_, PyAny>,
         com: &Bound<'_, PyAny>,
         posture: &Bound<'_, PyAny>,
-    ) -> PyResult<(Bound<'py, PyAny>, &'static str, Bound<'py, PyAny>, Vec<HeldMembers>)> {
+    ) -> PyResult<StepMembers<'py>> {
         let mut inner = lock("ik", &self.inner)?;
         self.read(&mut inner, frames, com, posture)?;
         let q = vector("q", q, self.nq)?;
@@ -294,7 +298,7 @@ impl GlobalIk {
         targets: &Bound<'_, PyAny>,
         count: usize,
         posture: &Bound<'_, PyAny>,
-    ) -> PyResult<(Bound<'py, PyAny>, Vec<bool>, Bound<'py, PyAny>, Vec<usize>, Vec<Vec<HeldMembers>>)> {
+    ) -> PyResult<AnswerMembers<'py>> {
         let mut poses = Vec::new();
         read_poses(&crate::arrays::tensor("targets", targets, [count * self.frames, 4, 4])?, &mut poses);
         let posture = vector("posture", posture, self.nq)?.to_vec();
