@@ -2933,10 +2933,6 @@ class WholeBodyMpc:
         fade: the time (s) during which a contact is loaded and unloaded.
 
         Raises `ControllerError` without a plan.
-
-        >>> mpc.reset(np.r_[0.0, 0.0, 0.5354, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, np.zeros(18)])
-        >>> mpc.plan()
-        <condyle.wholebody.Plan of 26 knots and 4 contacts, 0 s to 0.5 s>
         """
 
     def policy(self) -> JointPolicy:
