@@ -187,6 +187,7 @@ impl Planner {
                 false => self.solver.tick(&mut self.problem, self.settings.sweeps)?,
             };
             made += 1;
+            self.report.iterations = made;
             if !plan.is_executable() {
                 if self.restart(self.times[0], refer).is_err() {
                     self.report.status = TickStatus::Failed;
@@ -200,7 +201,6 @@ impl Planner {
             }
             last = Instant::now();
         };
-        self.report.iterations = made;
         self.publish(status, begin, references)
     }
 

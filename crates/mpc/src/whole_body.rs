@@ -175,6 +175,7 @@ impl WholeBodyMpc {
             return self.reset(t, x);
         }
         if !self.planner.accepts(x)? {
+            self.touching = None;
             return Ok(&self.planner.report);
         }
         let (begin, start) = (Instant::now(), self.planner.start(t));

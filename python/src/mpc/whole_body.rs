@@ -210,10 +210,6 @@ controller! { WholeBodyMpc, 6 {
     /// fade: the time (s) during which a contact is loaded and unloaded.
     ///
     /// Raises `ControllerError` without a plan.
-    ///
-    /// >>> mpc.reset(np.r_[0.0, 0.0, 0.5354, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, np.zeros(18)])
-    /// >>> mpc.plan()
-    /// <condyle.wholebody.Plan of 26 knots and 4 contacts, 0 s to 0.5 s>
     #[pyo3(signature = (fade=0.0))]
     fn plan(&self, py: Python<'_>, fade: f64) -> PyResult<Plan> {
         let inner = lock("controller", &self.inner)?;
