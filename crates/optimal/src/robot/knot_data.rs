@@ -3,7 +3,7 @@
 use super::outputs::{Capabilities, Output};
 use super::residuals::layout::ResidualData;
 use super::residuals::rows::Row;
-use condyle_spatial::block::{Block, Strided, scatter_matrix, scatter_rows};
+use condyle_spatial::block::{Block, Strided, lanes, scatter_matrix, scatter_rows};
 use nalgebra::DMatrix;
 
 /// Outputs of the dynamics of a knot, and the quantities that its residuals read.
@@ -105,6 +105,10 @@ pub(crate) fn unpack<S: Block<Number = f64>>(
     to: &mut [KnotData],
     part: impl Fn(&mut KnotData) -> &mut [f64],
 ) {
+    if S::LANES == 1 {
+        part(&mut to[0])[..from.len()].copy_from_slice(lanes(from));
+        return;
+    }
     let count = to.len();
     scatter_rows(from, &mut parts(to, part)[..count]);
 }

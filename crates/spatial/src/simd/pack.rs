@@ -49,6 +49,13 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
 /// than `to`.
 #[inline]
 pub fn gather_rows<S: Block>(from: &[&[S::Number]], to: &mut [S]) {
+    if S::LANES == 1 {
+        let from = &from[0][..to.len()];
+        for (i, to) in to.iter_mut().enumerate() {
+            *to = S::load(&from[i..]);
+        }
+        return;
+    }
     S::enter(Gather(from, to));
 }
 

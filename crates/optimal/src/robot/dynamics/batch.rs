@@ -379,6 +379,9 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
 
 /// Copies the slices of `count` knots into the lanes of `to`, one lane for each knot.
 fn pack<'a, S: Block<Number = f64>>(count: usize, of: impl Fn(usize) -> &'a [f64], to: &mut [S]) {
+    if S::LANES == 1 {
+        return gather_rows(&[of(0)], to);
+    }
     let rows: [&[f64]; WIDEST] = core::array::from_fn(|k| of(k.min(count - 1)));
     gather_rows(&rows[..count], to);
 }

@@ -299,8 +299,10 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
             _ => Evaluation::Derivatives,
         };
         let (lanes, room) = (GroupModel::lanes(self), results.motions.len() / count.max(1));
-        for from in (0..count).step_by(lanes) {
-            let to = (from + lanes).min(count);
+        let mut to = 0;
+        while to < count {
+            let from = to;
+            to = (from + lanes).min(count);
             let (knots, xs) = (&knots[from..to], &xs[from * nx..to * nx]);
             let controls = &us[from * nu..][..(to - from) * inner_nu]; // with several knots, controls are constant
             let group = Group { knots, xs, us: controls, what: what.part(from..to, count), limited: true };

@@ -125,10 +125,14 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
             if let Residual::Distances { .. } = residual {
                 return write_distances(placements, group, [list, i], plan, (r, row));
             }
-            let target = |k: usize| group.terms.get(k).and_then(|terms| terms.0[list].kinematic(i));
-            let numbers: [_; WIDEST] =
-                core::array::from_fn(|k| target(k).map_or([0.0; 12], |(residual, ..)| residual.target_numbers()));
-            gather_rows(&numbers.each_ref().map(<[f64; 12]>::as_slice)[..group.terms.len()], t);
+            if S::LANES == 1 {
+                gather_rows(&[&residual.target_numbers()], t);
+            } else {
+                let target = |k: usize| group.terms.get(k).and_then(|terms| terms.0[list].kinematic(i));
+                let numbers: [_; WIDEST] =
+                    core::array::from_fn(|k| target(k).map_or([0.0; 12], |(residual, ..)| residual.target_numbers()));
+                gather_rows(&numbers.each_ref().map(<[f64; 12]>::as_slice)[..group.terms.len()], t);
+            }
             let (frame, slopes) = (plan.frame, group.slopes);
             let velocities = || velocities.expect("velocities are computed where a residual needs them");
             match *residual {
