@@ -1,4 +1,5 @@
-//! Writes the HTML page of `condyle plan`, `condyle ik` and `condyle walk`: plots and playback in one file that needs no network.
+//! Writes the HTML page of `condyle plan`, `condyle ik` and `condyle walk`: plots and playback in one file that needs
+//! no network.
 
 use crate::budget::held;
 use crate::limits::LimitCounts;
