@@ -1,5 +1,5 @@
-//! Times 100 distances of capsules, without and with gradients. The kinematics are not part of the time. `cargo bench -p
-//! condyle-benches --bench distances`
+//! Times 100 distances of capsules, without and with gradients. The kinematics are not part of the time.
+//! `cargo bench -p condyle-benches --bench distances`
 
 use condyle::distances::{DistancePairs, Distances, Geometry, GeometryPair, Shape};
 use condyle::{Data, Model, forward_kinematics, neutral, robots};

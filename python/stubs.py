@@ -112,7 +112,7 @@ ARGUMENTS = {
     "str": """
         _DifferentialIk._describe.kind _GlobalIk._describe.kind _GlobalIk.rank _GlobalIk.pairs
         ArmMpc.frame Foot.point.frame Foot.sole.frame
-        _Collisions.format _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
+        _Collisions.kind _Collisions._disable.first _Collisions._disable.second _Collisions._fit.kind
         _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
         text FrictionContact.frame Task.frame""",
     "str | int": """
@@ -154,9 +154,9 @@ ARGUMENTS = {
     "Sequence[tuple[str, float, float]]": "Gait.table.swings",
     "tuple[float, float, float]": "WholeBodyMpc.max_acceleration",
     "ArrayLike | Callable[[float], ArrayLike]": "ArmMpc.reset.path ArmMpc.update.path",
-    "bool": """
-        _DistancePairs._evaluate.gradients _generate.external_forces batch frames mimic progress strict verbose
-        weightless_meshes FrictionCone.inner Unicycle.terminal _lend.versioned""",
+    "bool": """_DistancePairs._evaluate.gradients
+        _generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
+        Unicycle.terminal _lend.versioned""",
     "list[tuple[int, Residual]]": " ".join(
         f"{kind}Dynamics._from_parts.written"
         for kind in ("Contact", "ContactInverse", "Free", "Impulse", "FreeInverse")

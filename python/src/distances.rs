@@ -129,7 +129,7 @@ impl PreparedPairs {
 
 /// Collision shapes of a robot's file; see `condyle.distances.Collisions`.
 ///
-/// format: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
+/// kind: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
 #[pyclass(name = "_Collisions", module = "condyle._condyle")]
 pub(crate) struct FileCollisions {
     inner: Collisions,
@@ -139,19 +139,19 @@ pub(crate) struct FileCollisions {
 #[pymethods]
 impl FileCollisions {
     #[new]
-    #[pyo3(signature = (format, path, text, packages))]
-    fn new(format: &str, path: Option<PathBuf>, text: Option<&str>, packages: Vec<PathBuf>) -> PyResult<Self> {
+    #[pyo3(signature = (kind, path, text, packages))]
+    fn new(kind: &str, path: Option<PathBuf>, text: Option<&str>, packages: Vec<PathBuf>) -> PyResult<Self> {
         let urdf = UrdfOptions { packages: packages.clone(), ..UrdfOptions::default() };
         let mjcf = MjcfOptions { packages: packages.clone(), ..MjcfOptions::default() };
         let sdf = SdfOptions { packages: packages.clone(), ..SdfOptions::default() };
-        let inner = match (format, path, text) {
+        let inner = match (kind, path, text) {
             ("urdf", Some(path), _) => Collisions::from_urdf(path, &urdf),
             ("urdf", None, Some(text)) => Collisions::from_urdf_str(text, &urdf),
             ("mjcf", Some(path), _) => Collisions::from_mjcf(path, &mjcf),
             ("mjcf", None, Some(text)) => Collisions::from_mjcf_str(text, &mjcf),
             ("sdf", Some(path), _) => Collisions::from_sdf(path, &sdf),
             ("sdf", None, Some(text)) => Collisions::from_sdf_str(text, &sdf),
-            _ => return Err(PyValueError::new_err(format!("format: expected urdf, mjcf or sdf, found {format}"))),
+            _ => return Err(PyValueError::new_err(format!("format: expected urdf, mjcf or sdf, found {kind}"))),
         };
         Ok(Self { inner: inner.map_err(exception)?, packages })
     }

@@ -100,6 +100,6 @@ def test_what_is_wrong_is_named() -> None:
     refused(ValueError, r"pairs\[0\]\[1\].center", [(good, Sphere([0.0, 1.0]))])
     refused(TypeError, r"pairs\[0\]\[0\].radius: expected a number", [(Sphere([0.0] * 3, "r", "tool"), good)])  # type: ignore[arg-type]
     refused(condyle.ModelError, "`tol`", [(good, Sphere([0.0] * 3, 0.1, "tol"))])
-    refused(ProblemError, r"cost `apart`: its pairs\[0\].second.radius is -0.1", [(good, Sphere([0.0] * 3, -0.1))])
-    refused(ProblemError, r"its pairs\[0\].first.center holds a NaN", [(Sphere([np.nan] * 3, 0.1, "tool"), good)])
-    refused(ProblemError, r"its pairs\[0\] has no frame", [(Sphere([0.0] * 3), Sphere([1.0] * 3))])
+    refused(ProblemError, r"cost `apart`: its pairs\[0\].second: radius is -0.1", [(good, Sphere([0.0] * 3, -0.1))])
+    refused(ProblemError, r"its pairs\[0\].first: center holds a NaN", [(Sphere([np.nan] * 3, 0.1, "tool"), good)])
+    refused(ProblemError, r"its pairs\[0\]: has no frame", [(Sphere([0.0] * 3), Sphere([1.0] * 3))])

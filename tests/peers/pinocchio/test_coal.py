@@ -17,6 +17,8 @@ ITERATED = 1e-5
 # Tolerance of points where Coal iterates: a distance with the error e has points with an error of about √e.
 POINTS = {CLOSED: 1e-7, ITERATED: 1e-3}
 CASES = 45
+# Distance to which overlapping shapes are moved apart (m).
+APART = 1e-2
 KINDS = ["sphere", "capsule", "box", "cylinder", "ellipsoid", "half_space"]
 CURVED, SIMPLE = {"cylinder", "ellipsoid"}, {"sphere", "half_space"}
 
@@ -54,31 +56,24 @@ def random_shape(kind: str, rng: np.random.Generator) -> tuple[Shape, object]:
 
 
 def of_coal(first: object, X: np.ndarray, second: object, Y: np.ndarray) -> tuple[float, np.ndarray]:
-    """Returns Coal's distance and nearest points. Coal's iteration sometimes fails for deep penetrations in one order
-    of the shapes, and then gives a larger penetration than in the other order, so the smaller penetration counts."""
-    request = coal.DistanceRequest()
+    """Returns Coal's distance and nearest points."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
     request.enable_signed_distance = True
     request.gjk_tolerance = request.epa_tolerance = 1e-12
     request.gjk_max_iterations = request.epa_max_iterations = 1000
-    found = []
-    for swap in (False, True):
-        result, ends = coal.DistanceResult(), [(first, X), (second, Y)][:: -1 if swap else 1]
-        (a, at), (b, there) = ends
-        place = [coal.Transform3s(pose[:3, :3].copy(), pose[:3, 3].copy()) for pose in (at, there)]
-        distance = coal.distance(a, place[0], b, place[1], request, result)
-        points = np.array([result.getNearestPoint1(), result.getNearestPoint2()])
-        found.append((distance, points[::-1] if swap else points))
-    return max(found, key=lambda pair: pair[0])
+    a, b = (coal.Transform3s(pose[:3, :3].copy(), pose[:3, 3].copy()) for pose in (X, Y))
+    distance = coal.distance(first, a, second, b, request, result)
+    return distance, np.array([result.getNearestPoint1(), result.getNearestPoint2()])
 
 
-@pytest.mark.parametrize("kinds", filter(is_exact, itertools.product(KINDS, KINDS)), ids="-".join)
+@pytest.mark.parametrize("kinds", list(filter(is_exact, itertools.product(KINDS, KINDS))), ids="-".join)
 def test_distances_and_points_are_those_of_coal(kinds: tuple[str, str]) -> None:
     rng = np.random.default_rng(KINDS.index(kinds[0]) + 6 * KINDS.index(kinds[1]))
     arm, q = condyle.robots.arm7(), np.full(7, 0.3)
     data = condyle.Data(arm)
     tool = condyle.frame_placement(arm, data, q, "tool")
     tolerance = ITERATED if "ellipsoid" in kinds and "half_space" not in kinds else CLOSED
-    overlapping = 0
+    overlapping = failures = 0
     for case in range(CASES):
         (a, theirs_a), (b, theirs_b) = (random_shape(kind, rng) for kind in kinds)
         X, Y = random_pose(rng, scale := [0.1, 0.4, 1.0][case % 3]), random_pose(rng, scale)
@@ -86,14 +81,24 @@ def test_distances_and_points_are_those_of_coal(kinds: tuple[str, str]) -> None:
         assert pairs.replacements == []
         found = distances(pairs, arm, data, q)
         expected, points = of_coal(theirs_a, X, theirs_b, Y)
-        assert abs(found.distance[0] - expected) < tolerance * (1 + abs(expected)), (kinds, case)
-        away = found.points[0, 0] - found.points[0, 1] - found.distance[0] * found.normal[0]
+        d, n = found.distance[0], found.normal[0]
+        away = found.points[0, 0] - found.points[0, 1] - d * n
         assert np.abs(away).max() < CLOSED
+        overlapping += d < 0
+        if expected < d - tolerance and d < 0 and set(kinds) & CURVED:
+            # Coal's iteration fails for some deep penetrations, and its result is too large: a translation by our
+            # penetration separates the shapes, also by Coal's distance of shapes that do not overlap
+            out = X.copy()
+            out[:3, 3] += (APART - d) * n
+            expected, _ = of_coal(theirs_a, out, theirs_b, Y)
+            assert abs(expected - APART) < ITERATED, (kinds, case)
+            failures += 1
+            continue
+        assert abs(d - expected) < tolerance * (1 + abs(expected)), (kinds, case)
         # points are unique, unless a face or a rim is parallel to the other shape
         same = np.abs(found.points[0] - points).max() < POINTS[tolerance]
         assert same or not is_unique(found, arm, data, q, a, b, X, Y, tool)
-        overlapping += found.distance[0] < 0
-    assert 2 < overlapping < CASES
+    assert 2 < overlapping < CASES and failures < overlapping
 
 
 def is_unique(found: object, arm: object, data: object, q: np.ndarray, a: Shape, b: Shape, *poses: np.ndarray) -> bool:
