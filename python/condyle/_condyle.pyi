@@ -1372,10 +1372,17 @@ def static_torque_derivative(
 class _Collisions:
     """Collision shapes of a robot's file; see `condyle.distances.Collisions`.
 
+<<<<<<< HEAD
     format: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
     """
 
     def __new__(cls, format: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
+=======
+    kind: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
+    """
+
+    def __new__(cls, kind: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
+>>>>>>> ik
     def _disable(self, first: str, second: str) -> None:
         """Disables the pairs of two links."""
 

@@ -144,6 +144,19 @@ test("a walk has plots of speeds and of ticks, and the camera follows the robot"
   await page.close();
 });
 
+test("a posture has the motion to it, and tells whether the target is reached", async () => {
+  const { page, wrong } = await open("posture");
+  assert.match(await page.$eval("#badges", (badges) => badges.textContent), /Target reached.*off.*limits of 7 of 7 positions hold/);
+  assert.match(await page.$eval("#facts", (facts) => facts.textContent), /starts \d+/);
+  for (const id of ["iterations", "budget"]) assert.equal(await page.$eval(`#${id}`, (part) => part.closest("section").hidden), true);
+  const start = await picture(page);
+  await page.$eval("#scrub", (scrub) => { scrub.value = 0.9; scrub.dispatchEvent(new Event("input")); });
+  await settled(page);
+  assert.notEqual(await picture(page), start);
+  await page.screenshot({ path: join(folder, "posture.png"), fullPage: true });
+  assert.deepEqual(wrong, []);
+});
+
 test("meshes of three kinds of files are drawn in their colours, where they belong", async () => {
   const { page, wrong } = await open("meshes", { width: 700, height: 600 });
   const data = await page.evaluate(() => {

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Tests the pages of `condyle plan` and `condyle walk` in headless Chromium. The test needs Node.js with npm, which installs the browser and
-# its driver into .venv/page. Without Node.js, or if the installation fails, the test is skipped with a message.
+# Tests the pages of `condyle plan`, `condyle ik` and `condyle walk` in headless Chromium. The test needs Node.js with
+# npm, which installs the browser and its driver into .venv/page. Without Node.js, or if the installation fails, the test
+# is skipped with a message.
 # CHROMIUM names another browser. Pictures are written to .venv/page/pages.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
@@ -25,6 +26,7 @@ fi
 "$program" plan --target 0.5,0.3,0.4 --knots 70 --out "$folder/pages/limits.html" >/dev/null
 "$program" plan --example trot >"$folder/pages/trot.toml"
 "$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
+"$program" ik arm7 --frame tool --target 0.45,-0.25,0.35,3.1,0,0.2 --out "$folder/pages/posture.html" >/dev/null
 "$program" walk quadruped --command 0.5,0,0 --seconds 1 --rate 50 --out "$folder/pages/walk.html" >/dev/null
 # A page is also written for a motion that does not reach its target, so exit status 1 is not an error here.
 plan() { "$program" plan "$@" >/dev/null 2>"$folder/pages/notes" || [ $? = 1 ] || { cat "$folder/pages/notes"; exit 1; }; }

@@ -122,7 +122,8 @@ function header(data) {
     const off = `${length(data.miss)}${rotation == null ? "" : ` and ${number(rotation, 2)} rad`} off`;
     badge(reached ? "good" : "bad", `${reached ? "Target reached" : "Target missed"}: ${off}`);
     for (const limit of held) badge("warn", `Held back by the ${limit.replaceAll("`", "")}`);
-    limitsBadge(data, badge);
+    if (data.limits.positions) badge("good", `The limits of ${data.limits.positions} of ${data.limits.of} positions hold`);
+    else badge("warn", `No limits of positions: ${data.limits.source} has none`);
     return footer(data);
   }
   const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly decreases" }[data.status];

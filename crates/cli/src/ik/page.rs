@@ -8,9 +8,17 @@ use condyle::{Data, difference, forward_kinematics, integrate, rnea};
 use serde_json::json;
 use std::path::Path;
 
-/// Number of intervals of the motion, and their duration (s).
+/// Number of intervals of the motion.
 const KNOTS: usize = 100;
-const DT: f64 = 0.02;
+
+/// Minimum duration of the motion (s).
+const LEAST: f64 = 1.0;
+
+/// Largest speed of the motion, relative to the limits of the joints.
+const SPEED: f64 = 0.5;
+
+/// Largest derivative of s(r), at r = ½.
+const STEEPEST: f64 = 1.875;
 
 /// Writes the page, and creates its folder. If meshes are left out, returns one line of text about these meshes.
 ///
@@ -22,7 +30,9 @@ pub(super) fn write(path: &Path, answer: &Answer) -> std::io::Result<Option<Stri
     let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();
     let (mut positions, mut velocities, mut efforts) = (Vec::new(), Vec::new(), Vec::new());
     let (mut poses, mut trail) = (Vec::new(), Vec::new());
-    let duration = KNOTS as f64 * DT;
+    let slowest = |(d, limit): (&f64, &f64)| if *limit > 0.0 { STEEPEST * d.abs() / (SPEED * limit) } else { 0.0 };
+    let duration = way.iter().zip(&model.limits().velocity).map(slowest).fold(LEAST, f64::max);
+    let dt = duration / KNOTS as f64;
     for t in 0..=KNOTS {
         let r = t as f64 / KNOTS as f64;
         let v = along(30.0 * r * r * (1.0 - r) * (1.0 - r) / duration);
@@ -49,8 +59,8 @@ pub(super) fn write(path: &Path, answer: &Answer) -> std::io::Result<Option<Stri
         "target": answer.target.translation.to_array(),
         "miss": answer.posture.error[0],
         "tolerance": answer.tolerance[0],
-        "dt": DT,
-        "times": (0..=KNOTS).map(|t| t as f64 * DT).collect::<Vec<_>>(),
+        "dt": dt,
+        "times": (0..=KNOTS).map(|t| t as f64 * dt).collect::<Vec<_>>(),
         "joints": page::joints(model),
         "q": positions,
         "v": velocities,

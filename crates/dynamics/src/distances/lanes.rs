@@ -80,15 +80,21 @@ pub(crate) fn compute(items: &[Item], rounds: &[Row], of_spheres: bool, results:
     }
 }
 
+/// Numbers of the columns 8 k to 8 k + 7, aligned to a register and to a cache line.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub(crate) struct Columns(pub [f64; PADDING]);
+
 /// Numbers from which gradients are computed.
 pub(crate) struct Slopes<'a> {
-    /// Joint columns S, one row for each of the six components, with `stride` entries.
-    pub columns: &'a [f64],
-    /// Padded number of columns.
-    pub stride: usize,
-    /// Rows of signs: 1 for a column that moves only the first body, −1 for the second, 0 for others.
-    pub signs: &'a [f64],
-    /// Row of signs of each pair.
+    /// Joint columns S: for each of the six components, `blocks` entries.
+    pub columns: &'a [Columns],
+    /// Number of blocks of columns.
+    pub blocks: usize,
+    /// Signs, `blocks` entries for each pair of bodies: 1 for a column that moves only the first body, −1 for the
+    /// second, 0 for others.
+    pub signs: &'a [Columns],
+    /// Index of the pair of bodies of each pair of shapes.
     pub sign_of: &'a [u32],
     /// Results of each pair.
     pub results: &'a [Row],
@@ -96,25 +102,55 @@ pub(crate) struct Slopes<'a> {
     pub nv: usize,
 }
 
-/// Computes the gradients nᵀ (J₁ − J₂) of all pairs, row after row. A row is written with its padding, which the next
-/// row overwrites.
+/// Returns the force n at the point p of a result: n, and the moment p × n about the origin.
 #[inline(always)]
-fn rows<V: Block<Number = f64>>(s: &Slopes<'_>, to: &mut [f64]) {
-    for (k, row) in s.results.iter().enumerate() {
-        let (n, p) = (vector(row, 4), vector(row, 1));
-        let m = p.cross(n);
-        let f = [n.x, n.y, n.z, m.x, m.y, m.z].map(V::splat);
-        let signs = &s.signs[s.sign_of[k] as usize * s.stride..][..s.stride];
-        let to = &mut to[k * s.nv..][..s.stride];
+fn force<V: Block<Number = f64>>(row: &Row) -> [V; 6] {
+    let (n, p) = (vector(row, 4), vector(row, 1));
+    let m = p.cross(n);
+    [V::splat(n.x), V::splat(n.y), V::splat(n.z), V::splat(m.x), V::splat(m.y), V::splat(m.z)]
+}
+
+/// Computes the gradients nᵀ (J₁ − J₂) of K pairs from pair k on. A row is written with its padding, which the first
+/// block of the next row overwrites. So the last blocks are computed first.
+#[inline(always)]
+fn some_rows<V: Block<Number = f64>, const K: usize>(s: &Slopes<'_>, k: usize, to: &mut [f64]) {
+    let mut f = [[V::zero(); 6]; K];
+    for j in 0..K {
+        f[j] = force(&s.results[k + j]);
+    }
+    for j in (0..s.blocks).rev() {
         let mut at = 0;
-        while at < s.stride {
-            let mut sum = V::load(&s.columns[at..][..V::LANES]) * f[0];
-            for i in 1..6 {
-                sum = V::load(&s.columns[i * s.stride + at..][..V::LANES]).mul_add(f[i], sum); // Sᵀ f
+        while at < PADDING {
+            let mut sums = [V::zero(); K];
+            for i in 0..6 {
+                let column = V::load(&s.columns[i * s.blocks + j].0[at..][..V::LANES]);
+                for j in 0..K {
+                    sums[j] = column.mul_add(f[j][i], sums[j]); // Sᵀ f
+                }
             }
-            (sum * V::load(&signs[at..][..V::LANES])).store(&mut to[at..][..V::LANES]);
+            for i in 0..K {
+                let signs = V::load(&s.signs[s.sign_of[k + i] as usize * s.blocks + j].0[at..][..V::LANES]);
+                (sums[i] * signs).store(&mut to[(k + i) * s.nv + j * PADDING + at..][..V::LANES]);
+            }
             at += V::LANES;
         }
+    }
+}
+/// Number of pairs for which a column is loaded once; chosen because 100 gradients of 29 coordinates take 0.9 µs. They
+/// take 1.6 µs with 1, 1.05 µs with 2 and 1.1 µs with 4 pairs.
+const AT_ONCE: usize = 3;
+
+/// Computes the gradients of all pairs, row after row.
+#[inline(always)]
+fn rows<V: Block<Number = f64>>(s: &Slopes<'_>, to: &mut [f64]) {
+    let (n, mut k) = (s.results.len(), 0);
+    while k + AT_ONCE <= n {
+        some_rows::<V, AT_ONCE>(s, k, to);
+        k += AT_ONCE;
+    }
+    while k < n {
+        some_rows::<V, 1>(s, k, to);
+        k += 1;
     }
 }
 

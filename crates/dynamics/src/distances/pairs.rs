@@ -1,6 +1,6 @@
 //! Pairs of geometries, prepared for one robot.
 
-use super::lanes::{self, PADDING, ROW, Slopes};
+use super::lanes::{self, Columns, Item, PADDING, ROW, Row, Slopes};
 use super::prepared::Method;
 use super::results::Distances;
 use super::round::{Witness, norm};
@@ -39,6 +39,8 @@ pub(crate) struct Placed {
     pub(crate) solid: Solid,
     /// Centre of the bounding sphere in the internal frame of the body, and its radius.
     bound: (Vec3<f64>, f64),
+    /// Whether a pair needs the shape in the world, and not only the row of a sphere or capsule.
+    is_general: bool,
 }
 
 impl Placed {
@@ -82,9 +84,14 @@ pub struct DistancePairs {
     pub(crate) geometries: Vec<Placed>,
     pub(crate) pairs: Vec<Pair>,
     pub(crate) path: Vec<PathColumn>,
+    /// Pairs of spheres, and pairs of capsules.
+    spheres: Vec<Item>,
+    capsules: Vec<Item>,
+    /// Indices of all other pairs.
+    others: Vec<usize>,
     /// Signs of columns for gradients in lanes: one row for each pair of bodies. Empty if coordinates drive several
     /// columns.
-    signs: Vec<f64>,
+    signs: Vec<Columns>,
     /// Row of signs of each pair.
     sign_of: Vec<u32>,
     replacements: Vec<Replacement>,
@@ -104,6 +111,9 @@ impl DistancePairs {
             geometries: Vec::new(),
             pairs: Vec::with_capacity(pairs.len()),
             path: Vec::new(),
+            spheres: Vec::new(),
+            capsules: Vec::new(),
+            others: Vec::new(),
             signs: Vec::new(),
             sign_of: Vec::new(),
             replacements: Vec::new(),
@@ -134,6 +144,16 @@ impl DistancePairs {
                 [Solid::Sphere(_) | Solid::Capsule(_), Solid::Sphere(_) | Solid::Capsule(_)] => Method::Capsules,
                 _ => Method::Other,
             };
+            let [a, b] = geometries;
+            match method {
+                Method::Spheres => all.spheres.push(item(pair, a, b)),
+                Method::Capsules => all.capsules.push(item(pair, a, b)),
+                Method::Other => {
+                    all.others.push(pair);
+                    all.geometries[a].is_general = true;
+                    all.geometries[b].is_general = true;
+                }
+            }
             all.pairs.push(Pair { geometries, path: [begin, all.path.len()], method });
             if is_dense {
                 all.add_signs([first.0, second.0], begin, &mut rows);
@@ -155,6 +175,7 @@ impl DistancePairs {
             frame: pose * geometry.placement.inverse(),
             solid: Solid::new(&shape, &pose),
             bound: (Vec3::zero(), 0.0),
+            is_general: false,
         };
         let (center, radius) = shape.bounding_sphere();
         placed.bound = (pose.act(center), radius);
@@ -177,10 +198,10 @@ impl DistancePairs {
     /// Adds the signs of the columns between two bodies, unless `rows` already contains the bodies.
     fn add_signs(&mut self, bodies: [usize; 2], begin: usize, rows: &mut Vec<[usize; 2]>) {
         let row = rows.iter().position(|row| *row == bodies).unwrap_or_else(|| {
-            let (first, stride) = (self.signs.len(), self.stride());
-            self.signs.resize(first + stride, 0.0);
+            let (first, blocks) = (self.signs.len(), self.blocks());
+            self.signs.resize(first + blocks, Columns::default());
             for path in &self.path[begin..] {
-                self.signs[first + path.coordinate] = path.ratio;
+                self.signs[first + path.coordinate / PADDING].0[path.coordinate % PADDING] = path.ratio;
             }
             rows.push(bodies);
             rows.len() - 1
@@ -188,9 +209,9 @@ impl DistancePairs {
         self.sign_of.push(row as u32);
     }
 
-    /// Returns the padded number of columns.
-    fn stride(&self) -> usize {
-        self.nv.next_multiple_of(PADDING)
+    /// Returns the number of blocks of columns.
+    fn blocks(&self) -> usize {
+        self.nv.div_ceil(PADDING)
     }
 
     /// Returns the number of pairs.
@@ -312,15 +333,15 @@ impl DistancePairs {
         self.evaluate(placements, distances);
         let columns = &placements.world.S;
         if !self.signs.is_empty() {
-            let stride = self.stride();
+            let blocks = self.blocks();
             for (c, column) in columns.iter().enumerate() {
                 for (row, x) in column.to_array().into_iter().enumerate() {
-                    distances.columns[row * stride + c] = x;
+                    distances.columns[row * blocks + c / PADDING].0[c % PADDING] = x;
                 }
             }
             let Distances { columns, found, gradients, .. } = distances;
             let Self { signs, sign_of, nv, .. } = self;
-            lanes::gradients(&Slopes { columns, stride, signs, sign_of, results: found, nv: *nv }, gradients);
+            lanes::gradients(&Slopes { columns, blocks, signs, sign_of, results: found, nv: *nv }, gradients);
         } else {
             distances.gradients.fill(0.0);
             for (k, pair) in self.pairs.iter().enumerate() {
@@ -353,33 +374,45 @@ impl DistancePairs {
         let Distances { solids, rounds, items, found, near, .. } = distances;
         for (g, placed) in self.geometries.iter().enumerate() {
             let X = if placed.body == 0 { Se3::identity() } else { placements.world.oX[placed.body] };
-            solids[g] = (placed.solid.moved(&X), X.act(placed.bound.0));
-            if let Solid::Sphere(round) | Solid::Capsule(round) = &solids[g].0 {
-                rounds[g] = lanes::row(round);
+            if let Solid::Sphere(round) | Solid::Capsule(round) = &placed.solid {
+                rounds[g] = lanes::row(&round.moved(&X));
+            }
+            if placed.is_general {
+                solids[g].0 = placed.solid.moved(&X);
+            }
+            if self.cutoff < f64::INFINITY {
+                solids[g].1 = X.act(placed.bound.0);
             }
         }
-        let (mut front, mut back) = (0, items.len());
-        for (k, &Pair { geometries: [a, b], method, .. }) in self.pairs.iter().enumerate() {
-            let far = self.beyond([a, b].map(|g| (solids[g].1, self.geometries[g].bound.1)));
-            near[k] = far.is_none();
-            match (far, method) {
-                (None, Method::Spheres) => {
-                    items[front] = [k, a, b].map(|index| index as u32);
-                    front += 1;
-                }
-                (None, Method::Capsules) => {
-                    back -= 1;
-                    items[back] = [k, a, b].map(|index| index as u32);
-                }
-                _ => {
-                    let w = far.unwrap_or_else(|| distance(&solids[a].0, &solids[b].0));
-                    let (p, n) = (w.points[0], w.normal);
-                    found[k] = [w.distance, p.x, p.y, p.z, n.x, n.y, n.z, 0.0];
+        if self.cutoff == f64::INFINITY {
+            near.fill(true);
+            for &k in &self.others {
+                let [a, b] = self.pairs[k].geometries;
+                found[k] = row_of(&distance(&solids[a].0, &solids[b].0));
+            }
+            lanes::compute(&self.spheres, rounds, true, found);
+            lanes::compute(&self.capsules, rounds, false, found);
+        } else {
+            let (mut front, mut back) = (0, items.len());
+            for (k, &Pair { geometries: [a, b], method, .. }) in self.pairs.iter().enumerate() {
+                let far = self.beyond([a, b].map(|g| (solids[g].1, self.geometries[g].bound.1)));
+                near[k] = far.is_none();
+                match (far, method) {
+                    (Some(far), _) => found[k] = row_of(&far),
+                    (None, Method::Spheres) => {
+                        items[front] = item(k, a, b);
+                        front += 1;
+                    }
+                    (None, Method::Capsules) => {
+                        back -= 1;
+                        items[back] = item(k, a, b);
+                    }
+                    (None, Method::Other) => found[k] = row_of(&distance(&solids[a].0, &solids[b].0)),
                 }
             }
+            lanes::compute(&items[..front], rounds, true, found);
+            lanes::compute(&items[back..], rounds, false, found);
         }
-        lanes::compute(&items[..front], rounds, true, found);
-        lanes::compute(&items[back..], rounds, false, found);
         for (distance, row) in distances.distances.iter_mut().zip(&distances.found) {
             *distance = row[0];
         }
@@ -398,10 +431,21 @@ impl DistancePairs {
     }
 }
 
+/// Returns the item of pair k with the geometries a and b.
+fn item(k: usize, a: usize, b: usize) -> Item {
+    [k as u32, a as u32, b as u32]
+}
+
+/// Returns the row of a result.
+fn row_of(w: &Witness<f64>) -> Row {
+    let (p, n) = (w.points[0], w.normal);
+    [w.distance, p.x, p.y, p.z, n.x, n.y, n.z, 0.0]
+}
+
 impl Distances {
     /// Allocates the results of prepared pairs.
     pub fn new(pairs: &DistancePairs) -> Self {
-        let (n, stride) = (pairs.len(), pairs.stride());
+        let (n, blocks) = (pairs.len(), pairs.blocks());
         Self {
             solids: pairs.geometries.iter().map(|placed| (placed.solid, Vec3::zero())).collect(),
             rounds: vec![[0.0; ROW]; pairs.geometries.len()],
@@ -409,7 +453,7 @@ impl Distances {
             found: vec![[0.0; ROW]; n],
             distances: vec![0.0; n],
             near: vec![false; n],
-            columns: vec![0.0; 6 * stride],
+            columns: vec![Columns::default(); 6 * blocks],
             gradients: vec![0.0; n * pairs.nv() + PADDING],
             nv: pairs.nv(),
         }

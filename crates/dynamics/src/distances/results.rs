@@ -1,6 +1,6 @@
 //! Results of distances at one position.
 
-use super::lanes::{Item, Row};
+use super::lanes::{Columns, Item, Row};
 use super::solid::Solid;
 use alloc::vec::Vec;
 use condyle_linalg::{check, check_index};
@@ -23,8 +23,9 @@ pub struct Distances {
     pub(crate) distances: Vec<f64>,
     /// Whether each pair is within the cutoff. Written by: `evaluate`.
     pub(crate) near: Vec<bool>,
-    /// Joint columns S in the world, one row for each component. Shape: 6 × padded nv. Written by: `gradients`.
-    pub(crate) columns: Vec<f64>,
+    /// Joint columns S in the world, one row for each component. Shape: 6 × blocks of columns. Written by:
+    /// `gradients`.
+    pub(crate) columns: Vec<Columns>,
     /// Gradients with respect to the tangent of q, one row per pair, and padding after the last row. Shape: pairs × nv.
     /// Written by: `gradients`.
     pub(crate) gradients: Vec<f64>,

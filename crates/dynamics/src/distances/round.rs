@@ -18,7 +18,7 @@
 //! segments, for which the sides contain a minimum. Source: Ericson, *Real-Time Collision Detection* (2005), section
 //! 5.1.9, for the parameters on a side.
 
-use condyle_spatial::{Scalar, Vec3};
+use condyle_spatial::{Act, Scalar, Se3, Vec3};
 
 /// Segment with a radius, in the world: a sphere or a capsule.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +40,14 @@ pub(crate) struct Witness<S> {
     pub points: [Vec3<S>; 2],
     /// Unit vector along which the first shape leaves the second shape.
     pub normal: Vec3<S>,
+}
+
+impl<S: Scalar> Round<S> {
+    /// Returns the shape after a change of coordinates.
+    #[inline(always)]
+    pub(crate) fn moved(&self, X: &Se3<S>) -> Self {
+        Self { center: X.act(self.center), half: X.rotation * self.half, radius: self.radius }
+    }
 }
 
 impl<S: Scalar> Witness<S> {
@@ -76,11 +84,11 @@ fn clamp<S: Scalar>(x: S) -> S {
     S::select(high.lt(x), high, x)
 }
 
-/// Returns a / b, or 0 if b is 0.
+/// Returns 1 / x, or 0 if x is 0.
 #[inline(always)]
-fn ratio<S: Scalar>(a: S, b: S) -> S {
-    let zero = b.lt(S::splat(COINCIDENT));
-    S::select(zero, S::zero(), a / S::select(zero, S::one(), b))
+fn inverse<S: Scalar>(x: S) -> S {
+    let zero = x.lt(S::splat(COINCIDENT));
+    S::select(zero, S::zero(), S::select(zero, S::one(), x).recip())
 }
 
 /// Returns a where the mask holds, and b elsewhere.
@@ -150,13 +158,13 @@ pub(crate) fn capsules<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witnes
     let n = h1.cross(h2);
     let square = n.norm_squared();
 
-    let one = S::one();
-    let t = clamp(ratio(b + f, e));
+    let (one, by_a, by_e) = (S::one(), inverse(a), inverse(e));
+    let t = clamp((b + f) * by_e);
     let d = w + h1 - h2.scale(t);
     let mut best = Nearest { s: one, t, d, least: d.norm_squared() }; // the side s = 1
-    best.consider([w, h1, h2], -one, clamp(ratio(f - b, e))); // the side s = −1
-    best.consider([w, h1, h2], clamp(ratio(b - c, a)), one); // the side t = 1
-    best.consider([w, h1, h2], clamp(ratio(-b - c, a)), -one); // the side t = −1
+    best.consider([w, h1, h2], -one, clamp((f - b) * by_e)); // the side s = −1
+    best.consider([w, h1, h2], clamp((b - c) * by_a), one); // the side t = 1
+    best.consider([w, h1, h2], clamp((-b - c) * by_a), -one); // the side t = −1
     let parallel = square.lt(a * e * S::splat(PARALLEL) + S::splat(COINCIDENT));
     let inverse = S::select(parallel, one, square).recip();
     let u = h2.cross(w).dot(n) * inverse;
@@ -168,11 +176,11 @@ pub(crate) fn capsules<S: Scalar>(first: &Round<S>, second: &Round<S>) -> Witnes
 
     let size = a + e + w.norm_squared();
     let touch = least.lt(size * S::splat(TOUCHING) + S::splat(COINCIDENT));
-    let distance = S::select(touch, S::zero(), least).sqrt();
     let across = choose::<S>(parallel, perpendicular(choose::<S>(a.lt(e), h2, h1)), n);
     let across = choose::<S>(across.dot(d).lt(S::zero()), -across, across);
-    let direction = choose::<S>(touch, across, d);
-    let normal = direction.scale(direction.norm_squared().sqrt().recip());
+    let length = S::select(touch, across.norm_squared(), least).sqrt();
+    let normal = choose::<S>(touch, across, d).scale(length.recip());
+    let distance = S::select(touch, S::zero(), length);
     let points = [first.center + h1.scale(s), second.center + h2.scale(t)];
     Witness { distance, points, normal }.enlarged(first.radius, second.radius)
 }

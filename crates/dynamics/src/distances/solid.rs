@@ -48,10 +48,9 @@ impl Solid {
     /// Returns the shape after a change of coordinates.
     #[inline(always)]
     pub(crate) fn moved(&self, X: &Se3<f64>) -> Self {
-        let round = |r: Round<f64>| Round { center: X.act(r.center), half: X.rotation * r.half, ..r };
         match *self {
-            Self::Sphere(r) => Self::Sphere(Round { center: X.act(r.center), ..r }),
-            Self::Capsule(r) => Self::Capsule(round(r)),
+            Self::Sphere(r) => Self::Sphere(r.moved(X)),
+            Self::Capsule(r) => Self::Capsule(r.moved(X)),
             Self::Box(b) => Self::Box(Cuboid { pose: *X * b.pose, ..b }),
             Self::Cylinder { pose, radius, half_length } => Self::Cylinder { pose: *X * pose, radius, half_length },
             Self::Ellipsoid { pose, radii } => Self::Ellipsoid { pose: *X * pose, radii },
