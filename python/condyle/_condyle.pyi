@@ -1372,17 +1372,10 @@ def static_torque_derivative(
 class _Collisions:
     """Collision shapes of a robot's file; see `condyle.distances.Collisions`.
 
-<<<<<<< HEAD
-    format: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
-    """
-
-    def __new__(cls, format: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
-=======
     kind: 'urdf', 'mjcf' or 'sdf'; path or text: the file, or its text.
     """
 
     def __new__(cls, kind: str, path: _Path | None, text: str | None, packages: Sequence[_Path]) -> _Collisions: ...
->>>>>>> ik
     def _disable(self, first: str, second: str) -> None:
         """Disables the pairs of two links."""
 
@@ -2811,10 +2804,8 @@ class ArmMpc:
     frame: the name of the frame.
     horizon, knot: the durations of the horizon and of a knot (s).
     weights: `ArmWeights`; None for the defaults.
-    limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
-    sweeps: the number of sweeps for the quadratic program of each linearisation.
-    iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
-        made only if the budget has time left for one more.
+    limits: `PlanLimits`; None for all limits of the model.
+    sweeps: the number of sweeps in a tick.
     budget: the time budget of a tick (s); None without a budget. One sweep is always made.
     latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
     threads: the number of threads of a tick.
@@ -2839,9 +2830,8 @@ class ArmMpc:
         horizon: float = 0.5,
         knot: float = 0.02,
         weights: ArmWeights | None | None = None,
-        limits: Literal["model"] | PlanLimits | None = "model",
+        limits: PlanLimits | None | None = None,
         sweeps: int = 2,
-        iterations: tuple[int, int] = (1, 1),
         budget: float | None | None = None,
         latency: float = 0.0,
         threads: int = 1,
@@ -2997,10 +2987,8 @@ class WholeBodyMpc:
     gait: a `Gait`.
     horizon, knot: the durations of the horizon and of a knot (s).
     weights: `Weights`; None for the defaults.
-    limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
-    sweeps: the number of sweeps for the quadratic program of each linearisation.
-    iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
-        made only if the budget has time left for one more.
+    limits: `PlanLimits`; None for all limits of the model.
+    sweeps: the number of sweeps in a tick.
     budget: the time budget of a tick (s); None without a budget. One sweep is always made.
     latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
     threads: the number of threads of a tick.
@@ -3027,13 +3015,12 @@ class WholeBodyMpc:
         horizon: float = 0.5,
         knot: float = 0.02,
         weights: Weights | None | None = None,
-        limits: Literal["model"] | PlanLimits | None = "model",
+        limits: PlanLimits | None | None = None,
         sweeps: int = 2,
-        iterations: tuple[int, int] = (1, 1),
         budget: float | None | None = None,
         latency: float = 0.0,
         threads: int = 1,
-        max_acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0),
+        max_acceleration: tuple[float, float, float] = ...,
         swing_height: float = 0.06,
     ) -> WholeBodyMpc: ...
     @property
@@ -3060,16 +3047,6 @@ class WholeBodyMpc:
         Raises `ControllerError` without a plan.
         """
 
-    def plan(self, fade: float = 0.0) -> Plan:
-        """Returns the plan of the last tick for `condyle.wholebody`: a `Plan` with the states, efforts and gains of the
-        horizon, and the feet that touch. A `WholeBodyController` with a contact for each foot, in the same order,
-        tracks it: `controller.track(mpc.plan(), t, references)`.
-
-        fade: the time (s) during which a contact is loaded and unloaded.
-
-        Raises `ControllerError` without a plan.
-        """
-
     def policy(self) -> JointPolicy:
         """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
 
@@ -3091,13 +3068,10 @@ class WholeBodyMpc:
         Raises `ControllerError` for a number that is not finite, or if the gait does not fit the feet.
         """
 
-    def set_gait(self, gait: Gait, at: Literal["next"] | float = "next") -> None:
-        """Changes the gait as soon as all feet that are in the air have landed. No other foot leaves the ground before.
+    def set_gait(self, gait: Gait) -> None:
+        """Changes the gait as soon as all feet that are in the air have landed.
 
-        gait: the new `Gait`.
-        at: 'next' for now, or the time before which the present gait goes on (s), at most 60 s ahead.
-
-        Raises `ControllerError` for a gait that does not fit the feet, and for a time that is too late.
+        Raises `ControllerError` for a gait that does not fit the feet.
         """
 
     def terrain(self, normal: ArrayLike | None = None, height: float = 0.0) -> None:
@@ -3105,21 +3079,6 @@ class WholeBodyMpc:
 
         normal: the normal of the plane, which points upwards; height: the height of the plane at the origin of the
         world (m).
-        """
-
-    def touch(self, feet: Sequence[str] | ArrayLike) -> None:
-        """Reports which feet touch the ground, as measured at the time of the next `update`. Later updates need reports of
-        their own. Without reports, feet land when the schedule says so.
-
-        - A foot that touches after half of its swing has landed: it stands from then on, where it is.
-        - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
-          most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
-
-        Other swings stay as the schedule has them.
-
-        feet: the names of the frames of the feet that touch, or a bool for each foot.
-
-        Raises `ControllerError` for a name that is not a foot, or another number of bools.
         """
 
     def update(self, t: float, x: ArrayLike) -> JointPolicy:
@@ -4587,8 +4546,8 @@ class Problem:
         """Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
         infinite bound is written as null.
 
-        Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate` around one
-        of these, or if knots belong to different robots.
+        Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate`, or if
+        knots belong to different robots.
         """
 
 @final

@@ -21,7 +21,6 @@ positions.
 `Collisions` reads the shapes of a robot's file, and lists the pairs that can collide.
 """
 
-import json
 import os
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal, NamedTuple
@@ -150,6 +149,8 @@ def _geometry(model: Model, geometry: Geometry) -> dict[str, Any]:
 
 def _text(model: Model, geometry: Geometry) -> str:
     """Returns a geometry in JSON, for the compiled part of the package."""
+    import json
+
     return json.dumps(_geometry(model, geometry))
 
 
@@ -173,6 +174,8 @@ class DistancePairs:
     """
 
     def __init__(self, model: Model, pairs: Iterable[GeometryPair]) -> None:
+        import json
+
         self.pairs: list[GeometryPair] = [(first, second) for first, second in pairs]
         """The pairs, as they were given."""
         encoded = [{"first": _geometry(model, a), "second": _geometry(model, b)} for a, b in self.pairs]
@@ -282,6 +285,8 @@ class Collisions:
     @property
     def geometries(self) -> list[Geometry]:
         """The shapes, in the order of the file. A shape without a name is named `link_k`."""
+        import json
+
         return [_read(geometry) for geometry in json.loads(self._inner._geometries())]
 
     @property
@@ -310,6 +315,8 @@ class Collisions:
     def pairs(self, model: Model) -> list[GeometryPair]:
         """Returns all pairs that can collide. Pairs of one body and of bodies that a joint connects are left out, and
         so are disabled pairs, `<exclude>`s and masks (`contype`, `conaffinity`) of an MJCF."""
+        import json
+
         both = json.loads(self._inner._pairs(model))
         return [(_read(pair["first"]), _read(pair["second"])) for pair in both]
 

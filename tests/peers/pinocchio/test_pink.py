@@ -1,6 +1,6 @@
 """Tests that velocities of `condyle.ik` equal Pink's on robots of example-robot-data.
 
-pytest tests/peers/pink        needs condyle, pin-pink, quadprog and example-robot-data; is skipped without them
+The tests need pin-pink, quadprog and example-robot-data, and are skipped without them.
 """
 
 import sys
