@@ -1,7 +1,7 @@
 //! Distances and gradients of many pairs, with one pair per lane of a SIMD register.
 
 use super::round::{Round, capsules, spheres};
-use condyle_spatial::block::{Block, MOST, gather_rows, scatter_rows};
+use condyle_spatial::block::Block;
 use condyle_spatial::gate::{Level, level};
 use condyle_spatial::{Scalar, Vec3, register_kernel};
 
@@ -44,28 +44,45 @@ fn result<S: Scalar>(first: &[S; ROW], second: &[S; ROW], of_spheres: bool) -> [
 /// Pair whose distance is computed: index of the result, and indices of both shapes.
 pub(crate) type Item = [u32; 3];
 
+/// Loads a row of numbers for each item of a group, one item per lane. The last item fills the remaining lanes.
+#[inline(always)]
+fn load<V: Block<Number = f64>>(group: &[Item], side: usize, rounds: &[Row]) -> [V; ROW] {
+    let mut rows = [V::zero(); ROW];
+    let mut at = 0;
+    while at < ROW {
+        for k in 0..V::LANES {
+            let item = &group[if k < group.len() { k } else { group.len() - 1 }];
+            rows[at + k] = V::load(&rounds[item[side] as usize][at..][..V::LANES]);
+        }
+        V::transpose(&mut rows[at..at + V::LANES]);
+        at += V::LANES;
+    }
+    rows
+}
+
+/// Stores the numbers of each lane as the row of an item's result.
+#[inline(always)]
+fn store<V: Block<Number = f64>>(mut found: [V; ROW], group: &[Item], results: &mut [Row]) {
+    let mut at = 0;
+    while at < ROW {
+        V::transpose(&mut found[at..at + V::LANES]);
+        for k in 0..group.len() {
+            found[at + k].store(&mut results[group[k][0] as usize][at..][..V::LANES]);
+        }
+        at += V::LANES;
+    }
+}
+
 register_kernel! {
     /// Computes the distances of pairs of spheres, or of capsules, in lanes.
     fn pairs_in_lanes<V>(items: &[Item], rounds: &[Row], of_spheres: bool, results: &mut [Row]) {
-        for group in items.chunks(V::LANES) {
-            let (mut first, mut second) = ([V::zero(); ROW], [V::zero(); ROW]);
-            for (side, to) in [(1, &mut first), (2, &mut second)] {
-                let mut rows: [&[f64]; MOST] = [&[]; MOST];
-                for k in 0..group.len() {
-                    rows[k] = &rounds[group[k][side] as usize];
-                }
-                gather_rows(&rows[..group.len()], to);
-            }
-            let found = result(&first, &second, of_spheres);
-            let mut numbers = [[0.0; ROW]; MOST];
-            let mut rows: [&mut [f64]; MOST] = Default::default();
-            for (row, numbers) in rows.iter_mut().zip(&mut numbers) {
-                *row = numbers;
-            }
-            scatter_rows(&found, &mut rows[..group.len()]);
-            for k in 0..group.len() {
-                results[group[k][0] as usize] = numbers[k];
-            }
+        let mut at = 0;
+        while at < items.len() {
+            let end = if at + V::LANES < items.len() { at + V::LANES } else { items.len() };
+            let group = &items[at..end];
+            let (first, second) = (load::<V>(group, 1, rounds), load::<V>(group, 2, rounds));
+            store(result(&first, &second, of_spheres), group, results);
+            at = end;
         }
     }
 }
