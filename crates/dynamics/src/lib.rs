@@ -100,12 +100,13 @@ pub use condyle_model::{
     distance, inertial_parameters, integrate, integrate_jacobian, interpolate, neutral, normalize,
     random_configuration, transport,
 };
-#[cfg(feature = "loaders")]
-pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 #[doc(hidden)]
 pub use condyle_model::{
-    PositionFault, ROTATION_ROUNDING, difference_jacobian_groups, integrate_jacobian_groups, unit_fault,
+    GroupJacobian, PositionFault, ROTATION_ROUNDING, commuting_difference, difference_jacobian_groups,
+    integrate_jacobian_groups, unit_fault,
 };
+#[cfg(feature = "loaders")]
+pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 pub use condyle_spatial::{
     Act, Constant, Cross, Dense, DenseMatrix, Force, Inertia, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Sym3,
     Vec3, level, lie,

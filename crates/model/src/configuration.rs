@@ -114,6 +114,15 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
     }
 }
 
+/// Computes q₁ ⊖ q₀ like [`difference`], for the joints whose positions are a vector space or an angle. The other
+/// entries of `out` are not changed.
+#[doc(hidden)]
+pub fn commuting_difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut [S]) {
+    for space in model.tree.spaces.iter().filter(|space| space.joint.commutes()) {
+        space.joint.difference(&q0[space.q.clone()], &q1[space.q.clone()], &mut out[space.v.clone()]);
+    }
+}
+
 /// Computes q₀ ⊕ t (q₁ ⊖ q₀): a position on the path with constant velocity from q₀ (t = 0) to q₁ (t = 1).
 ///
 /// q0, q1, out: nq numbers; tangent: scratch of nv numbers, which contains t (q₁ ⊖ q₀) after the call. Does not

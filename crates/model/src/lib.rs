@@ -99,11 +99,13 @@ pub use configuration::{
     interpolate, neutral, normalize, random_configuration, transport,
 };
 #[doc(hidden)]
-pub use configuration::{difference_jacobian_groups, integrate_jacobian_groups};
+pub use configuration::{commuting_difference, difference_jacobian_groups, integrate_jacobian_groups};
 pub use constraint::{ModelConstraint, ModelConstraintKind};
 pub use error::Error;
 #[cfg(feature = "loaders")]
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
+#[doc(hidden)]
+pub use joint::GroupJacobian;
 pub use joint::{Joint, Mimic};
 pub use keyframe::Keyframe;
 pub use model::Model;

@@ -80,7 +80,9 @@ impl Joint {
     }
 
     /// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁.
-    pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
                 for k in 0..q0.len() {
@@ -104,6 +106,7 @@ impl Joint {
     /// Returns a Jacobian of the joint's group at the tangent vector v, as a map of twists. Returns `None` if the
     /// Jacobian is the identity.
     #[doc(hidden)]
+    #[inline(always)]
     pub fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
         if self.commutes() {
             return None;
@@ -117,6 +120,21 @@ impl Joint {
                 MotionMap::adjoint(Se3::new(R.to_rotation(), p))
             }
         })
+    }
+
+    /// Computes the Jacobian of [`jacobian`](Self::jacobian), column after column, for a joint whose group is not
+    /// commutative.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn jacobian_columns<S: Scalar>(self, which: GroupJacobian, v: &[S], to: &mut [S]) {
+        let (Some(map), axes) = (self.jacobian(which, v), self.axes()) else { return };
+        let columns = map.columns();
+        for (k, &column) in axes.iter().enumerate() {
+            let column = columns[column].to_array();
+            for (i, &row) in axes.iter().enumerate() {
+                to[k * axes.len() + i] = column[row];
+            }
+        }
     }
 
     /// Converts a tangent vector to a twist of the body.

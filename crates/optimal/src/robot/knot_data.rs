@@ -34,6 +34,9 @@ pub(crate) struct KnotData {
     /// Number of eliminations that are already done in `equations`. The eliminations are, in order, of the limbs and of
     /// the base.
     pub eliminations: usize,
+    /// Blocks of T = ∂(q ⊕ δ)/∂q and of E = ∂(q ⊕ δ)/∂δ at the step δ of semi-implicit Euler, column after column, 36
+    /// entries for each block. There are two blocks for each joint whose positions are not a vector space.
+    pub steps: Vec<f64>,
     pub residuals: ResidualData,
 }
 
@@ -58,6 +61,7 @@ impl KnotData {
             dcontact_acceleration: [(); 3].map(|()| DMatrix::zeros(controlled, nv)),
             equations: Vec::new(),
             eliminations: 0,
+            steps: Vec::new(),
             residuals: ResidualData::default(),
         }
     }

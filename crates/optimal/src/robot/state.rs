@@ -1,22 +1,11 @@
-//! States x = (q, v) of a robot: differences of states, and second derivatives of q ⊕ δ.
+//! Groups of positions of a robot that are not a vector space, and second derivatives of q ⊕ δ.
 
 use crate::lq::Hessian;
-use condyle_dynamics::{
-    DifferenceArgument, IntegrateArgument, Joint, Model, difference, difference_jacobian, integrate_jacobian,
-};
+use condyle_dynamics::{DifferenceArgument, IntegrateArgument, Joint, Model, difference_jacobian, integrate_jacobian};
 use condyle_spatial::Scalar;
 use condyle_spatial::lane_dual::LaneDual;
 use core::ops::Range;
 use nalgebra::DMatrix;
-
-/// Computes x₁ ⊖ x₀ = (q₁ ⊖ q₀, v₁ − v₀) into `out`.
-pub(super) fn state_difference(model: &Model, x0: &[f64], x1: &[f64], out: &mut [f64]) {
-    let (nq, nv) = (model.nq(), model.nv());
-    difference(model, &x0[..nq], &x1[..nq], &mut out[..nv]);
-    for k in 0..nv {
-        out[nv + k] = x1[nq + k] - x0[nq + k];
-    }
-}
 
 /// Returns the velocity coordinates of each joint whose positions are not a vector space. For all other joints, the
 /// Jacobians of ⊕ and ⊖ are ±1.

@@ -5,6 +5,7 @@
 //! by knot.
 #![allow(non_snake_case)] // names follow the literature: J, M
 
+use super::group_kernel::GroupKernel;
 use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
     LimbElimination, invert_blocks, restore, solve_blocks, write_drift, write_jacobian, write_motion,
@@ -76,12 +77,14 @@ pub(crate) struct Group<'a> {
     pub what: Evaluation<'a>,
     /// Whether limits are evaluated, as at the first stage of an integration step.
     pub limited: bool,
+    /// Durations of the knots, if the Jacobians of their steps of semi-implicit Euler are computed; empty otherwise.
+    pub durations: &'a [f64],
 }
 
 impl<'a> Group<'a> {
     /// Returns the group that consists of one knot.
     pub(crate) fn one(input: &'a KnotInput<'a>, what: Evaluation<'a>, limited: bool) -> Self {
-        Self { knots: core::slice::from_ref(&input.t), xs: input.x, us: input.u, what, limited }
+        Self { knots: core::slice::from_ref(&input.t), xs: input.x, us: input.u, what, limited, durations: &[] }
     }
 }
 
@@ -104,6 +107,7 @@ pub(crate) struct KnotBatch<S> {
     pub pass: Pass<S>,
     gravity_residual: GravityResidual<S>,
     residuals: ResidualKernel<S>,
+    groups: GroupKernel<S>,
     q: Vec<S>,
     v: Vec<S>,
     /// Quantity that the controls drive: the efforts τ, or the accelerations q̈ if accelerations are controls.
@@ -137,11 +141,12 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
             }
         };
         let (gravity_residual, residuals) = (GravityResidual::new(nv), ResidualKernel::new(nv));
+        let groups = GroupKernel::new(model);
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
         let lambda = zeros(rows);
         let linear = LinearEquations::new();
-        Self { data, pass, gravity_residual, residuals, q, v, tau, a, lambda, linear, visited: false }
+        Self { data, pass, gravity_residual, residuals, groups, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Sets target and gains of contact k, which must be valid.
@@ -167,6 +172,9 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         match group.what {
             Evaluation::Equations { .. } => self.run_equations(model, to),
             what => self.run_pass(model, what == Evaluation::Derivatives, terms.layout().forces, to),
+        }
+        if group.what != Evaluation::Values {
+            self.groups.run_steps(model, [&self.v, &self.a], group.durations, to);
         }
         self.run_residuals(model, group, terms, to);
     }
@@ -305,10 +313,11 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 each[k] = own;
             }
         }
-        let Self { data, gravity_residual, residuals, q, v, a, visited, .. } = self;
+        let Self { data, gravity_residual, residuals, groups, q, v, a, visited, .. } = self;
         let (data, requirements) = (&mut *data.get(), first.layout().requirements);
         let mut group =
             KnotGroup { terms: &each[..to.len()], data: to, slopes: what != Evaluation::Values, visited: *visited };
+        groups.run_states(model, q, &mut group);
         if requirements.gravity {
             gravity_residual.run(model, data, [q, v, a], requirements.inertia, &mut group);
             group.visited = true;

@@ -4,6 +4,7 @@ pub(super) mod acceleration;
 pub(super) mod batch;
 pub(super) mod contact;
 pub(super) mod free;
+pub(super) mod group_kernel;
 mod impact;
 pub(super) mod impulse;
 pub(super) mod inverse;

@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // names follow the literature: J
 
 use super::batch::{DynamicsKind, Group, KnotBatch, Long, Pass, Short};
+use super::group_kernel::BLOCK;
 use super::impact::Impact;
 use super::kkt_elimination::{KktElimination, Tableau};
 use super::limb_elimination::LimbElimination;
@@ -151,6 +152,7 @@ impl Work {
         // inverse-dynamics form needs SIMD registers, and an actuation in which each control drives one coordinate
         let form = moved_by.filter(|_| vectors.is_some()).zip(actuation.passive());
         let mut data = KnotData::new(nv, capabilities, given);
+        data.steps.resize(2 * BLOCK * groups.len(), 0.0);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
             let damped = matches!(kind, DynamicsKind::Contact(_, damping) if *damping != 0.0);
             let tableau = Tableau { nv, rows: capabilities.rows() };
@@ -363,7 +365,7 @@ impl RobotDynamics {
     /// Computes the dynamics of at most [`lanes`](Self::lanes) knots into the workspace, in one batch if that is
     /// faster. [`values`](Self::values) and [`slopes`](Self::slopes) then return the results of each knot.
     pub(crate) fn solve(&mut self, group: Group<'_>) {
-        let Group { knots, xs, us, what, .. } = group;
+        let Group { knots, xs, us, what, durations, .. } = group;
         if let Evaluation::Equations { motions, .. } = what {
             match motions.is_empty() {
                 true => self.solve(Group { what: Evaluation::Values, ..group }),
@@ -373,7 +375,10 @@ impl RobotDynamics {
         let Parts { model, actuation, terms, capabilities, work, .. } = self.parts();
         let Work { single, vectors, impact, data, .. } = work;
         let (nu, nx, count) = (capabilities.nu, model.nq() + model.nv(), knots.len());
-        let alone = |k: usize| Group { knots: &knots[k..=k], xs: &xs[k * nx..][..nx], ..group };
+        let alone = |k: usize| {
+            let durations = durations.get(k..=k).unwrap_or_default();
+            Group { knots: &knots[k..=k], xs: &xs[k * nx..][..nx], durations, ..group }
+        };
         let data = &mut data[..count];
         if let Some(impact) = impact {
             let terms_at = terms.at(knots[0], group.limited);
@@ -437,7 +442,7 @@ impl RobotDynamics {
         let inverse = equations && work.write_equations(terms, lane, input, scale, knot);
         let Work { single, data, da_du, .. } = work;
         if equations && !inverse {
-            let group = Group { knots: &[t], xs: x, us: u, what: Evaluation::Derivatives, limited };
+            let group = Group { knots: &[t], xs: x, us: u, what: Evaluation::Derivatives, limited, durations: &[] };
             single.run(model, group, terms, &mut data[lane..=lane]);
         }
         let data = &data[lane];
@@ -573,6 +578,12 @@ impl RobotDynamics {
     pub(crate) fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Position, by_q);
         integrate_jacobian_groups(&self.model, dq, IntegrateArgument::Velocity, by_dq);
+    }
+
+    /// Returns the Jacobians of the step at one knot of the last group in [`solve`](Self::solve) with durations: see
+    /// [`KnotData::steps`].
+    pub(crate) fn steps(&self, lane: usize) -> Option<&[f64]> {
+        self.work.made().map(|work| &work.data[lane].steps[..])
     }
 
     /// Computes the second derivatives of λᵀ(q ⊕ δq) with respect to q and δq.

@@ -19,6 +19,12 @@ pub(super) fn robot_mut<M: ContinuousModel>(model: &mut M) -> Option<&mut RobotD
 /// Panic message if a model that was checked to be a robot is not a robot.
 const ROBOT: &str = "the model is a robot";
 
+/// Returns the Jacobians of the step at one knot of the last group in [`solve`], if [`solve`] computed them: see
+/// [`KnotData::steps`](crate::robot::knot_data::KnotData::steps).
+pub(super) fn steps<'m, M: ContinuousModel>(model: &'m M, lane: usize, group: &Group<'_>) -> Option<&'m [f64]> {
+    robot(model).filter(|_| !group.durations.is_empty())?.steps(lane)
+}
+
 /// Computes the dynamics of a group of a robot's knots. Does nothing for user-defined models, whose dynamics are
 /// computed knot by knot.
 pub(super) fn solve<M: ContinuousModel>(model: &mut M, group: Group<'_>) {

@@ -2,7 +2,7 @@
 //! multiplied by Δt.
 #![allow(non_snake_case)] // names follow the literature: A, B
 
-use super::accelerations::{slopes, values};
+use super::accelerations::{slopes, steps, values};
 use super::retraction::Retraction;
 use crate::lq::LqKnot;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput};
@@ -53,7 +53,10 @@ pub(super) fn calc_diff<M: ContinuousModel>(
         at_level(Steps(parts, nv, dt));
         (0..nv).for_each(|k| knot.A[(k, nv + k)] += dt);
     }
-    step.differentiate(model);
+    match steps(model, lane, &group) {
+        Some(blocks) => step.set_jacobians(model.groups(), blocks),
+        None => step.differentiate(model),
+    }
     step.write_blocks(model.groups(), knot.structure.set_euler(dt, model.groups()));
     if !inverse {
         step.chain(model.groups(), &mut knot.A);

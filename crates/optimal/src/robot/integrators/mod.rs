@@ -12,7 +12,7 @@ use super::continuous::{ContinuousModel, Derivatives, KnotInput};
 use super::dynamics::batch::Group;
 use super::dynamics::robot::RobotDynamics;
 use super::horizon::{PerKnot, PerModel};
-use super::knot_data::OnDemand;
+use super::knot_data::{OnDemand, WIDEST};
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqKnot};
 use crate::problem::{Evaluation, KnotGroup, Results, Visit, quasi_static};
@@ -299,13 +299,21 @@ impl<M: ContinuousModel> KnotGroup for Integrated<M> {
             _ => Evaluation::Derivatives,
         };
         let (lanes, room) = (GroupModel::lanes(self), results.motions.len() / count.max(1));
+        let differentiates_steps =
+            self.method == Method::Euler && what != Evaluation::Values && !self.inner.groups().is_empty();
         let mut to = 0;
         while to < count {
             let from = to;
             to = (from + lanes).min(count);
             let (knots, xs) = (&knots[from..to], &xs[from * nx..to * nx]);
             let controls = &us[from * nu..][..(to - from) * inner_nu]; // with several knots, controls are constant
-            let group = Group { knots, xs, us: controls, what: what.part(from..to, count), limited: true };
+            let mut durations = [0.0; WIDEST];
+            let steps = if differentiates_steps { to - from } else { 0 };
+            for k in 0..steps {
+                durations[k] = self.duration_of(knots[k]);
+            }
+            let durations = &durations[..steps];
+            let group = Group { knots, xs, us: controls, what: what.part(from..to, count), limited: true, durations };
             if !matches!(self.method, Method::RungeKutta(_)) {
                 solve(&mut self.inner, group);
             }

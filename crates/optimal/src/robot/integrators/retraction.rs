@@ -5,6 +5,7 @@
 use crate::EulerBlock;
 use crate::lq::LARGEST_BLOCK;
 use crate::robot::continuous::ContinuousModel;
+use crate::robot::dynamics::group_kernel::BLOCK;
 use condyle_linalg::{Vector, Vectorized, at_level};
 use core::ops::Range;
 use nalgebra::DMatrix;
@@ -40,11 +41,30 @@ impl Retraction {
         }
     }
 
+    /// Sets the Jacobians T and E to the blocks of all groups, in the layout of
+    /// [`KnotData::steps`](crate::robot::knot_data::KnotData::steps).
+    pub(super) fn set_jacobians(&mut self, groups: &[Range<usize>], blocks: &[f64]) {
+        let Self { delta, T, E } = self;
+        for (group, blocks) in groups.iter().zip(blocks.chunks_exact(2 * BLOCK)) {
+            let (start, n) = (group.start, group.len());
+            let (by_q, by_delta) = blocks.split_at(BLOCK);
+            for k in 0..n {
+                let at = (start + k) * delta.len() + start;
+                T.as_mut_slice()[at..][..n].copy_from_slice(&by_q[k * n..][..n]);
+                E.as_mut_slice()[at..][..n].copy_from_slice(&by_delta[k * n..][..n]);
+            }
+        }
+    }
+
     /// Copies the blocks of T and E to `blocks`, one pair for each group.
     pub(super) fn write_blocks(&self, groups: &[Range<usize>], blocks: &mut [EulerBlock]) {
         for (group, block) in groups.iter().zip(blocks) {
-            block.T.copy_from(&self.T.view((group.start, group.start), (group.len(), group.len())));
-            block.E.copy_from(&self.E.view((group.start, group.start), (group.len(), group.len())));
+            let (start, n) = (group.start, group.len());
+            for k in 0..n {
+                let at = (start + k) * self.delta.len() + start;
+                block.T.as_mut_slice()[k * n..][..n].copy_from_slice(&self.T.as_slice()[at..][..n]);
+                block.E.as_mut_slice()[k * n..][..n].copy_from_slice(&self.E.as_slice()[at..][..n]);
+            }
         }
     }
 

@@ -4,6 +4,7 @@
 
 use super::distance::PairPlan;
 use super::residual::{Part, Residual};
+use crate::lq::LARGEST_BLOCK;
 use crate::robot::outputs::{Capabilities, Output};
 use condyle_dynamics::Model;
 use core::ops::{Add, BitOr, Range};
@@ -16,7 +17,8 @@ pub(crate) struct Plan {
     pub n: usize,
     /// Offset of the residual's entries: the number of entries of all terms before this one.
     pub first: usize,
-    /// Index of the first slot of a kinematic residual among the slots of the knot's kinematic residuals.
+    /// Index of the first slot of a kinematic residual among the slots of the knot's kinematic residuals. For a
+    /// residual of the state, the offset of its data in [`KinematicData::states`].
     pub slot: usize,
     /// Index of the residual's frame in the robot; 0 if the residual reads no frame.
     pub frame: usize,
@@ -80,6 +82,8 @@ pub(crate) struct KnotLayout {
     /// Number of kinematic residuals, and number of their slots.
     pub kinematic: usize,
     pub slots: usize,
+    /// Number of residuals of the state.
+    pub states: usize,
     /// Whether a residual reads contact forces.
     pub forces: bool,
     /// Whether a residual is user-defined; the next field tells whether a user-defined residual has second derivatives.
@@ -98,18 +102,20 @@ impl KnotLayout {
         };
         let kinematic = usize::from(residual.is_kinematic());
         let slots = kinematic * plan.slots();
+        let states = usize::from(matches!(residual, Residual::State { .. }));
         let forces = residual.output() == Some(Output::Force);
         let requirements = Requirements::of(residual, plan.in_contact);
         let own = matches!(residual, Residual::Own(_));
         let curved = matches!(residual, Residual::Own(own) if own.has_hessian());
-        Self { longest: plan.n, rows, kinematic, slots, forces, own, curved, requirements }
+        Self { longest: plan.n, rows, kinematic, slots, states, forces, own, curved, requirements }
     }
 
     /// Returns a layout that is large enough for either of two knots.
     pub(crate) fn or(self, other: Self) -> Self {
         let most = |a: [usize; 2], b: [usize; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         let (kinematic, slots) = (self.kinematic.max(other.kinematic), self.slots.max(other.slots));
-        Self { rows: most(self.rows, other.rows), kinematic, slots, ..self + other }
+        let states = self.states.max(other.states);
+        Self { rows: most(self.rows, other.rows), kinematic, slots, states, ..self + other }
     }
 }
 
@@ -123,6 +129,7 @@ impl Add for KnotLayout {
             rows: sum(self.rows, other.rows),
             kinematic: self.kinematic + other.kinematic,
             slots: self.slots + other.slots,
+            states: self.states + other.states,
             forces: self.forces | other.forces,
             own: self.own | other.own,
             curved: self.curved | other.curved,
@@ -208,12 +215,18 @@ pub(crate) struct ResidualData {
 pub(crate) struct KinematicData {
     pub r: Vec<f64>,
     pub rows: Vec<f64>,
+    /// Differences to the references of state residuals, for joints whose positions are not a vector space, and their
+    /// Jacobians. See [`difference`](Self::difference).
+    pub states: Vec<f64>,
 }
 
 impl ResidualData {
     /// Allocates memory for the residuals of costs and of limits, if the present memory is too small.
     pub(crate) fn reserve(&mut self, nv: usize, layouts: [KnotLayout; 2]) {
-        for (data, KnotLayout { slots, .. }) in self.kinematic.iter_mut().zip(layouts) {
+        for (data, KnotLayout { slots, states, .. }) in self.kinematic.iter_mut().zip(layouts) {
+            if data.states.len() < states * state_size(nv) {
+                data.states.resize(states * state_size(nv), 0.0);
+            }
             if data.r.len() < slots * STRIDE {
                 data.r.resize(slots * STRIDE, 0.0);
                 data.rows.resize(slots * ROWS * nv, 0.0);
@@ -230,7 +243,20 @@ impl ResidualData {
     }
 }
 
+/// Returns the number of entries that the data of a state residual occupies: one difference and one row of at most
+/// [`LARGEST_BLOCK`] entries for each coordinate.
+pub(crate) fn state_size(nv: usize) -> usize {
+    (1 + LARGEST_BLOCK) * nv
+}
+
 impl KinematicData {
+    /// Returns the difference q ⊖ q_ref of the joint with the coordinates `group`, and the block of its derivative with
+    /// respect to q, column after column.
+    pub(crate) fn difference(&self, plan: &Plan, group: &Range<usize>) -> (&[f64], &[f64]) {
+        let n = group.len();
+        self.states[plan.slot + (1 + LARGEST_BLOCK) * group.start..][..n + n * n].split_at(n)
+    }
+
     /// Returns the entries of a residual.
     pub(crate) fn residual(&self, plan: &Plan) -> &[f64] {
         &self.r[plan.slot * STRIDE..][..plan.n]

@@ -1,6 +1,6 @@
 //! Terms of a knot: the residuals of its costs or of its limits, and their contributions to the objective.
 
-use super::layout::{KnotLayout, Plan};
+use super::layout::{KnotLayout, Plan, state_size};
 use super::residual::{Part, Residual};
 use super::view::ResidualView;
 use crate::lq::LqKnot;
@@ -30,14 +30,17 @@ pub(crate) trait Objective<T> {
 pub(crate) struct Terms<T> {
     all: Vec<T>,
     plans: Vec<Plan>,
-    /// Indices of the terms that read only kinematics.
+    /// Indices of the terms that read only kinematics; the next field contains the indices of the residuals of the
+    /// state.
     kinematic: Vec<usize>,
+    states: Vec<usize>,
     layout: KnotLayout,
 }
 
 impl<T> Default for Terms<T> {
     fn default() -> Self {
-        Self { all: Vec::new(), plans: Vec::new(), kinematic: Vec::new(), layout: KnotLayout::default() }
+        let (kinematic, states) = (Vec::new(), Vec::new());
+        Self { all: Vec::new(), plans: Vec::new(), kinematic, states, layout: KnotLayout::default() }
     }
 }
 
@@ -47,6 +50,10 @@ impl<T: Term> Terms<T> {
         (plan.first, plan.slot) = (self.len(), self.layout.slots);
         if term.residual().is_kinematic() {
             self.kinematic.push(self.all.len());
+        }
+        if let Residual::State { .. } = term.residual() {
+            plan.slot = self.layout.states * state_size(plan.n / 2);
+            self.states.push(self.all.len());
         }
         self.layout = self.layout + KnotLayout::of(term.residual(), &plan);
         self.all.push(term);
@@ -124,7 +131,7 @@ impl<T: Term> Terms<T> {
             objective.slopes(term, plan, &s.r[..plan.n], &mut s.d[..plan.n], &mut s.dd[..plan.n]);
             match diagonal {
                 false => view.push_rows(residual, plan, sensitivities),
-                true => view.add_diagonal(residual, knot),
+                true => view.add_diagonal(residual, plan, knot),
             }
         }
     }
@@ -137,6 +144,9 @@ pub(crate) trait KinematicTerms {
 
     /// Returns the kinematic residual with index i, with its weight and its plan.
     fn kinematic(&self, i: usize) -> Option<(&Residual, f64, &Plan)>;
+
+    /// Returns the residual of the state with index i.
+    fn state(&self, i: usize) -> StateTerm<'_>;
 }
 
 impl<T: Term> KinematicTerms for Terms<T> {
@@ -148,6 +158,19 @@ impl<T: Term> KinematicTerms for Terms<T> {
         let k = *self.kinematic.get(i)?;
         Some((self.all[k].residual(), self.all[k].weight(), &self.plans[k]))
     }
+
+    fn state(&self, i: usize) -> StateTerm<'_> {
+        let k = self.states[i];
+        let Residual::State { reference } = self.all[k].residual() else { unreachable!("only states are listed") };
+        StateTerm { reference, weight: self.all[k].weight(), slot: self.plans[k].slot }
+    }
+}
+
+/// Residual of the state: its reference, its weight, and the offset of its data.
+pub(crate) struct StateTerm<'a> {
+    pub reference: &'a [f64],
+    pub weight: f64,
+    pub slot: usize,
 }
 
 /// Terms of a knot: its costs and its limits.
@@ -165,6 +188,7 @@ impl KnotTerms<'_> {
         let same = |k: usize| core::ptr::addr_eq(self.0[k], other.0[k]);
         let alike = |a: &dyn KinematicTerms, b: &dyn KinematicTerms| {
             a.layout().kinematic == b.layout().kinematic
+                && a.layout().states == b.layout().states
                 && (0..a.layout().kinematic).all(|i| match (a.kinematic(i), b.kinematic(i)) {
                     (Some((a, _, own)), Some((b, _, its))) => own.reads_the_bodies_of(its) && a.differs_in_target(b),
                     _ => false,

@@ -8,10 +8,10 @@ use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
 use crate::lq::{ConstraintRow, Hessian, LARGEST_BLOCK, LqKnot, MOST_FORMS};
 use crate::robot::knot_data::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::outputs::Output;
-use crate::robot::state::{groups, state_difference};
-use condyle_dynamics::{DifferenceArgument, Model, difference_jacobian_groups};
+use crate::robot::state::groups;
+use condyle_dynamics::{Model, commuting_difference};
+use condyle_linalg::{Vector, Vectorized, at_level};
 use core::ops::Range;
-use nalgebra::DMatrix;
 
 /// Workspace of the residuals of a knot.
 #[derive(Clone, Debug)]
@@ -22,8 +22,6 @@ pub(crate) struct Scratch {
     pub dd: Vec<f64>,
     /// Rows of the Jacobians of all residuals.
     pub rows: Rows,
-    /// Jacobian of the difference of configurations; only the blocks of groups are read. Shape: nv × nv.
-    D: DMatrix<f64>,
     /// Coordinates of each group of positions that is not a vector space.
     groups: Vec<Range<usize>>,
     /// Derivatives ∂r/∂x and ∂r/∂u of a user-defined residual, row after row.
@@ -37,10 +35,10 @@ impl Scratch {
     /// Allocates the workspace for a robot with nu controls.
     pub(crate) fn new(model: &Model, nu: usize, layout: KnotLayout) -> Self {
         let (nv, numbers) = (model.nv(), || vec![0.0; layout.longest]);
-        let (rows, D) = (Rows::new(nv, nu, layout.rows), DMatrix::zeros(nv, nv));
+        let rows = Rows::new(nv, nu, layout.rows);
         let own = [2 * nv, nu].map(|n| vec![0.0; if layout.own { layout.longest * n } else { 0 }]);
         let hessians = layout.curved.then(|| Box::new([(); 2].map(|()| Hessian::zeros(2 * nv, nu))));
-        Self { r: numbers(), d: numbers(), dd: numbers(), rows, D, groups: groups(model), own, hessians }
+        Self { r: numbers(), d: numbers(), dd: numbers(), rows, groups: groups(model), own, hessians }
     }
 
     /// Removes all rows, and sets the second derivatives to zero.
@@ -84,10 +82,18 @@ impl ResidualView<'_> {
     /// Computes the entries r of a residual in the scratch.
     pub(crate) fn compute(&mut self, residual: &Residual, plan: &Plan) {
         let Self { model, t, state: KnotState { x, u, data }, kinematics, scratch } = self;
-        let r = &mut scratch.r[..plan.n];
+        let Scratch { r, groups, .. } = &mut **scratch;
+        let r = &mut r[..plan.n];
         let minus = |r: &mut [f64], a: &[f64], b: &[f64]| (0..r.len()).for_each(|i| r[i] = a[i] - b[i]);
         match residual {
-            Residual::State { reference } => state_difference(model, reference, x, r), // x ⊖ x_ref
+            Residual::State { reference } => {
+                let (nq, (r_q, r_v)) = (model.nq(), r.split_at_mut(model.nv()));
+                commuting_difference(model, &reference[..nq], &x[..nq], r_q); // x ⊖ x_ref
+                for group in groups {
+                    r_q[group.clone()].copy_from_slice(kinematics.difference(plan, group).0);
+                }
+                minus(r_v, &x[nq..], &reference[nq..]);
+            }
             Residual::Control { reference } => minus(r, u, reference),
             Residual::ControlGravity => {
                 r.copy_from_slice(&data.residuals.gravity_residual);
@@ -235,7 +241,7 @@ impl ResidualView<'_> {
         [lower, upper]: [&[f64]; 2],
         knot: &mut LqKnot,
     ) {
-        let (n, nu, nv) = (knot.ndx(), knot.nu(), self.model.nv());
+        let (n, nu) = (knot.ndx(), knot.nu());
         let inverse = knot.structure.is_inverse_dynamics();
         let s = &mut *self.scratch;
         let mut push = |first: usize, entries: &[f64], i: usize, c: f64| {
@@ -243,14 +249,14 @@ impl ResidualView<'_> {
         };
         match residual {
             Residual::State { .. } => {
-                if !s.groups.is_empty() {
-                    difference_jacobian_groups(self.model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
-                }
                 for i in 0..plan.n {
                     let mut row = [0.0; LARGEST_BLOCK];
                     match s.groups.iter().find(|group| group.contains(&i)) {
                         Some(group) => {
-                            group.clone().zip(&mut row).for_each(|(j, entry)| *entry = s.D[(i, j)]);
+                            let (_, D) = self.kinematics.difference(plan, group);
+                            for (j, entry) in row[..group.len()].iter_mut().enumerate() {
+                                *entry = D[j * group.len() + i - group.start];
+                            }
                             push(group.start, &row[..group.len()], i, s.r[i]);
                         }
                         None => push(i, &[1.0], i, s.r[i]),
@@ -285,50 +291,74 @@ impl ResidualView<'_> {
 
     /// Adds the gradient and Hessian of the residual that was computed last, which is a residual of the state or the
     /// controls.
-    pub(crate) fn add_diagonal(&mut self, residual: &Residual, knot: &mut LqKnot) {
+    pub(crate) fn add_diagonal(&mut self, residual: &Residual, plan: &Plan, knot: &mut LqKnot) {
         match residual {
-            Residual::State { .. } => self.add_state(knot),
+            Residual::State { .. } => self.add_state(plan, knot),
             _ => add_control_diagonal(knot, &self.scratch.d, &self.scratch.dd),
         }
     }
 
     /// Adds the gradient and Hessian of a residual of the state, whose ∂r/∂x is the identity except in the blocks of
     /// groups.
-    fn add_state(&mut self, knot: &mut LqKnot) {
-        let Self { model, scratch: s, .. } = self;
+    fn add_state(&mut self, plan: &Plan, knot: &mut LqKnot) {
+        let Self { model, kinematics, scratch: s, .. } = self;
         let nv = model.nv();
         let mut from = 0;
         for group in s.groups.iter().cloned().chain(core::iter::once(2 * nv..2 * nv)) {
             add_state_diagonal(knot, from..group.start, &s.d, &s.dd);
             from = group.end;
         }
-        if s.groups.is_empty() {
-            return;
-        }
-        difference_jacobian_groups(model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
         for group in &s.groups {
-            let (start, size) = (group.start, group.len());
-            let mut D = [[0.0; LARGEST_BLOCK]; LARGEST_BLOCK]; // row by row, padded with zeros
+            let (slopes, (_, D)) = ([&s.d[group.clone()], &s.dd[group.clone()]], kinematics.difference(plan, group));
+            let q = &mut knot.q.as_mut_slice()[group.clone()];
+            let Q = &mut knot.Q.as_mut_slice()[group.start * (2 * nv + 1)..];
+            at_level(AddGroup { D, slopes, q, Q, n: 2 * nv });
+        }
+    }
+}
+
+/// Length of a row of a block, padded with zeros to a whole register.
+const PADDED: usize = 8;
+
+/// Sum q += Dᵀ a′ and Q += Dᵀ a″ D for a group with the Jacobian D, which is stored column after column. The
+/// derivatives of the activation are a′ and a″, and n is the number of rows of Q.
+struct AddGroup<'a> {
+    D: &'a [f64],
+    slopes: [&'a [f64]; 2],
+    q: &'a mut [f64],
+    Q: &'a mut [f64],
+    n: usize,
+}
+
+impl Vectorized for AddGroup<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { D, slopes: [d, dd], q, Q, n } = self;
+        let size = d.len();
+        let mut rows = [[0.0; PADDED]; LARGEST_BLOCK];
+        for a in 0..size {
             for i in 0..size {
-                for a in 0..size {
-                    D[i][a] = s.D[(start + i, start + a)];
+                rows[i][a] = D[a * size + i];
+            }
+        }
+        let (mut g, mut H) = ([0.0; PADDED], [[0.0; PADDED]; LARGEST_BLOCK]);
+        for i in 0..size {
+            let row = rows[i];
+            for b in 0..PADDED {
+                g[b] += row[b] * d[i];
+            }
+            for a in 0..LARGEST_BLOCK {
+                let weighted = dd[i] * row[a];
+                for b in 0..PADDED {
+                    H[a][b] += weighted * row[b];
                 }
             }
-            let (mut g, mut H) = ([0.0; LARGEST_BLOCK], [[0.0; LARGEST_BLOCK]; LARGEST_BLOCK]);
-            for i in 0..size {
-                let (d, dd) = (s.d[start + i], s.dd[start + i]);
-                for a in 0..LARGEST_BLOCK {
-                    g[a] += D[i][a] * d; // Dᵀ a′
-                    let weighted = dd * D[i][a];
-                    for b in 0..LARGEST_BLOCK {
-                        H[a][b] += weighted * D[i][b]; // Dᵀ a″ D
-                    }
-                }
-            }
-            for a in 0..size {
-                knot.q[start + a] += g[a];
-                let column = &mut knot.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
-                column.iter_mut().zip(&H[a]).for_each(|(Q, H)| *Q += H);
+        }
+        for a in 0..size {
+            q[a] += g[a];
+            let column = &mut Q[a * n..][..size];
+            for b in 0..size {
+                column[b] += H[a][b];
             }
         }
     }
