@@ -352,6 +352,12 @@ def generated_gain(f: Figures, names: tuple[str, ...]) -> list[str]:
     return [f"{min(gains):.1f}", f"{max(gains):.1f}"]
 
 
+def policy_calls(f: Figures, part: str) -> list[str]:
+    """Returns the median and the 99th percentile of the calls of a Go2's policy (µs)."""
+    calls = next(row["policy_us"] for row in f.rows(part) if "policy_us" in row)
+    return [f"{microseconds:.1f}" for microseconds in calls]
+
+
 def fddp_spread(f: Figures) -> list[str]:
     ratios = [row["time"]["total"]["ratio"] for row in f.rows("fddp") if "time" in row]
     return [f"{min(ratios):.2f}", f"{max(ratios):.2f}"]
@@ -416,6 +422,11 @@ QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
             times_of(f, "arm7", "Sparse", "Dense", "factorise"),
             times_of(f, "humanoid", "Sparse", "Dense", "factorise"),
         ],
+    ),
+    (
+        "docs/mpc.md",
+        "From Python, a call takes {} µs (99 % within {} µs)",
+        lambda f: policy_calls(f, "mpc"),
     ),
     (
         "docs/sparsity.md",
