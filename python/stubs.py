@@ -203,7 +203,7 @@ ARGUMENTS = {
     "_Size": "Foot.sole.size WrenchCone.size Residual.center_of_pressure.size",
     "Activation": "activation",
     "Residual": "residual",
-    "Sequence[tuple[Sphere | Geometry, Sphere | Geometry]]": "Residual.distances.pairs",
+    "Sequence[tuple[Sphere | Geometry, Sphere | Geometry]]": "ArmMpc.obstacles Residual.distances.pairs",
     "Sequence[Cost]": "costs",
     "Sequence[Limit]": "limits",
     "dict[int, Sequence[Cost]]": "costs_at",

@@ -41,6 +41,7 @@ from ._types import (
     Iteration,
     Limits,
     LqKnot,
+    ManyRollouts,
     Mimic,
     ModelWarning,
     Outcome,
@@ -231,6 +232,7 @@ __all__ = [
     "rnea_hessian",
     "rnea_input_derivative",
     "rnea_second_derivatives",
+    "rollout_many",
     "static_torque",
     "static_torque_derivative",
     "to_inertia",
@@ -2804,13 +2806,20 @@ class ArmMpc:
     frame: the name of the frame.
     horizon, knot: the durations of the horizon and of a knot (s).
     weights: `ArmWeights`; None for the defaults.
-    limits: `PlanLimits`; None for all limits of the model.
-    sweeps: the number of sweeps in a tick.
+    limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
+    obstacles: pairs of geometries that stay apart, as for `Residual.distances`: the arm and obstacles, or two parts of
+        the arm.
+    clearance: the smallest distance of each pair at each knot (m). It may give way at a high cost, because a measured
+        state can be nearer.
+    sweeps: the number of sweeps for the quadratic program of each linearisation.
+    iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
+        made only if the budget has time left for one more.
     budget: the time budget of a tick (s); None without a budget. One sweep is always made.
     latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
     threads: the number of threads of a tick.
 
-    Raises `ControllerError` for a number outside its range, and `ProblemError` for a frame that does not exist.
+    Raises `ControllerError` for a number outside its range, and `ProblemError` for a frame that does not exist or an
+    invalid pair.
 
     >>> from condyle.mpc import ArmMpc
     >>> arm = condyle.robots.arm7()
@@ -2830,8 +2839,11 @@ class ArmMpc:
         horizon: float = 0.5,
         knot: float = 0.02,
         weights: ArmWeights | None | None = None,
-        limits: PlanLimits | None | None = None,
+        limits: Literal["model"] | PlanLimits | None = "model",
+        obstacles: Sequence[tuple[Sphere | Geometry, Sphere | Geometry]] = (),
+        clearance: float = 0.02,
         sweeps: int = 2,
+        iterations: tuple[int, int] = (1, 1),
         budget: float | None | None = None,
         latency: float = 0.0,
         threads: int = 1,
@@ -2987,8 +2999,10 @@ class WholeBodyMpc:
     gait: a `Gait`.
     horizon, knot: the durations of the horizon and of a knot (s).
     weights: `Weights`; None for the defaults.
-    limits: `PlanLimits`; None for all limits of the model.
-    sweeps: the number of sweeps in a tick.
+    limits: 'model' for all limits of the model, `PlanLimits` for some of them, or None for none of them.
+    sweeps: the number of sweeps for the quadratic program of each linearisation.
+    iterations: the least and the largest number of linearisations in a tick. Further ones after the least number are
+        made only if the budget has time left for one more.
     budget: the time budget of a tick (s); None without a budget. One sweep is always made.
     latency: the time between the measurement of a state and the use of the plan that is computed from it (s).
     threads: the number of threads of a tick.
@@ -3015,12 +3029,13 @@ class WholeBodyMpc:
         horizon: float = 0.5,
         knot: float = 0.02,
         weights: Weights | None | None = None,
-        limits: PlanLimits | None | None = None,
+        limits: Literal["model"] | PlanLimits | None = "model",
         sweeps: int = 2,
+        iterations: tuple[int, int] = (1, 1),
         budget: float | None | None = None,
         latency: float = 0.0,
         threads: int = 1,
-        max_acceleration: tuple[float, float, float] = ...,
+        max_acceleration: tuple[float, float, float] = (1.0, 1.0, 2.0),
         swing_height: float = 0.06,
     ) -> WholeBodyMpc: ...
     @property
@@ -3047,6 +3062,16 @@ class WholeBodyMpc:
         Raises `ControllerError` without a plan.
         """
 
+    def plan(self, fade: float = 0.0) -> Plan:
+        """Returns the plan of the last tick for `condyle.wholebody`: a `Plan` with the states, efforts and gains of the
+        horizon, and the feet that touch. A `WholeBodyController` with a contact for each foot, in the same order,
+        tracks it: `controller.track(mpc.plan(), t, references)`.
+
+        fade: the time (s) during which a contact is loaded and unloaded.
+
+        Raises `ControllerError` without a plan.
+        """
+
     def policy(self) -> JointPolicy:
         """Returns a `JointPolicy` that follows the latest plan, also after later updates."""
 
@@ -3068,10 +3093,13 @@ class WholeBodyMpc:
         Raises `ControllerError` for a number that is not finite, or if the gait does not fit the feet.
         """
 
-    def set_gait(self, gait: Gait) -> None:
-        """Changes the gait as soon as all feet that are in the air have landed.
+    def set_gait(self, gait: Gait, at: Literal["next"] | float = "next") -> None:
+        """Changes the gait as soon as all feet that are in the air have landed. No other foot leaves the ground before.
 
-        Raises `ControllerError` for a gait that does not fit the feet.
+        gait: the new `Gait`.
+        at: 'next' for now, or the time before which the present gait goes on (s), at most 60 s ahead.
+
+        Raises `ControllerError` for a gait that does not fit the feet, and for a time that is too late.
         """
 
     def terrain(self, normal: ArrayLike | None = None, height: float = 0.0) -> None:
@@ -3079,6 +3107,21 @@ class WholeBodyMpc:
 
         normal: the normal of the plane, which points upwards; height: the height of the plane at the origin of the
         world (m).
+        """
+
+    def touch(self, feet: Sequence[str] | ArrayLike) -> None:
+        """Reports which feet touch the ground, as measured at the time of the next `update`. Later updates need reports of
+        their own. Without reports, feet land when the schedule says so.
+
+        - A foot that touches after half of its swing has landed: it stands from then on, where it is.
+        - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
+          most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
+
+        Other swings stay as the schedule has them.
+
+        feet: the names of the frames of the feet that touch, or a bool for each foot.
+
+        Raises `ControllerError` for a name that is not a foot, or another number of bools.
         """
 
     def update(self, t: float, x: ArrayLike) -> JointPolicy:
@@ -4546,8 +4589,8 @@ class Problem:
         """Returns the problem and its robot as JSON, with the current initial state, weights and models of its knots. An
         infinite bound is written as null.
 
-        Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate`, or if
-        knots belong to different robots.
+        Raises `ProblemError` if an action is an `Lqr`, an `Action`, a `ConstrainedAction` or a `ControlRate` around one
+        of these, or if knots belong to different robots.
         """
 
 @final
@@ -4932,6 +4975,45 @@ class WrenchCone:
 
     def rows(self) -> _Array:
         """Returns the matrix A, (facets + 13, 6)."""
+
+def rollout_many(
+    problem: Problem,
+    us: ArrayLike,
+    x0: ArrayLike | None = None,
+    *,
+    states: bool = True,
+    gradients: bool = False,
+    threads: int = 1,
+) -> ManyRollouts:
+    """Simulates many control sequences on the dynamics of a problem, with the costs of the problem.
+
+    Several sequences are computed together in SIMD lanes. The result of a sequence does not depend on the other ones.
+
+    problem: the problem. Its initial state is used where x0 is None.
+    us: the controls of B sequences, (B, N, nu); or (B, Σ nu), where the controls of all knots follow one another, as
+        for knots that differ in nu. Controls are not moved into their bounds.
+    x0: the initial state of all sequences, nx numbers; or of each sequence, (B, nx); None is the problem's.
+    states: whether to return the states.
+    gradients: whether to return the gradients of the costs.
+    threads: the number of threads.
+
+    Returns `ManyRollouts`. A sequence that diverges has an infinite cost and does not affect the others: its numbers
+    are not finite or exceed 1e30.
+
+    Other Python threads can run meanwhile. An exception of a signal handler, such as KeyboardInterrupt, ends the call.
+
+    Raises `ProblemError` if x0 is not finite or contains a rotation whose length is not 1, and for an `Action` or
+    another action written in Python, which cannot be copied.
+
+    >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual, rollout_many
+    >>> arm, x0 = condyle.robots.arm7(), np.zeros(14)
+    >>> effort = Cost("effort", 1e-4, Residual.control(np.zeros(7)))
+    >>> problem = Problem(x0, [FreeDynamics(arm, 0.02, [effort])], [0] * 25, FreeDynamics(arm, None, []))
+    >>> us = np.random.default_rng(0).normal(size=(1000, 25, 7))
+    >>> found = rollout_many(problem, us, gradients=True)
+    >>> found.costs.shape, found.xs.shape, found.du.shape
+    ((1000,), (1000, 26, 14), (1000, 25, 7))
+    """
 
 def joint_torque_regressor(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None

@@ -111,6 +111,7 @@ def _decoded(shape: dict[str, Any]) -> Shape:
             return [_numbers(end) for end in x]
         return _numbers(x) if name in _VECTORS else x
 
+    kind: Any
     ((kind, numbers),) = shape.items()
     return Shape(kind, {name: value(name, x) for name, x in numbers.items()})
 
