@@ -97,8 +97,8 @@ impl Guide {
         self.refer(planner)
     }
 
-    /// Changes the swings at the time `start` for the feet of the mask `touching`, which touch the ground at the time t.
-    /// `stood` has the feet that stood at the last tick. Returns whether a swing was changed.
+    /// Changes the swings at the time `start` for the feet of the mask `touching`, which touch the ground at the time
+    /// t. `stood` has the feet that stood at the last tick. Returns whether a swing was changed.
     pub(crate) fn land(&mut self, touching: u32, stood: u32, [t, start]: [f64; 2], planner: &mut Planner) -> bool {
         let times = [start, t - planner.measured, self.walk.settings.knot];
         let stances = &self.stances;
