@@ -290,7 +290,8 @@ impl WholeBodyMpc {
     ///
     /// - A foot that touches after half of its swing has landed: it stands from then on, where it is.
     /// - A foot that does not touch at the end of its swing swings on, and its foothold is lowered at 0.8 m/s, by at
-    ///   most 0.06 m. The foot counts as standing before that if the other feet are no stance of the gait.
+    ///   most 0.06 m. The foot counts as standing at once if fewer than two other feet
+    ///   stand, or if these are no stance of the gait.
     ///
     /// Other swings stay as the schedule has them. The first call makes models for all stances that early landings can
     /// lead to, and allocates.
