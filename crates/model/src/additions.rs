@@ -16,7 +16,7 @@ use alloc::borrow::ToOwned;
 use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
-use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
+use condyle_spatial::{Act, Inertia, Scalar, Se3, Sym3, Vec3};
 
 /// State of one joint in a keyframe: its body, position and velocity.
 type JointState = (BodyId, Vec<f64>, Vec<f64>);
@@ -318,7 +318,7 @@ impl Model {
         let body = &self.bodies[body];
         let q = &q[body.idx_q..];
         let own = match body.joint {
-            Joint::Continuous { .. } => q[1].atan2(q[0]),
+            Joint::Continuous { .. } => Scalar::atan2(q[1], q[0]),
             _ => q[0],
         };
         body.mimic.map_or(own, |mimic| mimic.ratio * own + mimic.offset)

@@ -12,7 +12,7 @@ use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::vec::Vec;
-use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
+use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Scalar, Se3, Sym3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 
@@ -115,7 +115,7 @@ fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     if I.mass == 0.0 {
         warnings.push(unlikely(format!("has no mass and a moment of inertia of {greatest:e} kg m²")));
     } else if greatest > 0.0 {
-        let radius = (greatest / I.mass).sqrt();
+        let radius = Scalar::sqrt(greatest / I.mass);
         let what = format!("{} kg and {greatest:e} kg m² are a radius of gyration of", I.mass);
         if radius > LARGEST_RADIUS {
             warnings.push(unlikely(format!("{what} {radius:.0} m, expected at most {LARGEST_RADIUS} m")));
