@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 from mujoco_film import film
-from mujoco_world import World
+from mujoco_world import World, walk
 
 from condyle.mpc import Foot, Gait, WholeBodyMpc
 
@@ -22,16 +22,7 @@ def main() -> World:
     world.set_state(world.stand(ANGLES), np.zeros(world.model.nv))
     feet = [Foot.sole(foot, friction=0.5, size=SOLE) for foot in FEET]
     mpc = WholeBodyMpc(world.model, feet, Gait.step(swing=0.36, double=0.08), horizon=0.8)
-    mpc.reset(np.concatenate(world.state()))
-    policy = mpc.policy()
-    while world.time < 6.0:
-        t, x = world.time, np.concatenate(world.state())
-        if world.is_due(0.02) and t > 0.0:
-            mpc.command(**COMMANDS[min(int(t / 2.0), 2)])
-            mpc.update(t, x)
-        world.step(np.r_[np.zeros(6), policy(t, x)])
-        if world.is_due(1.0):
-            print(f"{world.time:.0f} s: velocity {world.state()[1][[0, 1, 5]].round(2)} m/s and rad/s")
+    walk(world, mpc, COMMANDS)
     return world
 
 

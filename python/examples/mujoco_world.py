@@ -19,6 +19,7 @@ from example_robot_data.robots_loader import getModelPath
 from numpy.typing import NDArray
 
 import condyle
+from condyle.mpc import WholeBodyMpc
 
 Array = NDArray[np.float64]
 
@@ -234,3 +235,18 @@ class World:
             foot = next(k for k, foot in enumerate(self.feet) if foot in names)
             out[foot] += sign * contact.frame.reshape(3, 3).T @ force[:3]
         return out
+
+
+def walk(world: World, mpc: WholeBodyMpc, commands: Sequence[Mapping[str, float]], seconds: float = 2.0) -> None:
+    """Lets the robot walk with each command for some seconds, and prints its velocity after each second. The plan is
+    renewed at 50 Hz, and the policy follows it at each time step."""
+    mpc.reset(np.concatenate(world.state()))
+    policy = mpc.policy()
+    while world.time < seconds * len(commands) - 1e-9:
+        t, x = world.time, np.concatenate(world.state())
+        if world.is_due(0.02) and t > 0.0:
+            mpc.command(**commands[min(int(t / seconds), len(commands) - 1)])
+            mpc.update(t, x)
+        world.step(np.r_[np.zeros(6), policy(t, x)])
+        if world.is_due(1.0):
+            print(f"{world.time:.0f} s: velocity {world.state()[1][[0, 1, 5]].round(2)} m/s and rad/s")
