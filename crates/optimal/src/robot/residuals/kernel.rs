@@ -200,12 +200,7 @@ fn witnesses<'a, S: Block<Number = f64>>(
     r: &mut [S; STRIDE],
 ) {
     let (mut lanes, mut poses) = ([S::zero(); 24], [[0.0; 24]; WIDEST]);
-    for (body, lanes) in bodies.iter().zip(lanes.chunks_exact_mut(12)) {
-        let Se3 { rotation, translation } = placements.body(*body);
-        for (k, column) in rotation.columns().into_iter().chain([translation]).enumerate() {
-            lanes[3 * k..][..3].copy_from_slice(&column.to_array());
-        }
-    }
+    body_poses(placements, bodies, &mut lanes);
     scatter_rows(&lanes, &mut poses.each_mut().map(<[f64; 24]>::as_mut_slice)[..count]);
     let mut found = [[0.0; 7]; WIDEST];
     for (knot, found) in found[..count].iter_mut().enumerate() {
@@ -387,12 +382,26 @@ kernel! {
 }
 
 kernel! {
+    /// Writes the columns of the rotation and the translation of two bodies.
+    fn body_poses<S>(placements: Placements<'_, S>, bodies: [usize; 2], poses: &mut [S; 24]) {
+        for k in 0..2 {
+            let Se3 { rotation: Mat3 { x, y, z }, translation } = placements.body(bodies[k]);
+            let columns = [x, y, z, translation];
+            for i in 0..4 {
+                poses[12 * k + 3 * i..][..3].copy_from_slice(&columns[i].to_array());
+            }
+        }
+    }
+}
+
+kernel! {
     /// Computes the signed distance of two spheres or capsules on bodies, a witness point and the normal. `t` contains
     /// the numbers of both shapes.
     fn round_distances<S>(
         placements: Placements<'_, S>, bodies: [usize; 2], method: Method, t: &[S; NUMBERS], r: &mut [S; STRIDE],
     ) {
-        let (distance, p, n) = round_distance(method, t, bodies.map(|body| placements.body(body)));
+        let poses = [placements.body(bodies[0]), placements.body(bodies[1])];
+        let (distance, p, n) = round_distance(method, t, poses);
         r[..7].copy_from_slice(&[distance, p.x, p.y, p.z, n.x, n.y, n.z]);
     }
 }
