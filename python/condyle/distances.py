@@ -85,6 +85,12 @@ class Shape(NamedTuple):
         return Shape("half_space", {"normal": _three("normal", normal), "offset": float(offset)})
 
 
+def _finite(name: str, numbers: Iterable[float]) -> None:
+    for number in numbers:
+        if not np.isfinite(number):
+            raise ValueError(f"{name}: expected finite numbers, found {number}")
+
+
 def _vector(numbers: Sequence[float]) -> dict[str, float]:
     return dict(zip("xyz", numbers, strict=True))
 
@@ -98,6 +104,7 @@ _VECTORS = {"center", "half_sizes", "radii", "normal"}
 
 def _encoded(shape: Shape) -> dict[str, Any]:
     def value(name: str, x: Any) -> Any:
+        _finite(f"{name} of a {shape.kind}", np.ravel(x))
         if name == "ends":
             return [_vector(end) for end in x]
         return _vector(x) if name in _VECTORS else x
@@ -143,6 +150,7 @@ def _geometry(model: Model, geometry: Geometry) -> dict[str, Any]:
         pose = np.asarray(geometry.placement, dtype=float)
         if pose.shape != (4, 4):
             raise ValueError(f"placement: expected shape (4, 4), found {pose.shape}")
+        _finite("placement", pose.ravel())
         columns = {axis: _vector([float(x) for x in pose[:3, k]]) for k, axis in enumerate("xyz")}
         found["placement"] = {"rotation": columns, "translation": _vector([float(x) for x in pose[:3, 3]])}
     return found
@@ -164,6 +172,13 @@ def _read(geometry: dict[str, Any]) -> Geometry:
         placement[:3, 3] = _numbers(geometry["placement"]["translation"])
     frame = geometry.get("frame")
     return Geometry(_decoded(geometry["shape"]), frame and frame["name"], placement, geometry.get("name", ""))
+
+
+def _read_pairs(text: str) -> list[GeometryPair]:
+    """Returns the pairs in a text in JSON, from the compiled part of the package."""
+    import json
+
+    return [(_read(pair["first"]), _read(pair["second"])) for pair in json.loads(text)]
 
 
 class DistancePairs:

@@ -6,7 +6,7 @@ use crate::exceptions::exception;
 use crate::made_for::MadeFor;
 use crate::model::Model;
 use condyle::distances::{Collisions, DistancePairs, Distances, Fit, GeometryPair};
-use condyle::{MjcfOptions, SdfOptions, UrdfOptions};
+use condyle::{MjcfOptions, SdfOptions, Se3, UrdfOptions};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
@@ -57,12 +57,7 @@ impl PreparedPairs {
         if geometry >= count {
             return Err(PyIndexError::new_err(format!("geometry: expected an index below {count}, found {geometry}")));
         }
-        let placement = pose("placement", placement)?;
-        let numbers = placement.translation.to_array();
-        if !placement.rotation.is_rotation() || !numbers.iter().all(|x| x.is_finite()) {
-            return Err(PyValueError::new_err("placement: expected a rotation and a finite translation"));
-        }
-        self.pairs.place(geometry, placement);
+        self.pairs.place(geometry, valid_placement(placement)?);
         Ok(())
     }
 
@@ -198,5 +193,15 @@ impl FileCollisions {
     /// Returns the pairs that can collide, in JSON.
     fn _pairs(&self, model: &Bound<'_, Model>) -> PyResult<String> {
         json(&self.inner.pairs(&model.get().inner).map_err(exception)?)
+    }
+}
+
+/// Reads the placement of a geometry: a rotation and a finite translation.
+pub(crate) fn valid_placement(given: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
+    let placement = pose("placement", given)?;
+    let is_finite = placement.translation.to_array().iter().all(|x| x.is_finite());
+    match placement.rotation.is_rotation() && is_finite {
+        true => Ok(placement),
+        false => Err(PyValueError::new_err("placement: expected a rotation and a finite translation")),
     }
 }

@@ -1,6 +1,7 @@
 //! Inverse kinematics: the compiled part of the module `condyle.ik`, which has the public classes.
 
-use crate::arrays::{Array, Give, numbers, output, pose, vector};
+use crate::arrays::{Array, Give, numbers, output, vector};
+use crate::distances::valid_placement;
 use crate::exceptions::ik_error;
 use crate::model::Model;
 use crate::optimal::lock;
@@ -219,7 +220,7 @@ impl DifferentialIk {
 
     /// Sets the placement of the geometry with a name; returns whether it exists.
     fn _place(&self, name: &str, placement: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let placement = pose("placement", placement)?;
+        let placement = valid_placement(placement)?;
         Ok(place(lock("ik", &self.inner)?.ik.pairs_mut(), name, placement))
     }
 }
@@ -329,7 +330,7 @@ impl GlobalIk {
 
     /// Sets the placement of the geometry with a name; returns whether it exists.
     fn _place(&self, name: &str, placement: &Bound<'_, PyAny>) -> PyResult<bool> {
-        let placement = pose("placement", placement)?;
+        let placement = valid_placement(placement)?;
         Ok(place(lock("ik", &self.inner)?.pairs_mut(), name, placement))
     }
 }

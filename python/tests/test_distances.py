@@ -94,8 +94,8 @@ def test_what_is_wrong_is_named() -> None:
             FreeDynamics(ARM, None, [Cost("apart", 1.0, Residual.distances(ARM, pairs))])  # type: ignore[arg-type]
 
     refused(TypeError, r"pairs: expected a list of pairs of spheres, found an int", 3)
-    refused(TypeError, r"pairs\[0\]: expected two spheres, found a tuple of 3", [good])
-    refused(TypeError, r"pairs\[0\]: expected a pair of spheres, found a float", [1.0])
+    refused(TypeError, r"pairs\[0\]: expected two geometries, found a tuple of 3", [good])
+    refused(TypeError, r"pairs\[0\]: expected a pair of geometries, found a float", [1.0])
     refused(TypeError, r"pairs\[1\]\[1\]: expected a `Sphere`, found a float", [(good, good), (good, 1.0)])
     refused(ValueError, r"pairs\[0\]\[1\].center", [(good, Sphere([0.0, 1.0]))])
     refused(TypeError, r"pairs\[0\]\[0\].radius: expected a number", [(Sphere([0.0] * 3, "r", "tool"), good)])  # type: ignore[arg-type]

@@ -153,6 +153,19 @@ def test_wrong_arguments_are_named() -> None:
         search.solve(np.full((4, 4), np.nan))
 
 
+def test_wrong_placements_are_refused() -> None:
+    hand, ball = Geometry(Shape.sphere([0.0] * 3, 0.04), "tool"), Geometry(Shape.sphere([0.0] * 3, 0.05), name="ball")
+    ik = DifferentialIk(ARM, [Task.posture()], distances=DistanceLimits([(hand, ball)]))
+    search = GlobalIk(ARM, "tool", pairs=[(hand, ball)])
+    for place in (ik.place, search.place):
+        for wrong in (np.eye(4) * np.nan, np.diag([2.0, 2.0, 2.0, 1.0])):
+            with pytest.raises(ValueError, match="placement: expected a rotation and a finite translation"):
+                place("ball", wrong)
+        place("ball", np.eye(4))
+    with pytest.raises(ValueError, match="radius of a sphere: expected finite numbers, found nan"):
+        DifferentialIk(ARM, [], distances=DistanceLimits([(hand, Geometry(Shape.sphere([0.0] * 3, np.nan)))]))
+
+
 def test_threads_may_search_at_once() -> None:
     search = GlobalIk(ARM, "tool")
     poses = np.array([tool(condyle.random_configuration(ARM, seed)) for seed in range(50)])

@@ -98,6 +98,8 @@ def test_bad_arguments_are_named() -> None:
         rollout_many(problem, us[:, 1:])
     with pytest.raises(ValueError, match="x0"):
         rollout_many(problem, us, np.zeros(13))
+    with pytest.raises(ValueError, match="threads: expected at least 1"):
+        rollout_many(problem, us, threads=0)
     with pytest.raises(ProblemError, match="x0"):
         rollout_many(problem, us, np.full(14, np.nan))
 

@@ -66,6 +66,7 @@ def factor() -> condyle.Ltdl:
 
 # An object of each class that has properties.
 PROBLEM = Problem(np.r_[Q, V], [FreeDynamics(ARM, 0.1, [])], [0], FreeDynamics(ARM, None, []))
+ARGUMENTS |= {"problem": PROBLEM, "us": np.zeros((2, 1, 7))}
 OBJECTS = {
     "Model": ARM,
     "ConstraintSet": ARGUMENTS["constraints"],

@@ -24,6 +24,10 @@ pub(crate) struct Bounds {
 
 /// Returns the position limits of each coordinate in v: its index in q, and its limits. Free-flyers and joints on a
 /// circle or sphere have none.
+///
+/// # Errors
+/// [`Error::Limits`] if a lower limit is above the upper one. [`Error::Unlimited`] for a finite limit of a joint that
+/// has none, unless it is the model's own number.
 pub(crate) fn position_limits(
     model: &Model,
     lower: &[f64],
@@ -33,6 +37,13 @@ pub(crate) fn position_limits(
     for body in model.bodies().iter().skip(1).filter(|body| body.mimic.is_none()) {
         let (nq, nv) = (body.joint.nq(), body.joint.nv());
         if nq != nv || body.joint == Joint::FreeFlyer {
+            let own = model.limits();
+            let is_given = |i: usize| {
+                (lower[i].is_finite() && lower[i] != own.lower[i]) || (upper[i].is_finite() && upper[i] != own.upper[i])
+            };
+            if let Some(index) = (body.idx_q..body.idx_q + nq).find(|i| is_given(*i)) {
+                return Err(Error::Unlimited { joint: body.joint_name.clone(), index });
+            }
             continue;
         }
         for k in 0..nv {

@@ -59,6 +59,14 @@ pub enum Error {
         /// The allowed range, in words.
         allowed: &'static str,
     },
+    /// A limit is given for the position of a joint on a circle, a sphere or in free space, which has no limits here.
+    #[error("limits of joint `{joint}`: entry {index} is finite, but positions of such joints have no limits")]
+    Unlimited {
+        /// The joint's name.
+        joint: String,
+        /// Index of the entry in q.
+        index: usize,
+    },
     /// A lower limit is above the upper limit.
     #[error("limits of joint `{joint}`: lower is {lower}, above upper, which is {upper}")]
     Limits {

@@ -50,6 +50,26 @@ fn descriptions_are_checked() {
     }
 }
 
+/// Checks that limits of a free-flyer are refused, but not the model's own numbers.
+#[test]
+fn limits_that_cannot_be_held_are_refused() {
+    let quadruped = robots::quadruped();
+    let own = quadruped.limits();
+    let limits = |lower: Vec<f64>| JointLimits { lower: Some(lower), ..JointLimits::default() };
+    let make = |lower| {
+        let settings = Settings { limits: Some(limits(lower)), ..Settings::default() };
+        DifferentialIk::new(&quadruped, &[Task::com()], settings).map(|_| ())
+    };
+    assert!(make(own.lower.clone()).is_ok());
+    let mut lower = own.lower.clone();
+    lower[2] = 0.3; // the height of the trunk
+    let error = make(lower.clone()).unwrap_err().to_string();
+    assert!(error.contains("entry 2 is finite, but positions of such joints have no limits"), "{error}");
+    let settings = SearchSettings { lower: Some(lower), ..SearchSettings::default() };
+    let error = GlobalIk::new(&quadruped, &["LF_foot"], settings).unwrap_err().to_string();
+    assert!(error.contains("entry 2"), "{error}");
+}
+
 #[test]
 fn arguments_are_checked() {
     let arm = robots::arm7();

@@ -6,7 +6,7 @@ use crate::planner::Planner;
 use crate::policy::Policy;
 use crate::report::Report;
 use crate::settings::{PlanLimits, PlanSettings, check_at_least};
-use condyle_dynamics::{Model, Se3};
+use condyle_dynamics::{Joint, Model, Se3};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, GeometryPair, Limit, Residual, Target};
 use condyle_optimal::{InteriorPoint, Problem};
 use std::sync::Arc;
@@ -115,10 +115,14 @@ impl ArmMpc {
     /// Creates a controller for a robot with a fixed base, whose frame `frame` follows poses. Allocates.
     ///
     /// # Errors
-    /// [`Error::Optimal`] for a frame that does not exist, an invalid pair of geometries, or a robot with joints that
-    /// move no mass; [`Error::Setting`] for an invalid setting.
+    /// [`Error::Robot`] for a robot with a free-flyer; [`Error::Optimal`] for a frame that does not exist, an invalid
+    /// pair of geometries, or a robot with joints that move no mass; [`Error::Setting`] for an invalid setting.
     pub fn new(model: Arc<Model>, frame: &str, settings: ArmSettings) -> Result<Self, Error> {
         settings.check()?;
+        if model.bodies().iter().any(|body| body.joint == Joint::FreeFlyer) {
+            let what = format!("`{}` has a free-flyer; expected a fixed base", model.name());
+            return Err(Error::Robot { what });
+        }
         let (nv, w) = (model.nv(), settings.weights);
         let knots = (settings.horizon / settings.knot).round().max(1.0) as usize;
         let neutral = [condyle_dynamics::neutral(&model), vec![0.0; nv]].concat();

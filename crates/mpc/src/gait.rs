@@ -97,6 +97,9 @@ impl Gait {
     }
 }
 
+/// Shortest duration of a swing (s). Shorter ones are no motion of a leg, and would switch contacts many times a knot.
+const SHORTEST_SWING: f64 = 0.01;
+
 fn check_duration(name: &str, seconds: f64, is_valid: bool) -> Result<(), Error> {
     match is_valid && seconds.is_finite() {
         true => Ok(()),
@@ -142,6 +145,10 @@ impl Cycle {
             let name = &feet[foot].frame;
             if !(0.0 <= start && start < end && end <= self.period) {
                 return wrong(format!("`{name}` swings from {start} to {end} s; the period has {} s", self.period));
+            }
+            if end - start < SHORTEST_SWING {
+                let what = format!("`{name}` swings for {} s; expected at least {SHORTEST_SWING} s", end - start);
+                return wrong(what);
             }
             let overlaps = |other: &&(usize, f64, f64)| other.0 == foot && other.1 < end && start < other.2;
             if let Some((_, from, to)) = self.swings[..k].iter().find(overlaps) {

@@ -9,6 +9,9 @@ use condyle_optimal::{InteriorPoint, PolicyPublisher, Problem, Schedule, Status}
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// Magnitude from which the numbers of a measured state are invalid (m, rad, m/s, rad/s).
+const LARGEST: f64 = 1e6;
+
 /// Plan that each tick renews, in the same way for all controllers. A controller gives the references.
 #[derive(Debug)]
 pub(crate) struct Planner {
@@ -82,9 +85,11 @@ impl Planner {
         Ok(())
     }
 
-    /// Returns whether a measured state is finite. Otherwise, the report says that it is not.
+    /// Returns whether the numbers of a measured state are below [`LARGEST`]. Otherwise, the report says that the state
+    /// is invalid.
     pub(crate) fn accepts(&mut self, x: &[f64]) -> Result<bool, Error> {
-        if x.len() == self.x.len() && x.iter().any(|x| !x.is_finite()) {
+        let is_small = |x: &f64| x.abs() < LARGEST; // false for NaN
+        if x.len() == self.x.len() && !x.iter().all(is_small) {
             self.report.status = TickStatus::InvalidState;
             return Ok(false);
         }

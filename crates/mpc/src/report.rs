@@ -38,7 +38,7 @@ pub enum TickStatus {
     Planned,
     /// The sweep failed, so the new plan is the last one, simulated from the measured state with its feedback.
     Fallback,
-    /// The measured state was not finite, so the last plan remains in use.
+    /// A number of the measured state was not finite, or was 1e6 or more, so the last plan remains in use.
     InvalidState,
     /// The solver found no finite plan, so the horizon began anew from the measured state.
     Restarted,

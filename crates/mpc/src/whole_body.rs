@@ -268,8 +268,12 @@ impl WholeBodyMpc {
     ///
     /// # Errors
     /// [`Error::Gait`] for a gait that does not fit the feet; [`Error::Argument`] for a time that is too late or no
-    /// number.
+    /// number, and for a time before the first [`reset`](Self::reset).
     pub fn set_gait_at(&mut self, gait: Gait, t: f64) -> Result<(), Error> {
+        if !self.planner.is_started && t.is_finite() {
+            let what = "there is no plan yet: call `reset` first, or give no time".to_owned();
+            return Err(Error::Argument { name: "t", what });
+        }
         let now = self.guide.last() + self.settings().latency;
         if t.is_nan() || self.planner.is_started && t > now + LATEST {
             let what = format!("the time {t} s is not before {} s", now + LATEST);

@@ -126,6 +126,9 @@ fn invalid_obstacles_are_named() {
     let fails = |settings: ArmSettings| ArmMpc::new(arm.clone(), "tool", settings).unwrap_err().to_string();
     let error = fails(ArmSettings { obstacles: vec![on("tool"), on("tol")], ..ArmSettings::default() });
     assert!(error.contains("pairs[1]") && error.contains("tol"), "{error}");
+    let quadruped = Arc::new(robots::quadruped());
+    let error = ArmMpc::new(quadruped, "LF_foot", ArmSettings::default()).unwrap_err().to_string();
+    assert!(error.contains("expected a fixed base"), "{error}");
     let error = fails(ArmSettings { clearance: f64::NAN, ..ArmSettings::default() });
     assert!(error.contains("clearance"), "{error}");
 }

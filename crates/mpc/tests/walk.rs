@@ -277,6 +277,8 @@ fn the_budget_limits_the_linearisations() {
 fn a_gait_changes_at_a_given_time() {
     let mut mpc = controller(trot(), Settings::default());
     let x = stand();
+    let early = mpc.set_gait_at(Gait::Stand, 0.9).unwrap_err();
+    assert_eq!(early.to_string(), "`t`: there is no plan yet: call `reset` first, or give no time");
     mpc.reset(0.0, &x).unwrap();
     mpc.set_gait_at(Gait::Stand, 0.9).unwrap();
     let swings: Vec<bool> = (1..80)
@@ -373,6 +375,8 @@ fn bad_states_leave_a_safe_policy() {
     assert_eq!(mpc.update(0.02, &broken).unwrap().status, TickStatus::InvalidState);
     assert_eq!(policy.control(0.02, &broken, &mut tau), EffortSource::OpenLoop);
     assert!(tau.iter().all(|tau| tau.is_finite()));
+    let far = [&[1e16, 0.0, 0.0][..], &x[3..]].concat();
+    assert_eq!(mpc.update(0.03, &far).unwrap().status, TickStatus::InvalidState);
     assert_eq!(mpc.update(0.04, &x).unwrap().status, TickStatus::Planned);
     assert_eq!(mpc.update(0.03, &x).unwrap_err(), Error::Time { t: 0.03, last: 0.04 });
     assert_eq!(mpc.update(0.06, &x[1..]).unwrap_err().to_string(), "`x`: expected 37 numbers, found 36");
@@ -424,6 +428,9 @@ fn wrong_descriptions_are_refused() {
     assert_eq!(late, "gait: `LF_foot` swings from 0.8 to 1.2 s; the period has 1 s");
     let short = refused(&four, trot(), Settings { horizon: 0.01, ..Settings::default() });
     assert_eq!(short, "setting `horizon` is 0.01, but it must be at least a knot, and at most 1000 knots");
+    let tiny = Gait::Table { period: 1e-5, swings: vec![("LF_foot".into(), 1e-6, 3e-6)] };
+    let tiny = refused(&four, tiny, Settings::default());
+    assert!(tiny.ends_with("expected at least 0.01 s"), "{tiny}");
     let backwards = refused(&four, Gait::in_turn(Pattern::Trot, -0.2, 0.0), Settings::default());
     assert_eq!(backwards, "gait: the swing's duration is -0.2 s");
 }

@@ -175,11 +175,14 @@ controller! { WholeBodyMpc, 6 {
     ///
     /// Other swings stay as the schedule has them.
     ///
-    /// feet: the names of the frames of the feet that touch, or a bool for each foot.
+    /// feet: the names of the frames of the feet that touch, one name, or a bool for each foot.
     ///
     /// Raises `ControllerError` for a name that is not a foot, or another number of bools.
     fn touch(&self, feet: &Bound<'_, PyAny>) -> PyResult<()> {
         let mut inner = lock("controller", &self.inner)?;
+        if let Ok(name) = feet.extract::<String>() {
+            return inner.touch_named(&[name]).map_err(mpc_error);
+        }
         if let Ok(names) = feet.extract::<Vec<String>>() {
             return inner.touch_named(&names).map_err(mpc_error);
         }

@@ -414,10 +414,14 @@ pub(crate) fn geometry_pairs(model: &Bound<'_, Model>, pairs: &Bound<'_, PyAny>)
 
 /// Reads pair k of spheres or geometries.
 fn geometry_pair(model: &Bound<'_, Model>, k: usize, pair: &Bound<'_, PyAny>) -> PyResult<robot::GeometryPair> {
-    let wrong = || PyTypeError::new_err(format!("pairs[{k}]: expected a pair of spheres, found {}", found_type(pair)));
+    let wrong =
+        || PyTypeError::new_err(format!("pairs[{k}]: expected a pair of geometries, found {}", found_type(pair)));
     let pair = pair.cast::<PyTuple>().map_err(|_| wrong())?;
     if pair.len() != 2 {
-        return Err(PyTypeError::new_err(format!("pairs[{k}]: expected two spheres, found a tuple of {}", pair.len())));
+        return Err(PyTypeError::new_err(format!(
+            "pairs[{k}]: expected two geometries, found a tuple of {}",
+            pair.len()
+        )));
     }
     let [first, second] = [0, 1].map(|side| geometry(model, &format!("pairs[{k}][{side}]"), &pair.get_item(side)?));
     Ok(robot::GeometryPair::new(first?, second?))

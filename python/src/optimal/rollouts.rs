@@ -6,6 +6,7 @@ use crate::arrays::{class, matrix, place, tensor, vector, writable};
 use crate::exceptions::problem_error;
 use crate::signals::{self, Signals};
 use condyle::optimal as rust;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use rust::{RolloutResults, Rollouts};
@@ -52,6 +53,9 @@ pub(crate) fn rollout_many<'py>(
     gradients: bool,
     threads: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
+    if threads == 0 {
+        return Err(PyValueError::new_err("threads: expected at least 1, found 0"));
+    }
     let inner = lock("problem", &problem.inner)?;
     let (horizon, nx, ndx) = (inner.horizon(), inner.nx(), inner.ndx());
     let (count, length) = (us.len()?, inner.control_range(horizon).end);
@@ -67,7 +71,7 @@ pub(crate) fn rollout_many<'py>(
             Err(_) => vector("x0", x0, nx)?.to_vec(),
         },
     };
-    let mut rollouts = Rollouts::new(&inner, threads.clamp(1, count.max(1))).map_err(problem_error)?;
+    let mut rollouts = Rollouts::new(&inner, threads.min(count.max(1))).map_err(problem_error)?;
     drop(inner);
 
     let place = |wanted: bool, shape: &[usize]| wanted.then(|| place(py, None, shape)).transpose();
