@@ -3120,7 +3120,7 @@ class WholeBodyMpc:
 
         Other swings stay as the schedule has them.
 
-        feet: the names of the frames of the feet that touch, or a bool for each foot.
+        feet: the names of the frames of the feet that touch, one name, or a bool for each foot.
 
         Raises `ControllerError` for a name that is not a foot, or another number of bools.
         """
@@ -5652,6 +5652,7 @@ class WholeBodyController:
                      f_min ≤ Σ f_n ≤ f_max               for each contact, ramped while it fades in or out
                      −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
                      bounds on q̈                         from limits of position and velocity: `JointLimits`
+                     ∂d/∂q q̈ ≥ …                         for the distance d of each pair: `DistanceLimits`
 
     J and J_c are the Jacobians of tasks and contacts; in Jᵀ f, J belongs to the contact forces. a* is the desired
     acceleration of a task, and w are weights. f are the contact forces: f_n is the normal component of a force, f₁ and

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import condyle
+from condyle.distances import Geometry, Shape
 from condyle.optimal import ContactDynamics, Cost, Fddp, FreeDynamics, ImpulseDynamics, Problem, Residual
 from condyle.wholebody import (
     ControllerError,
+    DistanceLimits,
     FrictionContact,
     Gains,
     JointLimits,
@@ -209,6 +211,31 @@ def test_settings_are_the_library_s() -> None:
     assert WholeBodyController(QUADRUPED, [], [], Settings(joint_limits=None)).settings.joint_limits is None
 
 
+def test_a_distance_is_held() -> None:
+    """Checks that an arm moves around a ball, and that copies of the controller have the same limits."""
+    arm, q, v = condyle.robots.arm7(), np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0]), np.zeros(7)
+    data = condyle.Data(arm)
+    begin = condyle.frame_placement(arm, data, q, "tool")[:3, 3]
+    ball = begin + np.array([0.0, 0.15, 0.03])
+    pair = (Geometry(Shape.sphere([0.0] * 3, 0.03), "tool", name="hand"), Geometry(Shape.sphere(ball, 0.08)))
+    settings = Settings(distances=DistanceLimits([pair], minimum=0.02))
+    tasks = [Task.position("tool"), Task.posture(weight=1e-3)]
+    controller = pickle.loads(pickle.dumps(WholeBodyController(arm, [], tasks, settings)))
+    given = controller.settings.distances
+    assert given is not None and given.minimum == 0.02 and given.pairs[0][0].name == "hand"
+    references, nearest = controller.hold(q), np.inf
+    references.frames[0].pose[1, 3] += 0.3
+    for _ in range(1500):
+        command = controller.step(q, v, references).solved()
+        q = condyle.integrate(arm, q, 1e-3 * v + 0.5e-6 * command.a)
+        v = v + 1e-3 * command.a
+        tool = condyle.frame_placement(arm, data, q, "tool")[:3, 3]
+        nearest = min(nearest, np.linalg.norm(tool - ball) - 0.11)
+    assert nearest > 0.0199 and np.linalg.norm(tool - begin - [0.0, 0.3, 0.0]) < 5e-3
+    with pytest.raises(ControllerError, match="distances.range is 0"):
+        WholeBodyController(arm, [], tasks, Settings(distances=DistanceLimits([pair], range=0.0)))
+
+
 def test_limits_of_effort() -> None:
     """Checks that commands are within the torque limits if motors are too weak to carry the robot."""
     weak = np.full(18, 5.0)
@@ -381,7 +408,17 @@ def test_values() -> None:
         Task.posture(joints=np.arange(18)),
         Task.contact_force("LF_foot", 2.0, [True] * 6, 2),
     ]
-    for value in (limited, edge, *points(), *tasks, Settings(), Gains(1.0, 2.0), JointLimits(), Pyramid()):
+    for value in (
+        limited,
+        edge,
+        *points(),
+        *tasks,
+        Settings(),
+        Gains(1.0, 2.0),
+        JointLimits(),
+        DistanceLimits([]),
+        Pyramid(),
+    ):
         again = pickle.loads(pickle.dumps(value))
         assert again == value and repr(again) == repr(value)
     assert limited != points()[0] and tasks[0] != Task.com()

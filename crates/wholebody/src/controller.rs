@@ -103,7 +103,8 @@ impl WholeBodyController {
 
         let kinematics = Kinematics::new(model, &frames);
         let unknowns = model.nv() + touching.iter().map(|c| c.geometry.unknowns()).sum::<usize>();
-        let objective = Objective::new(resolved, model.nv(), unknowns);
+        let pairs = settings.distances.as_ref().map_or(0, |limits| limits.pairs.len());
+        let objective = Objective::new(resolved, model.nv(), unknowns, pairs);
         let rows: Vec<usize> = objective.priorities.iter().map(|priority| priority.b.len()).collect();
         let held = match rows.len() {
             1 => 0,
@@ -123,8 +124,8 @@ impl WholeBodyController {
         };
         let Settings { damping, hold_ticks, .. } = settings;
         let safety = Safety::new(&kinematics, &neutral(model), settings.effort(model), damping, hold_ticks);
-        let equations = Equations::new(kinematics, touching, &settings, held);
-        let hierarchy = TaskHierarchy::new(equations.program.capacity(), equations.limited.len(), &rows, &settings);
+        let equations = Equations::new(kinematics, touching, &settings, held)?;
+        let hierarchy = TaskHierarchy::new(equations.program.capacity(), equations.dense_rows(), &rows, &settings);
         let planned = PlannedState { q: neutral(model), v: vec![0.0; model.nv()], a: vec![0.0; model.nv()] };
         Ok(Self { settings, equations, objective, hierarchy, safety, command, planned })
     }
@@ -291,7 +292,7 @@ impl WholeBodyController {
             hierarchy.solve(program, kinds, &objective.priorities)
         };
         let failed = matches!(outcome.stopped, Some(Stopped::Infeasible | Stopped::NumericalError)) && done == 0;
-        command.limits_relaxed = failed && !equations.bounds.bounds.is_empty();
+        command.limits_relaxed = failed && equations.can_relax();
         if command.limits_relaxed {
             equations.relax(&mut objective.priorities[0], PULL);
             let iterations = outcome.iterations;

@@ -5,10 +5,12 @@
 use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
 use crate::contact_rows::ContactRows;
+use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::least_squares::{LeastSquares, dot};
 use crate::limits::AccelerationBounds;
 use crate::references::References;
+use crate::separation::Separation;
 use crate::settings::Settings;
 use crate::warm_start::Places;
 use condyle_dynamics::{Joint, Model};
@@ -27,6 +29,8 @@ pub(crate) struct Equations {
     pub actuated: Vec<usize>,
     /// Coordinates whose motor has an effort limit, each with its minimum and maximum effort.
     pub limited: Vec<(usize, [f64; 2])>,
+    /// Distances of pairs of geometries; their rows of G follow the rows of the efforts.
+    separation: Option<Separation>,
     pub bounds: AccelerationBounds,
     /// Coordinates with limits of position or velocity. Each has a row of G for the bounds on its acceleration.
     bounded: Vec<usize>,
@@ -48,7 +52,7 @@ impl Equations {
         mut contacts: Vec<ContactRows>,
         settings: &Settings,
         held: usize,
-    ) -> Self {
+    ) -> Result<Self, Error> {
         let model = &kinematics.model;
         let nv = model.nv();
         let free_flyers = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer);
@@ -59,14 +63,39 @@ impl Equations {
         let limited: Vec<_> = limits.filter(|(_, sides)| sides.iter().any(|x| x.is_finite())).collect();
         let bounds = AccelerationBounds::new(model, settings.joint_limits.as_ref());
         let bounded = bounds.bounds.iter().map(|bound| bound.0).collect();
-        let rows = limited.len() + bounds.bounds.len();
+        let separation = settings.distances.as_ref().map(|limits| Separation::new(model, limits)).transpose()?;
+        let pairs = separation.as_ref().map_or(0, Separation::len);
+        let rows = limited.len() + pairs + bounds.bounds.len();
         let mut capacity = Size { unknowns: nv, equalities: free.len(), rows, cone_rows: 0 };
         contacts.iter_mut().for_each(|contact| contact.add_to(&mut capacity, settings.friction));
         capacity.equalities += held;
         let weight = kinematics.mass * model.gravity().norm_squared().sqrt();
         let (Et, program) = (DMatrix::zeros(capacity.unknowns, nv), ConeProgram::new(capacity));
         let places = Places::new(capacity);
-        Self { free, actuated, limited, bounds, bounded, Et, program, places, weight, contacts, kinematics }
+        Ok(Self {
+            free,
+            actuated,
+            limited,
+            separation,
+            bounds,
+            bounded,
+            Et,
+            program,
+            places,
+            weight,
+            contacts,
+            kinematics,
+        })
+    }
+
+    /// Returns the number of rows with few zeros: of the efforts, and of the distances.
+    pub(crate) fn dense_rows(&self) -> usize {
+        self.limited.len() + self.separation.as_ref().map_or(0, Separation::len)
+    }
+
+    /// Returns whether there are limits that may give way.
+    pub(crate) fn can_relax(&self) -> bool {
+        self.separation.is_some() || !self.bounds.bounds.is_empty()
     }
 
     pub(crate) fn model(&self) -> &Model {
@@ -75,12 +104,14 @@ impl Equations {
 
     /// Returns the program and its known structure.
     pub(crate) fn program(&mut self) -> (&mut ConeProgram, Known<'_>) {
-        (&mut self.program, Known { dense: self.limited.len(), single: &self.bounded, places: &self.places })
+        let dense = self.dense_rows();
+        (&mut self.program, Known { dense, single: &self.bounded, places: &self.places })
     }
 
     /// Computes all constraints at the state (q, v).
     pub(crate) fn update(&mut self, q: &[f64], v: &[f64], references: &References, settings: &Settings) {
-        let Self { kinematics, contacts, bounds, Et, program, .. } = self;
+        let dense = self.dense_rows();
+        let Self { kinematics, contacts, separation, bounds, Et, program, .. } = self;
         kinematics.update(q, v);
         let nv = v.len();
         let mut unknowns = nv;
@@ -121,15 +152,18 @@ impl Equations {
             let h = kinematics.h[i];
             (program.lower[row], program.upper[row]) = (least - h, greatest - h); // τ_min ≤ E x + h ≤ τ_max
         }
+        if let Some(separation) = separation {
+            separation.write(&kinematics.model, q, v, program, self.limited.len()); // g q̈ ≥ bound − ġ v
+        }
         bounds.update(q, v);
         for (k, &(i, lower, upper)) in bounds.bounds.iter().enumerate() {
-            let row = self.limited.len() + k;
+            let row = dense + k;
             let coefficients = program.row_mut(row);
             coefficients[..unknowns].fill(0.0);
             coefficients[i] = 1.0; // position and velocity, as bounds on q̈
             (program.lower[row], program.upper[row]) = (lower, upper);
         }
-        program.size.rows = self.limited.len() + bounds.bounds.len();
+        program.size.rows = dense + bounds.bounds.len();
         self.places.clear();
         self.places.unknowns.extend(0..nv);
         self.places.units.resize(nv, 1.0);
@@ -148,11 +182,15 @@ impl Equations {
         }
     }
 
-    /// Removes the joints' limits from the rows. If the bounds exclude zero acceleration, the joint gets a task of this
-    /// weight for the nearest allowed acceleration.
+    /// Removes the limits of joints and distances from the rows. If the bounds exclude zero acceleration, the joint or
+    /// pair gets a task of this weight for the nearest allowed acceleration.
     pub(crate) fn relax(&mut self, objective: &mut LeastSquares, weight: f64) {
+        let dense = self.dense_rows();
+        if let Some(separation) = &self.separation {
+            separation.relax(&mut self.program, self.limited.len(), objective, weight);
+        }
         for (k, &(i, lower, upper)) in self.bounds.bounds.iter().enumerate() {
-            let row = self.limited.len() + k;
+            let row = dense + k;
             (self.program.lower[row], self.program.upper[row]) = (f64::NEG_INFINITY, f64::INFINITY);
             if lower > 0.0 || upper < 0.0 {
                 objective.add_single(i, weight, if lower > 0.0 { lower } else { upper });
@@ -165,7 +203,7 @@ impl Equations {
         let p = &self.program;
         let stride = p.At.nrows();
         let product = |matrix: &DMatrix<f64>, column: usize| -> f64 { dot(&matrix.as_slice()[column * stride..], x) };
-        let unit = self.limited.len()..self.limited.len() + self.bounds.bounds.len();
+        let unit = self.dense_rows()..self.dense_rows() + self.bounds.bounds.len();
         let larger = |worst: f64, x: f64| if x > worst || x.is_nan() { x } else { worst };
         let mut worst = 0.0;
         for e in 0..p.size.equalities {

@@ -13,6 +13,7 @@
 //!              f_min ≤ Σ f_n ≤ f_max                   for each contact, ramped while it fades in or out
 //!              −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
 //!              bounds on q̈                             from limits of position and velocity: [`JointLimits`]
+//!              ∂d/∂q q̈ ≥ …                             for the distance d of each pair of bodies: [`DistanceLimits`]
 //! ```
 //!
 //! The efforts τ are eliminated: their limits become rows in x. [`Task`]s move the centre of mass, frames, joints,
@@ -65,6 +66,7 @@ mod plan;
 mod reason;
 mod references;
 mod safety;
+mod separation;
 mod settings;
 mod task;
 mod task_hierarchy;
@@ -80,6 +82,7 @@ pub use error::{Error, InvalidRotation, Status};
 pub use kkt_residuals::KktResiduals;
 pub use plan::{Plan, PlanData};
 pub use references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};
+pub use separation::DistanceLimits;
 pub use settings::{Backend, Formulation, Friction, JointLimits, Settings};
 pub use task::{Axes, Gains, Task, TaskKind};
 

@@ -161,9 +161,13 @@ pub(crate) struct Objective {
 }
 
 impl Objective {
-    pub(crate) fn new(tasks: Vec<ResolvedTask>, nv: usize, unknowns: usize) -> Self {
+    /// Allocates memory for the tasks, and for `relaxed` rows of limits that give way, in the first priority.
+    pub(crate) fn new(tasks: Vec<ResolvedTask>, nv: usize, unknowns: usize, relaxed: usize) -> Self {
         let count = tasks.iter().map(|t| t.task.priority + 1).max().unwrap_or(1);
-        let rows = |p| tasks.iter().filter(|t| t.task.priority == p).map(ResolvedTask::max_rows).sum();
+        let rows = |p| {
+            let of_tasks: usize = tasks.iter().filter(|t| t.task.priority == p).map(ResolvedTask::max_rows).sum();
+            of_tasks + if p == 0 { relaxed } else { 0 }
+        };
         let priorities = (0..count).map(|p| LeastSquares::new(unknowns, rows(p))).collect();
         Self { priorities, error: vec![0.0; nv], tasks }
     }

@@ -1,6 +1,7 @@
 //! Settings of a controller.
 
 use crate::error::Error;
+use crate::separation::DistanceLimits;
 use crate::task::Gains;
 use condyle_dynamics::{Joint, Model};
 use std::fmt;
@@ -118,6 +119,8 @@ pub struct Settings {
     pub effort: Option<Vec<f64>>,
     /// Limits of the joints' positions and velocities; `None` for no limits.
     pub joint_limits: Option<JointLimits>,
+    /// Limits of distances between bodies and obstacles; `None` for no limits.
+    pub distances: Option<DistanceLimits>,
     /// Maximum number of ticks after the last solution in which the solution's torques serve as the safe command.
     pub hold_ticks: u32,
     /// Damping of the safe command after `hold_ticks`: the effort −D v at the velocity v, where D is this factor
@@ -147,6 +150,7 @@ impl Default for Settings {
             friction: Friction::Cone,
             effort: None,
             joint_limits: Some(JointLimits::default()),
+            distances: None,
             hold_ticks: 5,
             damping: 0.02,
             backend: Backend::InteriorPoint,
@@ -186,6 +190,7 @@ impl Settings {
                 return Err(Error::Setting { name, value, allowed });
             }
         }
+        self.distances.as_ref().map_or(Ok(()), DistanceLimits::check)?;
         let (nq, nv) = (model.nq(), model.nv());
         for (name, numbers, expected, least) in [
             ("effort", &self.effort, nv, None), // `check_effort` checks the numbers

@@ -28,6 +28,7 @@ use std::sync::Mutex;
 ///                  f_min ≤ Σ f_n ≤ f_max               for each contact, ramped while it fades in or out
 ///                  −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
 ///                  bounds on q̈                         from limits of position and velocity: `JointLimits`
+///                  ∂d/∂q q̈ ≥ …                         for the distance d of each pair: `DistanceLimits`
 ///
 /// J and J_c are the Jacobians of tasks and contacts; in Jᵀ f, J belongs to the contact forces. a* is the desired
 /// acceleration of a task, and w are weights. f are the contact forces: f_n is the normal component of a force, f₁ and
@@ -84,7 +85,7 @@ impl WholeBodyController {
         tasks: Vec<PyRef<'_, Task>>,
         settings: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let settings = settings.map_or_else(|| Ok(rust::Settings::default()), settings::read)?;
+        let settings = settings.map_or_else(|| Ok(rust::Settings::default()), |given| settings::read(model, given))?;
         let contacts: Vec<_> = contacts.iter().map(|contact| contact.0.clone()).collect();
         let tasks: Vec<_> = tasks.iter().map(|task| task.0.clone()).collect();
         let robot = &model.get().inner;

@@ -2,10 +2,12 @@
 
 use crate::arrays::{Give, class, numbers};
 use crate::exceptions::wrong_word;
+use crate::model::Model;
+use crate::optimal::geometry_pairs;
 use condyle::wholebody as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rust::{Backend, Formulation, Friction, JointLimits, Settings};
+use rust::{Backend, DistanceLimits, Formulation, Friction, JointLimits, Settings};
 
 /// Reads gains, given as a pair.
 pub(super) fn gains(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<rust::Gains> {
@@ -20,8 +22,22 @@ fn list(given: &Bound<'_, PyAny>, prefix: &str, name: &str) -> PyResult<Option<V
     (!value.is_none()).then(|| numbers(&format!("{prefix}{name}"), &value)).transpose()
 }
 
-/// Converts settings to the library's type.
-pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
+/// Reads limits of distances between geometries of a robot; `None` if they are None.
+fn distances(model: &Bound<'_, Model>, given: &Bound<'_, PyAny>) -> PyResult<Option<DistanceLimits>> {
+    if given.is_none() {
+        return Ok(None);
+    }
+    Ok(Some(DistanceLimits {
+        pairs: geometry_pairs(model, &given.getattr("pairs")?)?,
+        minimum: given.getattr("minimum")?.extract()?,
+        look_ahead: given.getattr("look_ahead")?.extract()?,
+        max_acceleration: given.getattr("max_acceleration")?.extract()?,
+        range: given.getattr("range")?.extract()?,
+    }))
+}
+
+/// Converts settings for a robot to the library's type.
+pub(super) fn read(model: &Bound<'_, Model>, given: &Bound<'_, PyAny>) -> PyResult<Settings> {
     let get = |name: &str| given.getattr(name);
     let friction = get("friction")?;
     let friction = match (friction.extract::<String>().as_deref(), friction.extract::<(usize, bool)>()) {
@@ -53,6 +69,7 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
         friction,
         effort: list(given, "", "effort")?,
         joint_limits,
+        distances: distances(model, &get("distances")?)?,
         hold_ticks: get("hold_ticks")?.extract()?,
         damping: get("damping")?.extract()?,
         backend: match get("backend")?.extract::<String>()?.as_str() {
@@ -91,6 +108,12 @@ pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, Py
         let all = (l.look_ahead, l.max_acceleration, lower, upper, velocity);
         class!(py, "condyle._wholebody", "JointLimits")?.call1(all)
     };
+    let distances = |l: &DistanceLimits| {
+        let text = serde_json::to_string(&l.pairs).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        let pairs = py.import("condyle.distances")?.call_method1("_read_pairs", (text,))?;
+        let all = (pairs, l.minimum, l.look_ahead, l.max_acceleration, l.range);
+        class!(py, "condyle._wholebody", "DistanceLimits")?.call1(all)
+    };
     let all = [
         s.acceleration_weight.give(py, None)?,
         s.force_weight.give(py, None)?,
@@ -107,6 +130,7 @@ pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, Py
         s.tolerance.give(py, None)?,
         s.max_iterations.into_pyobject(py)?.into_any(),
         s.time_limit.give(py, None)?,
+        s.distances.as_ref().map(distances).transpose()?.into_pyobject(py)?.into_any(),
     ];
     class!(py, "condyle._wholebody", "Settings")?.call1(pyo3::types::PyTuple::new(py, all)?)
 }
