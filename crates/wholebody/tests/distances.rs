@@ -24,8 +24,8 @@ fn tool(arm: &Model, q: &[f64]) -> Vec3<f64> {
     forward_kinematics(arm, &mut Data::new(arm), q).frame(arm.frame("tool").unwrap()).translation
 }
 
-/// Moves the tool of the arm by `by` for 2 s. Returns the smallest distance of each time step, and the last error of the
-/// tool.
+/// Moves the tool of the arm by `by` for 2 s. Returns the smallest distance of each time step, and the last error of
+/// the tool.
 fn moved(settings: Settings, ball: Vec3<f64>, by: Vec3<f64>) -> (Vec<f64>, f64) {
     let arm = robots::arm7();
     let (mut q, mut v) = (start(), vec![0.0; 7]);
