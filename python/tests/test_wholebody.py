@@ -232,7 +232,7 @@ def test_a_distance_is_held() -> None:
         tool = condyle.frame_placement(arm, data, q, "tool")[:3, 3]
         nearest = min(nearest, np.linalg.norm(tool - ball) - 0.11)
     assert nearest > 0.0199 and np.linalg.norm(tool - begin - [0.0, 0.3, 0.0]) < 5e-3
-    with pytest.raises(ControllerError, match="distances.range is 0"):
+    with pytest.raises(ControllerError, match="`distances.range` is 0"):
         WholeBodyController(arm, [], tasks, Settings(distances=DistanceLimits([pair], range=0.0)))
 
 
