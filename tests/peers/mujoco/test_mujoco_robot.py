@@ -1,7 +1,6 @@
 """Tests `condyle.conventions.MujocoRobot`: states and efforts by names, in a scene whose joints and actuators have
 another order than the robot's."""
 
-import xml.etree.ElementTree as ET
 from collections.abc import Callable
 
 import mujoco
@@ -24,7 +23,7 @@ Change = Callable[[mujoco.MjSpec], object]
 
 def scene(change: Change = lambda spec: None, motors: bool = True) -> mujoco.MjModel:
     """Returns a scene: a box, then the quadruped, whose motors are in the reverse order of its joints."""
-    text = ET.tostring(bare(condyle.robots.QUADRUPED)).decode()
+    text = bare(condyle.robots.QUADRUPED)
     robot = mujoco.MjSpec.from_string(text)
     spec = mujoco.MjSpec()
     box = spec.worldbody.add_body(name="box", pos=[3.0, 0.0, 0.0])
