@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 from pushes import ANGLES, BEGIN, Push
-from walking import COMMANDS, CONDITIONS, LEAST, WALKERS, Conditions, Walk, survives, walk
+from walking import COMMANDS, CONDITIONS, LEAST, RATES, WALKERS, Conditions, Walk, at_rate, survives, walk
 from world import Array
 
 full = pytest.mark.skipif("CONDYLE_FULL" not in os.environ, reason="takes minutes: ./test full")
@@ -65,6 +65,16 @@ def test_pushes_are_survived(name: str) -> None:
         for impulse, least in LEAST[name].items():
             pushes = [Push(impulse, angle, begin) for begin, angle in product(BEGIN, ANGLES)]
             assert sum(pool.map(survives, [name] * len(pushes), pushes)) >= least, impulse
+
+
+@full
+@pytest.mark.parametrize(("name", "impulses"), [("go2", (12.0, 16.0, 20.0, 24.0)), ("g1", (6.0, 9.0))])
+def test_pushes_are_survived_at_the_highest_rate(name: str, impulses: tuple[float, ...]) -> None:
+    with ProcessPoolExecutor() as pool:
+        for impulse in impulses:
+            pushes = [Push(impulse, angle, begin) for begin, angle in product(BEGIN, ANGLES)]
+            survived = pool.map(survives, [name] * len(pushes), pushes, [at_rate(RATES[name])] * len(pushes))
+            assert sum(survived) >= 15, impulse
 
 
 @full

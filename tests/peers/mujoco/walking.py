@@ -168,6 +168,10 @@ LEAST = {"go2": {12.0: 16, 16.0: 16, 20.0: 16, 24.0: 15, 28.0: 9}, "g1": {6.0: 1
 """Smallest number of survived pushes of 16, by their impulse (N s)."""
 
 
+RATES = {"go2": 500.0, "g1": 150.0}
+"""Highest rates of ticks on one core (Hz). A plan is then used one period after its state was measured."""
+
+
 class Walk(NamedTuple):
     """Result of a simulation."""
 
@@ -245,10 +249,25 @@ def walk(
     return Walk(fallen, *map(np.array, (times, states, efforts, ticks, gaps)))
 
 
-def survives(name: str, push: Push) -> bool:
+def at_rate(rate: float) -> Conditions:
+    """Returns the conditions of ticks that last as long as the period."""
+    return Conditions(period=1.0 / rate, late=1.0 / rate)
+
+
+def survives(name: str, push: Push, conditions: Conditions = NOMINAL) -> bool:
     """Returns whether the robot survives a push."""
-    command = PUSHED[name]
-    return not walk(name, push.begin + PUSH_TIME + SURVIVED, lambda _: command, [push]).fallen
+    command, end = PUSHED[name], push.begin + PUSH_TIME + SURVIVED
+    return not walk(name, end, lambda _: command, [push], conditions, latency=conditions.late).fallen
+
+
+def at_highest_rate(name: str) -> str:
+    """Returns the times of ticks at the highest rate, and the fraction of ticks that exceed the period."""
+    period = 1.0 / RATES[name]
+    found = walk(name, 8.0, lambda _: COMMANDS[name][0], conditions=at_rate(RATES[name]), latency=period)
+    ticks = found.ticks.sum(axis=1)
+    middle, most = 1e3 * np.percentile(ticks, [50, 99])
+    late = 100.0 * np.mean(ticks > period)
+    return f"{name} at {RATES[name]:g} Hz: {middle:.2f} ms, p99 {most:.2f} ms, {late:.1f} % of {len(ticks)} ticks late"
 
 
 def walked(name: str, command: tuple[float, float, float], conditions: Conditions) -> str:
@@ -274,6 +293,8 @@ def main() -> None:
     for name in names:
         for conditions in CONDITIONS.get(name, []):
             print(walked(name, COMMANDS[name][0], conditions), conditions, flush=True)
+    for name in [name for name in names if name in RATES]:
+        print(at_highest_rate(name), flush=True)
     with ProcessPoolExecutor() as pool:
         for name in [name for name in names if name in LEAST]:
             for impulse in LEAST[name]:
