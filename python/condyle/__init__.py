@@ -78,7 +78,8 @@ Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL
 Modules: `optimal` (FDDP, DDP and their problems), `distances` (between shapes), `ik` (inverse kinematics), `mpc`
     (controllers at a rate), `wholebody` (control), `simulation`, `algebra` (poses, motions, forces), `conventions`
     (other libraries' numbers). Further modules must be imported by name: `casadi`, `pinocchio` (Pinocchio's names of
-    functions), `crocoddyl` (Crocoddyl's problems), `codegen` (straight-line C), `cuda` (kernels) and `viz` (pictures)
+    functions), `crocoddyl` (Crocoddyl's problems), `codegen` (straight-line C), `cuda` (kernels), `torch` and `jax`
+    (differentiable operations of PyTorch and JAX) and `viz` (pictures)
 """
 
 from . import algebra, conventions, distances, ik, inertial_parameters, mpc, optimal, robots, simulation, wholebody

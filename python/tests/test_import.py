@@ -6,6 +6,8 @@ import sys
 # Optional dependencies, and modules that are slow to import.
 LATER = {
     "casadi",
+    "jax",
+    "torch",
     "tqdm",
     "scipy",
     "matplotlib",

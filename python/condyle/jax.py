@@ -1,0 +1,293 @@
+"""Functions of a robot as differentiable operations of JAX, on batches of states.
+
+>>> import condyle, condyle.jax, jax, jax.numpy as jnp
+>>> arm = condyle.jax.Dynamics(condyle.robots.arm7())
+>>> q, v, tau = jnp.full((100, 7), 0.3), jnp.zeros(7), jnp.ones(7)  # 100 states
+>>> effort = jax.jit(jax.grad(lambda q: (arm.aba(q, v, tau) ** 2).sum()))
+>>> effort(q).shape
+(100, 7)
+
+Values are computed by the library's functions for many states, in SIMD lanes and on `threads` threads; derivatives by
+the library's exact derivatives. Second derivatives are exact where they exist: the docstring of a method tells where.
+Elsewhere a second differentiation raises `NotImplementedError`. `jax.jit`, `grad`, `vmap`, `jacrev`, `jacfwd`,
+`hessian` and `lax.scan` work. Compiled programs call the library by `jax.pure_callback`; `vmap` adds an axis to the
+batch of one call.
+
+Arrays have float32 or float64 numbers, and results have the arguments' type. So with JAX's default setting, without
+`jax_enable_x64`, results are float32. All computations use float64 inside. NaN in one state gives NaN in the results of
+this state only.
+
+Derivatives with respect to a position have nq numbers. They are derivatives of f(normalize(q)), as in
+`condyle.casadi`: the gradient has no component along a quaternion. The derivative of `f(integrate(q, d))` with respect
+to d, at d = 0, is the derivative in the tangent space, with nv numbers.
+
+JAX is an optional dependency: `pip install condyle[jax]`. The tests use version 0.10.2.
+"""
+
+import importlib
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from . import _dynamics
+from ._condyle import Model
+from ._operations import Operation, Shape, Slot
+
+try:
+    jax: Any = importlib.import_module("jax")
+except ImportError:
+    raise ImportError("condyle.jax needs JAX: pip install condyle[jax]") from None
+
+jnp: Any = importlib.import_module("jax.numpy")
+_ad: Any = importlib.import_module("jax.interpreters.ad")
+_batching: Any = importlib.import_module("jax.interpreters.batching")
+_mlir: Any = importlib.import_module("jax.interpreters.mlir")
+_Primitive: Any = importlib.import_module("jax.extend.core").Primitive
+
+__all__ = ["Dynamics"]
+
+Call = Callable[..., Sequence[Any]]
+
+
+def _primitive(name: str, compute: Call, slots: Callable[[Operation], Sequence[Slot]]) -> Any:
+    """Makes a primitive with arguments (*arrays, operation, needed): x, then cotangents λ, then tangents ẋ.
+
+    compute: (operation, needed, *NumPy arrays) -> results; slots: the results' names and shapes.
+    """
+    primitive = _Primitive(f"condyle_{name}")
+    primitive.multiple_results = True
+
+    def shapes(arrays: Sequence[Any], operation: Operation) -> list[Any]:
+        cut = len(arrays[0].shape) - len(operation.inputs[0].shape)
+        batch, kind = tuple(arrays[0].shape[:cut]), arrays[0].dtype
+        return [jax.ShapeDtypeStruct((*batch, *slot.shape), kind) for slot in slots(operation)]
+
+    def call(operation: Operation, needed: Any, *arrays: Any) -> list[Any]:
+        numbers = [np.asarray(array) for array in arrays]
+        return [y.astype(numbers[0].dtype) for y in compute(operation, needed, *numbers)]
+
+    def compiled(*arrays: Any, operation: Operation, needed: Any) -> Any:
+        def host(*arrays: Any) -> list[Any]:
+            return call(operation, needed, *arrays)
+
+        return jax.pure_callback(host, shapes(arrays, operation), *arrays, vmap_method="broadcast_all")
+
+    def at_once(*arrays: Any, operation: Operation, needed: Any) -> list[Any]:
+        return [jnp.asarray(y) for y in call(operation, needed, *arrays)]
+
+    def abstract(*arrays: Any, operation: Operation, needed: Any) -> list[Any]:
+        return [jax.core.ShapedArray(s.shape, s.dtype) for s in shapes(arrays, operation)]
+
+    def batched(arrays: Sequence[Any], axes: Sequence[Any], operation: Operation, needed: Any) -> Any:
+        (size,) = {a.shape[at] for a, at in zip(arrays, axes, strict=True) if at is not None}
+        moved = [
+            jnp.broadcast_to(a, (size, *a.shape)) if at is None else jnp.moveaxis(a, at, 0)
+            for a, at in zip(arrays, axes, strict=True)
+        ]
+        results = primitive.bind(*moved, operation=operation, needed=needed)
+        return results, [0] * len(results)
+
+    primitive.def_impl(at_once)
+    primitive.def_abstract_eval(abstract)
+    _mlir.register_lowering(primitive, _mlir.lower_fun(compiled, multiple_results=True))
+    _batching.primitive_batchers[primitive] = batched
+    return primitive
+
+
+def _inputs(operation: Operation) -> Sequence[Slot]:
+    return operation.inputs
+
+
+def _outputs(operation: Operation) -> Sequence[Slot]:
+    return operation.outputs
+
+
+def _cut(operation: Operation, arrays: Sequence[Any]) -> tuple[Sequence[Any], Sequence[Any]]:
+    n = len(operation.inputs)
+    return arrays[:n], arrays[n:]
+
+
+def _call_pull(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
+    return operation.pull(*_cut(operation, arrays), needed)
+
+
+def _call_push(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
+    return operation.push(*_cut(operation, arrays), needed)
+
+
+def _call_bend(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
+    x, more = _cut(operation, arrays)
+    m = len(operation.outputs)
+    return operation.bend(x, more[:m], more[m:], needed)
+
+
+def _call_curve(operation: Operation, needed: Any, *arrays: Any) -> Sequence[Any]:
+    x, more = _cut(operation, arrays)
+    return operation.curve(x, *_cut(operation, more))
+
+
+_value = _primitive("value", lambda operation, needed, *x: operation.value(*x), _outputs)  # x -> f(x)
+_pull = _primitive("pull", _call_pull, _inputs)  # (x, λ) -> Jᵀ λ
+_push = _primitive("push", _call_push, _outputs)  # (x, ẋ) -> J ẋ
+_bend = _primitive("bend", _call_bend, _inputs)  # (x, λ, ẋ) -> H ẋ
+_curve = _primitive("curve", _call_curve, _outputs)  # (x, ẋ, ẏ) -> the second derivative along ẋ and ẏ
+
+
+def _moving(tangents: Sequence[Any]) -> tuple[bool, ...]:
+    return tuple(type(t) is not _ad.Zero for t in tangents)
+
+
+def _full(values: Sequence[Any]) -> list[Any]:
+    """Returns tangents or cotangents, with zeros instead of symbols of zeros."""
+    return [_ad.instantiate_zeros(value) for value in values]
+
+
+def _sum(a: Sequence[Any], b: Sequence[Any]) -> list[Any]:
+    return [x + y for x, y in zip(a, b, strict=True)]
+
+
+def _value_jvp(x: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
+    y = _value.bind(*x, operation=operation, needed=needed)
+    return y, _push.bind(*x, *_full(tangents), operation=operation, needed=_moving(tangents))
+
+
+def _push_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
+    x, along = _cut(operation, arrays)
+    moved, changed = _cut(operation, tangents)
+    y = _push.bind(*x, *along, operation=operation, needed=needed)
+    total = [jnp.zeros_like(d) for d in y]
+    if any(_moving(changed)):
+        total = _sum(total, _push.bind(*x, *_full(changed), operation=operation, needed=needed))
+    if any(_moving(moved)):
+        if not operation.twice:
+            raise operation.only_once()
+        total = _sum(total, _curve.bind(*x, *along, *_full(moved), operation=operation, needed=None))
+    return y, total
+
+
+def _push_transpose(cotangents: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
+    x, along = _cut(operation, arrays)  # along: symbols of the arguments in which J ẋ is linear, or constants
+    linear = tuple(_ad.is_undefined_primal(d) for d in along)
+    slopes = _pull.bind(*x, *_full(cotangents), operation=operation, needed=linear)
+    return [None] * len(x) + [g if flag else None for g, flag in zip(slopes, linear, strict=True)]
+
+
+def _pull_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
+    x, cotangents = _cut(operation, arrays)
+    moved, changed = _cut(operation, tangents)
+    y = _pull.bind(*x, *cotangents, operation=operation, needed=needed)
+    total = [jnp.zeros_like(g) for g in y]
+    if any(_moving(changed)):
+        total = _sum(total, _pull.bind(*x, *_full(changed), operation=operation, needed=needed))
+    if any(_moving(moved)):
+        if not operation.twice:
+            raise operation.only_once()
+        bent = _bend.bind(*x, *cotangents, *_full(moved), operation=operation, needed=(True,) * len(x))
+        total = [t + b if flag else t for t, b, flag in zip(total, bent, needed, strict=True)]
+    return y, total
+
+
+def _pull_transpose(directions: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
+    x, _ = _cut(operation, arrays)
+    along = tuple(a and b for a, b in zip(_moving(directions), needed, strict=True))
+    return [None] * len(x) + list(_push.bind(*x, *_full(directions), operation=operation, needed=along))
+
+
+def _bend_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
+    n, m = len(operation.inputs), len(operation.outputs)
+    if any(_moving(tangents[: n + m])):
+        raise operation.too_often()
+    y = _bend.bind(*arrays, operation=operation, needed=needed)
+    changed = [*arrays[: n + m], *_full(tangents[n + m :])]
+    return y, _bend.bind(*changed, operation=operation, needed=needed)
+
+
+def _bend_transpose(directions: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
+    n, m = len(operation.inputs), len(operation.outputs)  # H is symmetric
+    bent = _bend.bind(*arrays[: n + m], *_full(directions), operation=operation, needed=(True,) * n)
+    return [None] * (n + m) + list(bent)
+
+
+def _curve_jvp(arrays: Sequence[Any], tangents: Sequence[Any], operation: Operation, needed: Any) -> Any:
+    x, both = _cut(operation, arrays)
+    moved, more = _cut(operation, tangents)
+    if any(_moving(moved)):
+        raise operation.too_often()
+    (a, b), (along_a, along_b) = _cut(operation, both), _cut(operation, more)
+    y = _curve.bind(*arrays, operation=operation, needed=needed)
+    first = _curve.bind(*x, *_full(along_a), *b, operation=operation, needed=needed)
+    return y, _sum(first, _curve.bind(*x, *a, *_full(along_b), operation=operation, needed=needed))
+
+
+def _curve_transpose(cotangents: Sequence[Any], *arrays: Any, operation: Operation, needed: Any) -> list[Any]:
+    x, both = _cut(operation, arrays)
+    a, b = _cut(operation, both)  # linear in one of the two
+    first = any(_ad.is_undefined_primal(d) for d in a)
+    bent = _bend.bind(*x, *_full(cotangents), *(b if first else a), operation=operation, needed=(True,) * len(x))
+    none = [None] * len(x)
+    return [*none, *bent, *none] if first else [*none, *none, *bent]
+
+
+_ad.primitive_jvps |= {
+    _value: _value_jvp,
+    _push: _push_jvp,
+    _pull: _pull_jvp,
+    _bend: _bend_jvp,
+    _curve: _curve_jvp,
+}
+_ad.primitive_transposes |= {
+    _push: _push_transpose,
+    _pull: _pull_transpose,
+    _bend: _bend_transpose,
+    _curve: _curve_transpose,
+}
+
+
+class Dynamics(_dynamics.Dynamics):
+    """Differentiable functions of one robot, on JAX's arrays.
+
+    An argument has the shape (*batch, n) with any batch; batches broadcast. Arrays have float32 or float64 numbers. An
+    array of integers is a `TypeError`; a wrong shape is a `ValueError`. Several threads may call the methods at the
+    same time. JAX's arrays on other devices than the CPU are copied to the CPU and back.
+
+    model: the robot; threads: the number of threads of one call.
+
+    >>> import condyle, condyle.jax, jax, jax.numpy as jnp
+    >>> quadruped = condyle.jax.Dynamics(condyle.robots.quadruped())
+    >>> q = jnp.asarray(condyle.neutral(quadruped.model))
+    >>> height = jax.grad(lambda q: quadruped.com(q)[2])(q)
+    >>> bool(abs(height[2] - 1.0) < 1e-6)  # the centre of mass rises with the trunk
+    True
+    """
+
+    def __init__(self, model: Model, threads: int = 1) -> None:
+        super().__init__(model, threads)
+        spans, at = [], 0
+        for rotation in self._pool.coordinates.rotations:
+            spans += [(slice(at, rotation.numbers.start), False), (rotation.numbers, True)]
+            at = rotation.numbers.stop
+        self._spans = [*spans, (slice(at, model.nq), False)]
+
+    def _arrays(self, names: Sequence[str], values: Sequence[Any]) -> list[Any]:
+        arrays = []
+        for name, value in zip(names, values, strict=True):
+            array = jnp.asarray(value)
+            if array.dtype not in (jnp.float32, jnp.float64):
+                raise TypeError(f"{name}: expected float32 or float64, found {array.dtype}")
+            arrays.append(array)
+        kind = jnp.result_type(*arrays)
+        return [array.astype(kind) for array in arrays]
+
+    def _expand(self, array: Any, shape: Shape) -> Any:
+        return jnp.broadcast_to(array, shape)
+
+    def _apply(self, operation: Operation, arrays: Sequence[Any]) -> tuple[Any, ...]:
+        return tuple(_value.bind(*arrays, operation=operation, needed=None))
+
+    def _normalized(self, q: Any) -> Any:
+        parts = []
+        for span, unit in self._spans:
+            part = q[..., span]
+            parts.append(part / jnp.linalg.norm(part, axis=-1, keepdims=True) if unit else part)
+        return jnp.concatenate(parts, -1)
