@@ -66,11 +66,14 @@ class Dynamics(ABC):
                 raise ValueError(f"{slot.name}: expected shape (..., {expected}), found {shape}")
             batches.append(shape[:cut])
         try:
-            batch = np.broadcast_shapes(*batches)
+            batch = batches[0] if all(b == batches[0] for b in batches) else np.broadcast_shapes(*batches)
         except ValueError:
             found = ", ".join(f"{slot.name} {shape}" for slot, shape in zip(slots, batches, strict=True))
             raise ValueError(f"{operation.name}: expected batches that broadcast, found {found}") from None
-        arrays = [self._expand(array, (*batch, *slot.shape)) for slot, array in zip(slots, arrays, strict=True)]
+        arrays = [
+            array if found == batch else self._expand(array, (*batch, *slot.shape))
+            for slot, array, found in zip(slots, arrays, batches, strict=True)
+        ]
         results = self._apply(operation, arrays)
         return results[0] if len(results) == 1 else results
 
@@ -81,7 +84,7 @@ class Dynamics(ABC):
         q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; f_ext: the external force on each
         body in the body's frame, (nbodies, 6), linear part first (N, N m).
         """
-        return self._dynamics("rnea", q, v, a, f_ext)
+        return self._forced(table.rnea, q, v, a, f_ext)
 
     def aba(self, q: Any, v: Any, tau: Any, f_ext: Any = None) -> Any:
         """Returns the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²). Exact second
@@ -89,12 +92,12 @@ class Dynamics(ABC):
 
         q: position, nq numbers; v, tau: velocity and efforts, nv numbers each; f_ext: as for `rnea`.
         """
-        return self._dynamics("aba", q, v, tau, f_ext)
+        return self._forced(table.aba, q, v, tau, f_ext)
 
-    def _dynamics(self, name: Any, q: Any, v: Any, u: Any, f_ext: Any) -> Any:
+    def _forced(self, make: Callable[[Pool, bool], Operation], q: Any, v: Any, u: Any, f_ext: Any) -> Any:
         forces = f_ext is not None
         arguments = (q, v, u, f_ext) if forces else (q, v, u)
-        return self._call((name, forces), lambda: table.dynamics(self._pool, name, forces), *arguments)
+        return self._call((make, forces), lambda: make(self._pool, forces), *arguments)
 
     def nonlinear_effects(self, q: Any, v: Any) -> Any:
         """Returns h(q, v): `rnea` without acceleration, nv numbers (N m, N). Exact second derivatives exist.

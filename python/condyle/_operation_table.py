@@ -16,56 +16,98 @@ from ._condyle import ConstraintSet
 from ._operations import Operation, Pool, Scratch, Slot
 
 _Array = NDArray[np.float64]
-_Row = list[_Array | None]
+_Row = list["_Array | float | None"]
 Reference = Literal["local", "world", "local_world_aligned"]
 
 
-def dynamics(pool: Pool, name: Literal["rnea", "aba"], forces: bool) -> Operation:
-    """Returns τ = rnea(q, v, a) or q̈ = aba(q, v, τ), with external forces as an additional argument if `forces`."""
-    model, nv, inverse = pool.model, pool.model.nv, name == "rnea"
-    function, derivatives, hessians = (getattr(c, name + end) for end in ("", "_derivatives", "_hessian"))
+def rnea(pool: Pool, forces: bool) -> Operation:
+    """Returns τ = rnea(q, v, a), with external forces as an additional argument if `forces`."""
+    model, nv = pool.model, pool.model.nv
+    function: Any = c.rnea
 
     def value(scratch: Scratch, *x: _Array) -> tuple[_Array, ...]:
         return (function(model, scratch.data, *x),)
 
     def jacobians(scratch: Scratch, needed: Sequence[bool], *x: _Array) -> list[_Row]:
-        matrix = (nv, nv)
-        row: list[Any]
-        if inverse:
-            row = [*derivatives(model, scratch.data, *x, out=scratch.out(name, len(x[0]), *[matrix] * 3))]
-        else:
-            shapes = ((nv,), matrix, matrix, matrix)
-            row = [*derivatives(model, scratch.data, *x, out=scratch.out(name, len(x[0]), *shapes))[1:]]
-        if forces and needed[3]:  # τ = … − Σ Jᵢᵀ fᵢ, and q̈ = M⁻¹ (… + Σ Jᵢᵀ fᵢ)
-            stacked = body_jacobians(scratch, x[0]).swapaxes(1, 2)
-            row.append(-stacked if inverse else np.matmul(row[2], stacked))
-        elif forces:
-            row.append(None)
-        return [row]
-
-    def body_jacobians(scratch: Scratch, q: _Array) -> _Array:
-        found = [c.body_jacobian(model, scratch.data, q, body) for body in range(model.nbodies)]
-        return np.concatenate(found, 1)  # (N, 6 nbodies, nv)
+        return [_inverse_dynamics(pool, scratch, needed, *x)]
 
     def hessian(scratch: Scratch, x: list[_Array], cotangents: list[_Array]) -> dict[tuple[int, int], _Array]:
-        q, v, u, *f_ext = x
-        found = hessians(model, scratch.data, q, v, u, cotangents[0], *f_ext)
-        blocks = dict(zip(((0, 0), (1, 0), (1, 1), (2, 0)), found, strict=True))
-        if forces:  # ∂(λᵀf)/∂fᵢ = ∓Jᵢ(q) μ with μ = λ for rnea and μ = M⁻¹ λ for aba
-            sign, mu = -1.0 if inverse else 1.0, cotangents[0]
-            if not inverse:
-                mu = np.matmul(c.minv(model, scratch.data, q), mu[:, :, None])[:, :, 0]
-            bodies = range(model.nbodies)
-            slopes = [c.body_velocity_derivative(model, scratch.data, q, mu, body) for body in bodies]
-            blocks[3, 0] = sign * np.concatenate(slopes, 1)
-            if not inverse:
-                blocks[3, 0] += np.matmul(body_jacobians(scratch, q), found[3])  # ∂μ/∂q is the block for τ and q
+        q, v, a, *f_ext = x
+        found = c.rnea_hessian(model, scratch.data, q, v, a, cotangents[0], f_ext[0] if f_ext else None)
+        blocks = dict(zip(_BLOCKS, found, strict=True))
+        if forces:  # the derivative with respect to fᵢ is −Jᵢ(q) λ
+            blocks[3, 0] = -_body_slopes(pool, scratch, q, cotangents[0])
         return blocks
 
-    inputs = [Slot("q", (model.nq,), True), Slot("v", (nv,)), Slot("a" if inverse else "tau", (nv,))]
-    if forces:
-        inputs.append(Slot("f_ext", (model.nbodies, 6)))
-    return Operation(name, pool, inputs, [Slot("tau" if inverse else "a", (nv,))], value, jacobians, hessian)
+    inputs = [*_motion(pool, 3), *_forces(pool, forces)]
+    return Operation("rnea", pool, inputs, [Slot("tau", (nv,))], value, jacobians, hessian)
+
+
+def aba(pool: Pool, forces: bool) -> Operation:
+    """Returns q̈ = aba(q, v, τ), with external forces as an additional argument if `forces`.
+
+    rnea(q, v, q̈) = τ, so that ∂q̈ = −M⁻¹ (∂rnea − ∂τ). The product with −M⁻¹ is a call of `aba` at rest and without
+    gravity. This takes less time than `aba_derivatives`, which multiplies matrices by M⁻¹.
+    """
+    model, nv = pool.model, pool.model.nv
+    falling = model.with_gravity([0.0, 0.0, 0.0])
+    function: Any = c.aba
+
+    def value(scratch: Scratch, *x: _Array) -> tuple[_Array, ...]:
+        return (function(model, scratch.data, *x),)
+
+    def jacobians(
+        scratch: Scratch, needed: Sequence[bool], q: _Array, v: _Array, tau: _Array, *f: _Array, y: _Array | None = None
+    ) -> list[_Row]:
+        a = function(model, scratch.data, q, v, tau, *f) if y is None else y
+        row = _inverse_dynamics(pool, scratch, needed, q, v, a, *f)
+        return [[*row[:2], -1.0, *row[3:]]]
+
+    def solve(scratch: Scratch, x: list[_Array], r: _Array) -> _Array:
+        solution: _Array = c.aba(falling, scratch.data, x[0], np.zeros_like(r), r)
+        return np.negative(solution, out=solution)
+
+    def hessian(scratch: Scratch, x: list[_Array], cotangents: list[_Array]) -> dict[tuple[int, int], _Array]:
+        q, v, tau, *f_ext = x
+        found = c.aba_hessian(model, scratch.data, q, v, tau, cotangents[0], f_ext[0] if f_ext else None)
+        blocks = dict(zip(_BLOCKS, found, strict=True))
+        if forces:  # the derivative with respect to fᵢ is Jᵢ(q) μ with μ = M⁻¹ λ, and the last block is ∂μ/∂q
+            mu = -solve(scratch, x, cotangents[0])
+            blocks[3, 0] = _body_slopes(pool, scratch, q, mu) + np.matmul(_body_jacobians(pool, scratch, q), found[3])
+        return blocks
+
+    inputs = [*_motion(pool, 2), Slot("tau", (nv,)), *_forces(pool, forces)]
+    return Operation("aba", pool, inputs, [Slot("a", (nv,))], value, jacobians, hessian, solve)
+
+
+_BLOCKS = ((0, 0), (1, 0), (1, 1), (2, 0))
+"""The pairs of arguments for the members of `rnea_hessian` and `aba_hessian`."""
+
+
+def _inverse_dynamics(
+    pool: Pool, scratch: Scratch, needed: Sequence[bool], q: _Array, v: _Array, a: _Array, *f: _Array
+) -> _Row:
+    """Returns the Jacobians of `rnea` with respect to q, v and a, and with respect to external forces if given."""
+    out: Any = scratch.out("rnea", len(q), *[(pool.model.nv, pool.model.nv)] * 3)
+    row: _Row = [*c.rnea_derivatives(pool.model, scratch.data, q, v, a, f[0] if f else None, out)]
+    if f:  # τ = … − Σ Jᵢᵀ fᵢ
+        row.append(-_body_jacobians(pool, scratch, q).swapaxes(1, 2) if needed[3] else None)
+    return row
+
+
+def _body_jacobians(pool: Pool, scratch: Scratch, q: _Array) -> _Array:
+    """Returns the Jacobians of all bodies in their frames, (N, 6 nbodies, nv)."""
+    return np.concatenate([c.body_jacobian(pool.model, scratch.data, q, b) for b in range(pool.model.nbodies)], 1)
+
+
+def _body_slopes(pool: Pool, scratch: Scratch, q: _Array, v: _Array) -> _Array:
+    """Returns the derivatives ∂(Jᵢ(q) v)/∂q of all bodies' velocities, (N, 6 nbodies, nv)."""
+    bodies = range(pool.model.nbodies)
+    return np.concatenate([c.body_velocity_derivative(pool.model, scratch.data, q, v, b) for b in bodies], 1)
+
+
+def _forces(pool: Pool, forces: bool) -> list[Slot]:
+    return [Slot("f_ext", (pool.model.nbodies, 6))] if forces else []
 
 
 def inertia(pool: Pool, name: Literal["crba", "minv"]) -> Operation:

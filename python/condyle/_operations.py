@@ -24,8 +24,8 @@ from ._coordinates import Coordinates
 _Array = NDArray[np.float64]
 Shape = tuple[int, ...]
 
-CHUNK = 2**21
-"""Size of a chunk's Jacobians in bytes; chosen because Jacobians then remain in the second-level cache."""
+CHUNK = 2**23
+"""Size of a chunk's Jacobians in bytes; chosen because smaller chunks take up to 15 % more time (panda, TALOS)."""
 
 
 class Slot(NamedTuple):
@@ -75,9 +75,12 @@ class Pool:
 
 Value = Callable[..., tuple[_Array, ...]]
 """(scratch, *x) -> y. Each array has one row for each state; positions are normalised."""
-Jacobians = Callable[..., list[list[_Array | None]]]
-"""(scratch, needed, *x) -> for each result and each argument ∂y/∂x, (N, m, n), in tangent spaces. A zero Jacobian is
-None. None may also replace the Jacobian for an argument that is not in `needed`."""
+Jacobians = Callable[..., list[list["_Array | float | None"]]]
+"""(scratch, needed, *x) -> for each result and each argument ∂y/∂x, (N, m, n), in tangent spaces. A number is this
+multiple of the unit matrix, and a zero Jacobian is None. None may also replace the Jacobian for an argument that is not
+in `needed`."""
+Solve = Callable[..., _Array]
+"""(scratch, x, r) -> S r, (N, nv), with a symmetric matrix S for each state."""
 Hessian = Callable[..., dict[tuple[int, int], _Array]]
 """(scratch, x, λ) -> the nonzero blocks ∂²(λᵀf)/∂xᵢ∂xⱼ, (N, nᵢ, nⱼ), each pair of arguments once."""
 
@@ -94,9 +97,14 @@ class Operation:
         value: Value,
         jacobians: Jacobians,
         hessian: Hessian | None = None,
+        solve: Solve | None = None,
     ) -> None:
+        """Makes an operation. With `solve`, the Jacobians of the only result are S J instead of J, and `jacobians`
+        takes the result as the argument `y` if it is known.
+        """
         self.name, self.inputs, self.outputs = name, tuple(inputs), tuple(outputs)
-        self._pool, self._value, self._jacobians, self._hessian = pool, value, jacobians, hessian
+        self._pool, self._value, self._jacobians = pool, value, jacobians
+        self._hessian, self._solve = hessian, solve
         rows = sum(math.prod(slot.shape) for slot in outputs)
         columns = sum(math.prod(slot.shape) for slot in inputs)
         self._chunk = max(16 * pool.threads, CHUNK // (8 * max(rows * columns, 1)))
@@ -123,38 +131,50 @@ class Operation:
 
     def value(self, *x: NDArray[Any]) -> list[_Array]:
         """Returns y = f(x). Each argument has the shape (*batch, *shape) with the same batch."""
-        return self._chunks(x, (), lambda scratch, x, _: self._value(scratch, *self._unit(x)), self.outputs)
+
+        def rows(scratch: Scratch, x: list[_Array], unit: list[_Array], _: list[_Array]) -> list[_Array]:
+            return self._in_chunks(lambda x: self._value(scratch, *x), unit)
+
+        return self._rows(x, (), rows, self.outputs)
 
     def pull(
-        self, x: Sequence[NDArray[Any]], cotangents: Sequence[NDArray[Any]], needed: Sequence[bool]
+        self,
+        x: Sequence[NDArray[Any]],
+        cotangents: Sequence[NDArray[Any]],
+        needed: Sequence[bool],
+        y: Sequence[NDArray[Any]] = (),
     ) -> list[_Array]:
-        """Returns Jᵀ λ for each argument; zeros for arguments that are not needed."""
+        """Returns Jᵀ λ for each argument; zeros for arguments that are not needed. y may be the results f(x): some
+        operations then take less time.
+        """
 
-        def rows(scratch: Scratch, x: list[_Array], cotangents: list[_Array]) -> list[_Array]:
-            unit = self._unit(x)
-            slopes = self._slopes(scratch, unit, self._dropped(scratch, unit, cotangents), needed)
-            return [self._lowered(slot, x, g) for slot, x, g in zip(self.inputs, x, slopes, strict=True)]
+        def rows(scratch: Scratch, x: list[_Array], unit: list[_Array], both: list[_Array]) -> list[_Array]:
+            cotangents, known = both[:count], both[count:]
+            slopes = self._slopes(scratch, unit, self._dropped(scratch, unit, cotangents), needed, known)
+            return self._lowered(x, slopes)
 
-        return self._chunks(x, cotangents, rows, self.inputs)
+        count, known = len(cotangents), y if self._solve is not None else ()
+        return self._rows(x, [*cotangents, *known], rows, self.inputs)
 
     def push(self, x: Sequence[NDArray[Any]], tangents: Sequence[NDArray[Any]], needed: Sequence[bool]) -> list[_Array]:
         """Returns J ẋ for each result; tangents of arguments that are not needed count as zero."""
 
-        def rows(scratch: Scratch, x: list[_Array], tangents: list[_Array]) -> list[_Array]:
-            unit, along = self._unit(x), self._tangents(x, tangents)
-            jacobians = self._jacobians(scratch, needed, *unit)
-            values = (
-                self._value(scratch, *unit) if any(slot.position for slot in self.outputs) else [None] * len(jacobians)
-            )
-            results = []
-            for slot, y, row in zip(self.outputs, values, jacobians, strict=True):
-                total = sum(_product(J, d) for J, d in zip(row, along, strict=True) if J is not None)
-                if isinstance(total, int):
-                    total = np.zeros((len(x[0]), math.prod(slot.shape)))
-                results.append(self._pool.coordinates.lift(y, total) if slot.position and y is not None else total)
-            return results
+        def rows(scratch: Scratch, x: list[_Array], unit: list[_Array], tangents: list[_Array]) -> list[_Array]:
+            def products(x: list[_Array], along: list[_Array]) -> list[_Array]:
+                sums = [np.zeros((len(x[0]), self._size(slot))) for slot in self.outputs]
+                for total, row in zip(sums, self._jacobians(scratch, needed, *x), strict=True):
+                    for J, d, flag in zip(row, along, needed, strict=True):
+                        if J is not None and flag:
+                            total += _product(J, d)
+                return sums if self._solve is None else [self._solve(scratch, x, sums[0])]
 
-        return self._chunks(x, tangents, rows, self.outputs)
+            found = self._in_chunks(products, unit, self._tangents(x, tangents))
+            if self._flat_results:
+                return found
+            values, lift = self._value(scratch, *unit), self._pool.coordinates.lift
+            return [lift(y, d) if slot.position else d for slot, y, d in zip(self.outputs, values, found, strict=True)]
+
+        return self._rows(x, tangents, rows, self.outputs)
 
     def bend(
         self,
@@ -163,31 +183,31 @@ class Operation:
         tangents: Sequence[NDArray[Any]],
         needed: Sequence[bool],
     ) -> list[_Array]:
-        """Returns H ẋ for each argument, with the Hessian H of λᵀf; zeros for arguments that are not needed."""
+        """Returns H ẋ for each argument, with the Hessian H of λᵀf. Arguments that are not needed may have zeros."""
         if self._hessian is None:
             raise self.only_once()
-        hessian, count = self._hessian, len(cotangents)
+        hessian, count, coordinates = self._hessian, len(cotangents), self._pool.coordinates
 
-        def rows(scratch: Scratch, x: list[_Array], both: list[_Array]) -> list[_Array]:
-            unit, tangents = self._unit(x), both[count:]
-            cotangents = self._dropped(scratch, unit, both[:count])
-            along = self._tangents(x, tangents)
-            sums: list[_Array] = [np.zeros_like(d) for d in along]
-            for (i, j), block in hessian(scratch, unit, cotangents).items():
-                sums[i] += _product(block, along[j])
-                if i != j:
-                    sums[j] += _transposed_product(block, along[i])
-            results = [self._lowered(slot, x, s) for slot, x, s in zip(self.inputs, x, sums, strict=True)]
-            curved = [slot.position and not self._pool.coordinates.flat for slot in self.inputs]
+        def rows(scratch: Scratch, x: list[_Array], unit: list[_Array], both: list[_Array]) -> list[_Array]:
+            def products(x: list[_Array], cotangents: list[_Array], along: list[_Array]) -> list[_Array]:
+                sums = [np.zeros_like(d) for d in along]
+                for (i, j), block in hessian(scratch, x, cotangents).items():
+                    sums[i] += _product(block, along[j])
+                    if i != j:
+                        sums[j] += _transposed_product(block, along[i])
+                return sums
+
+            cotangents, tangents = self._dropped(scratch, unit, both[:count]), both[count:]
+            found = self._in_chunks(products, unit, cotangents, self._tangents(x, tangents))
+            results = self._lowered(x, found)
+            curved = [slot.position and not coordinates.flat and n for slot, n in zip(self.inputs, needed, strict=True)]
             if any(curved):  # q̂ depends on q nonlinearly
                 slopes = self._slopes(scratch, unit, cotangents, curved)
                 for k in np.flatnonzero(curved):
-                    results[k] = results[k] + self._pool.coordinates.bend(x[k], slopes[k], tangents[k])
+                    results[k] = results[k] + coordinates.bend(x[k], slopes[k], tangents[k])
             return results
 
-        zeros = np.zeros(())
-        found = self._chunks(x, [*cotangents, *tangents], rows, self.inputs)
-        return [f if n else np.broadcast_to(zeros, f.shape) for f, n in zip(found, needed, strict=True)]
+        return self._rows(x, [*cotangents, *tangents], rows, self.inputs)
 
     def curve(self, x: Sequence[NDArray[Any]], a: Sequence[NDArray[Any]], b: Sequence[NDArray[Any]]) -> list[_Array]:
         """Returns the second derivative of each result along a and b, with one call of `bend` for each number of f."""
@@ -204,72 +224,101 @@ class Operation:
                 results[k][(..., *index)] = sum(products)
         return results
 
-    def _chunks(
+    def _rows(
         self,
         x: Sequence[NDArray[Any]],
         more: Sequence[NDArray[Any]],
-        rows: Callable[[Scratch, list[_Array], list[_Array]], Sequence[_Array]],
+        compute: Callable[[Scratch, list[_Array], list[_Array], list[_Array]], Sequence[_Array]],
         slots: Sequence[Slot],
     ) -> list[_Array]:
-        """Calls `rows` for chunks of the states, with arrays (N, n), and returns its results with the batch's shape."""
+        """Calls `compute(scratch, x, x with normalised positions, more)` with arrays of one row for each state. Returns
+        the results with the batch's shape.
+        """
         batch = x[0].shape[: x[0].ndim - len(self.inputs[0].shape)]
         n = math.prod(batch)
-        matrices = [
-            np.ascontiguousarray(a, np.float64).reshape(n, -1 if n else math.prod(a.shape[len(batch) :]))
-            for a in (*x, *more)
+        if n == 0:
+            return [np.zeros((*batch, *slot.shape)) for slot in slots]
+        matrices = [np.ascontiguousarray(a, np.float64).reshape(n, -1) for a in (*x, *more)]
+        rows, normalized = matrices[: len(x)], self._pool.coordinates.normalized
+        unit = [
+            normalized(a) if slot.position else a.reshape(n, *slot.shape)
+            for slot, a in zip(self.inputs, rows, strict=True)
         ]
-        results = [np.empty((n, math.prod(slot.shape))) for slot in slots]
         with self._pool.scratch() as scratch:
-            for at in range(0, n, self._chunk):
-                part = [matrix[at : at + self._chunk] for matrix in matrices]
-                for result, found in zip(results, rows(scratch, part[: len(x)], part[len(x) :]), strict=True):
-                    result[at : at + self._chunk] = found.reshape(len(part[0]), -1)
+            results = compute(scratch, rows, unit, matrices[len(x) :])
         return [result.reshape(*batch, *slot.shape) for result, slot in zip(results, slots, strict=True)]
 
-    def _unit(self, x: Sequence[_Array]) -> list[_Array]:
-        """Returns the arguments in their shapes, with normalised positions."""
-        pool = self._pool
-        return [
-            pool.coordinates.normalized(a) if slot.position else a.reshape(len(a), *slot.shape)
-            for slot, a in zip(self.inputs, x, strict=True)
-        ]
+    def _in_chunks(self, compute: Callable[..., Sequence[_Array]], *groups: list[_Array]) -> list[_Array]:
+        """Calls `compute(*groups)` for chunks of the states, and returns the results of all states."""
+        n, chunk = len(groups[0][0]), self._chunk
+        if n <= chunk:
+            return [*compute(*groups)]
+        starts = range(0, n, chunk)
+        parts = [compute(*[[a[at : at + chunk] for a in group] for group in groups]) for at in starts]
+        return [np.concatenate(part) for part in zip(*parts, strict=True)]
+
+    def _size(self, slot: Slot) -> int:
+        """Returns the number of derivatives for a slot: a position has nv."""
+        return self._pool.coordinates.nv if slot.position else math.prod(slot.shape)
+
+    @property
+    def _flat_results(self) -> bool:
+        return self._pool.coordinates.flat or not any(slot.position for slot in self.outputs)
 
     def _tangents(self, x: Sequence[_Array], tangents: Sequence[_Array]) -> list[_Array]:
         push = self._pool.coordinates.push
         return [push(a, d) if slot.position else d for slot, a, d in zip(self.inputs, x, tangents, strict=True)]
 
-    def _lowered(self, slot: Slot, x: _Array, g: _Array) -> _Array:
-        return self._pool.coordinates.pull(x, g) if slot.position else g
+    def _lowered(self, x: Sequence[_Array], slopes: Sequence[_Array]) -> list[_Array]:
+        pull = self._pool.coordinates.pull
+        return [pull(a, g) if slot.position else g for slot, a, g in zip(self.inputs, x, slopes, strict=True)]
 
     def _dropped(self, scratch: Scratch, unit: list[_Array], cotangents: list[_Array]) -> list[_Array]:
         """Returns the cotangents in the tangent spaces of results that are positions."""
-        if self._pool.coordinates.flat or not any(slot.position for slot in self.outputs):
+        if self._flat_results:
             return cotangents
         values, drop = self._value(scratch, *unit), self._pool.coordinates.drop
         return [drop(y, g) if slot.position else g for slot, y, g in zip(self.outputs, values, cotangents, strict=True)]
 
     def _slopes(
-        self, scratch: Scratch, unit: list[_Array], cotangents: list[_Array], needed: Sequence[bool]
+        self,
+        scratch: Scratch,
+        unit: list[_Array],
+        cotangents: list[_Array],
+        needed: Sequence[bool],
+        known: Sequence[_Array] = (),
     ) -> list[_Array]:
-        """Returns Jᵀ λ in tangent spaces."""
-        coordinates, n = self._pool.coordinates, len(unit[0])
-        sums: list[Any] = [None] * len(self.inputs)
-        for row, cotangent in zip(self._jacobians(scratch, needed, *unit), cotangents, strict=True):
-            for k, J in enumerate(row):
-                if J is not None and needed[k]:
-                    g = _transposed_product(J, cotangent)
-                    sums[k] = g if sums[k] is None else sums[k] + g
-        sizes = [coordinates.nv if slot.position else math.prod(slot.shape) for slot in self.inputs]
-        return [np.zeros((n, size)) if g is None else g for g, size in zip(sums, sizes, strict=True)]
+        """Returns Jᵀ λ in tangent spaces; `known` is the result of an operation with `solve`, or empty."""
+
+        def products(x: list[_Array], cotangents: list[_Array], known: list[_Array]) -> list[_Array]:
+            options = {"y": known[0]} if known else {}
+            sums: list[_Array | None] = [None] * len(self.inputs)
+            if self._solve is not None:
+                cotangents = [self._solve(scratch, x, cotangents[0])]
+            for row, cotangent in zip(self._jacobians(scratch, needed, *x, **options), cotangents, strict=True):
+                for k, J in enumerate(row):
+                    if J is not None and needed[k]:
+                        g, before = _transposed_product(J, cotangent), sums[k]
+                        sums[k] = g if before is None else before + g
+            return [
+                np.zeros((len(x[0]), self._size(slot))) if g is None else g
+                for g, slot in zip(sums, self.inputs, strict=True)
+            ]
+
+        return self._in_chunks(products, unit, cotangents, list(known))
 
 
-def _product(J: _Array, d: _Array) -> _Array:
+def _product(J: _Array | float, d: _Array) -> _Array:
     """Returns J d for each state."""
+    if isinstance(J, float):
+        return J * d
     product: _Array = np.matmul(J, d[:, :, None])[:, :, 0]
     return product
 
 
-def _transposed_product(J: _Array, g: _Array) -> _Array:
+def _transposed_product(J: _Array | float, g: _Array) -> _Array:
     """Returns Jᵀ g for each state."""
+    if isinstance(J, float):
+        return J * g
     product: _Array = np.matmul(g[:, None, :], J)[:, 0]
     return product

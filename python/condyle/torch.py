@@ -26,6 +26,7 @@ PyTorch is an optional dependency: `pip install condyle[torch]`. The tests use v
 """
 
 import importlib
+import inspect
 from collections.abc import Sequence
 from typing import Any
 
@@ -56,6 +57,22 @@ def _zeros(tensors: Sequence[Any], like: Sequence[Any]) -> list[Any]:
     return [torch.zeros_like(x) if t is None else t for t, x in zip(tensors, like, strict=True)]
 
 
+def _plain() -> bool:
+    """Returns whether derivatives of the current computation are not needed: a function's `forward` then suffices."""
+    inside = getattr(torch._C, "_are_functorch_transforms_active", lambda: True)()
+    level = getattr(torch.autograd.forward_ad, "_current_level", 0)
+    return not torch.is_grad_enabled() and not inside and level < 0
+
+
+def _full(operation: Operation, cotangents: Sequence[Any], x: Sequence[Any]) -> list[Any]:
+    """Returns the cotangents of an operation's results, with zeros instead of None."""
+    batch = x[0].shape[: x[0].ndim - len(operation.inputs[0].shape)]
+    return [
+        x[0].new_zeros((*batch, *slot.shape)) if c is None else c
+        for c, slot in zip(cotangents, operation.outputs, strict=True)
+    ]
+
+
 class _Function(torch.autograd.Function):  # type: ignore[misc]
     """An operation with arguments (operation, needed, *tensors): the common part of four functions.
 
@@ -84,22 +101,31 @@ class _Value(_Function):
     """The function (x) -> f(x)."""
 
     @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
+        _Function.setup_context(ctx, inputs, output)
+        ctx.save_for_backward(*inputs[2:], *output)
+
+    @staticmethod
     def forward(operation: Operation, needed: Any, *x: Any) -> Any:
         return _tensors(operation.value(*_numpy(x)), x[0])
 
     @staticmethod
     def backward(ctx: Any, *cotangents: Any) -> Any:
-        x, operation, needed = ctx.saved_tensors, ctx.operation, ctx.needs_input_grad[2:]
+        operation, needed = ctx.operation, ctx.needs_input_grad[2:]
+        x, y = ctx.saved_tensors[: len(needed)], ctx.saved_tensors[len(needed) :]
         if all(cotangent is None for cotangent in cotangents):
             return (None,) * (2 + len(x))
-        batch = x[0].shape[: x[0].ndim - len(operation.inputs[0].shape)]
-        outputs = [x[0].new_zeros(()).expand(*batch, *slot.shape) for slot in operation.outputs]
-        slopes = _Pull.apply(operation, needed, *x, *_zeros(cotangents, outputs))
+        full = _full(operation, cotangents, x)
+        if _plain():
+            slopes = _tensors(operation.pull(_numpy(x), _numpy(full), needed, _numpy(y)), x[0])
+        else:
+            slopes = _Pull.apply(operation, needed, *x, *full)
         return None, None, *(g if n else None for g, n in zip(slopes, needed, strict=True))
 
     @staticmethod
     def jvp(ctx: Any, *tangents: Any) -> Any:
-        x, needed = ctx.saved_tensors, tuple(t is not None for t in tangents[2:])
+        needed = tuple(t is not None for t in tangents[2:])
+        x = ctx.saved_tensors[: len(needed)]
         return _Push.apply(ctx.operation, needed, *x, *_zeros(tangents[2:], x))
 
     @staticmethod
@@ -168,9 +194,7 @@ class _Push(_Function):
         x, tangents = ctx.saved_tensors[:n], ctx.saved_tensors[n:]
         if all(cotangent is None for cotangent in incoming):
             return (None,) * (2 + len(ctx.saved_tensors))
-        batch = x[0].shape[: x[0].ndim - len(operation.inputs[0].shape)]
-        outputs = [x[0].new_zeros(()).expand(*batch, *slot.shape) for slot in operation.outputs]
-        cotangents = _zeros(incoming, outputs)
+        cotangents = _full(operation, incoming, x)
         by_x, by_tangents = ctx.needs_input_grad[2 : 2 + n], ctx.needs_input_grad[2 + n :]
         bent: Any = (None,) * n
         pulled: Any = (None,) * n
@@ -239,6 +263,11 @@ class _Curve(_Function):
         return _Curve._mapped(info, in_dims, *arguments)
 
 
+_kind: Any
+for _kind in (_Value, _Pull, _Push, _Bend, _Curve):
+    _kind.forward.__signature__ = inspect.signature(_kind.forward)  # PyTorch computes it for each call, in 60 µs
+
+
 class Dynamics(_dynamics.Dynamics):
     """Differentiable functions of one robot, on tensors.
 
@@ -279,7 +308,7 @@ class Dynamics(_dynamics.Dynamics):
                 )
             tensors.append(tensor)
         widest = torch.float64 if any(t.dtype == torch.float64 for t in tensors) else torch.float32
-        return [tensor.to(widest) for tensor in tensors]
+        return [tensor if tensor.dtype == widest else tensor.to(widest) for tensor in tensors]
 
     def _expand(self, array: Any, shape: Shape) -> Any:
         return array.expand(shape)
