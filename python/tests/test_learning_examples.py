@@ -44,3 +44,14 @@ def test_identified_inertias_are_physical(example: ModuleType) -> None:
     found = example.identify(cad, motion, tau, np.full(tau.shape[1], 3.0))
     for body in found.inertias:
         inertial_parameters.check(body)
+
+
+@pytest.mark.parametrize("example", ["estimate"], indirect=True)
+def test_estimation(example: ModuleType) -> None:
+    """Compares the estimates with dense least squares, which shares only the residuals, and with the truth."""
+    report = example.run(0.7, comparisons=2)
+    assert report.largest_difference < 1e-8
+    height, tilt, velocity = example.errors(report, report.estimate)
+    assert height < 0.003 and tilt < 0.01 and velocity < 0.05
+    alone = example.errors(report, report.integrated)
+    assert alone[1] > 2.0 * tilt and alone[2] > 3.0 * velocity
