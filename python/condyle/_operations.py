@@ -246,7 +246,7 @@ class Operation:
         ]
         with self._pool.scratch() as scratch:
             results = compute(scratch, rows, unit, matrices[len(x) :])
-        return [result.reshape(*batch, *slot.shape) for result, slot in zip(results, slots, strict=True)]
+        return [result.reshape((*batch, *slot.shape)) for result, slot in zip(results, slots, strict=True)]
 
     def _in_chunks(self, compute: Callable[..., Sequence[_Array]], *groups: list[_Array]) -> list[_Array]:
         """Calls `compute(*groups)` for chunks of the states, and returns the results of all states."""

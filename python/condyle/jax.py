@@ -65,7 +65,9 @@ def _primitive(name: str, compute: Call, slots: Callable[[Operation], Sequence[S
 
     def call(operation: Operation, needed: Any, *arrays: Any) -> list[Any]:
         numbers = [np.asarray(array) for array in arrays]
-        return [y.astype(numbers[0].dtype) for y in compute(operation, needed, *numbers)]
+        results = compute(operation, needed, *numbers)
+        with np.errstate(over="ignore"):  # too large for float32: infinity
+            return [y.astype(numbers[0].dtype) for y in results]
 
     def compiled(*arrays: Any, operation: Operation, needed: Any) -> Any:
         def host(*arrays: Any) -> list[Any]:

@@ -34,6 +34,8 @@ BOOK = load(ROOT / "docs" / "run.py")
     "chapter", [name for name in BOOK.chapters() if BOOK.blocks((ROOT / "docs" / name).read_text())]
 )
 def test_chapter(chapter: str) -> None:
+    if any("import jax" in block.code for block in BOOK.blocks((ROOT / "docs" / chapter).read_text())):
+        pytest.importorskip("jax")
     BOOK.run(chapter)
 
 

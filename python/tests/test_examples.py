@@ -24,6 +24,10 @@ def test_example(path: Path, tmp_path: Path) -> None:
     if path.stem.startswith("mujoco"):
         pytest.importorskip("mujoco")
         pytest.importorskip("example_robot_data")
+    if path.stem == "identify":
+        pytest.importorskip("example_robot_data")
+    if path.stem == "learn_residual":
+        pytest.importorskip("jax")
     if path.stem == "wholebody_clarabel":
         pytest.importorskip("clarabel")
     if path.stem in ("pictures", "drag_target"):

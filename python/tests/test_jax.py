@@ -70,6 +70,8 @@ def test_values(name: str, robot: str) -> None:
         for y, z in zip(jax.tree.leaves(run(*x)), expected, strict=True):
             assert y.dtype == jnp.float64 and y.shape == np.shape(z)
             assert np.allclose(y, z, rtol=ROUNDING, atol=ROUNDING)
+        for y, z in zip(jax.tree.leaves(run(*(a[3] for a in x))), expected, strict=True):
+            assert y.shape == np.shape(z)[1:] and np.allclose(y, z[3], rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize("robot", MODELS)

@@ -55,3 +55,13 @@ def test_estimation(example: ModuleType) -> None:
     assert height < 0.003 and tilt < 0.01 and velocity < 0.05
     alone = example.errors(report, report.integrated)
     assert alone[1] > 2.0 * tilt and alone[2] > 3.0 * velocity
+
+
+@pytest.mark.parametrize("example", ["learn_residual"], indirect=True)
+def test_learning(example: ModuleType) -> None:
+    pytest.importorskip("jax")
+    report = example.run(150)
+    assert np.mean(report.losses[-20:]) < 0.2 * report.losses[0]
+    assert report.prediction[1][-1] < 0.5 * report.prediction[0][-1]
+    before, after = (np.sqrt(np.mean(e[len(e) // 2 :] ** 2)) for e in report.tracking)
+    assert after < 0.6 * before

@@ -2,9 +2,11 @@
 
 import doctest
 import pickle
+import re
 import subprocess
 import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,6 +60,9 @@ def test_values(name: str, robot: str) -> None:
     for y, z in zip(outputs(found), outputs(expected), strict=True):
         assert y.dtype == torch.float64 and y.shape == np.shape(z)
         assert np.allclose(y.numpy(), z, rtol=ROUNDING, atol=ROUNDING)
+    alone = case.call(ROBOTS[robot], TIPS[robot], *(torch.tensor(a[3]) for a in x))
+    for y, z in zip(outputs(alone), outputs(found), strict=True):
+        assert y.shape == z.shape[1:] and torch.allclose(y, z[3], rtol=1e-8, atol=1e-8)
 
 
 @pytest.mark.parametrize("robot", MODELS)
@@ -269,6 +274,14 @@ def test_docstrings() -> None:
     results = doctest.testmod(condyle.torch)
     assert results.attempted >= 8
     assert results.failed == 0
+
+
+def test_chapter() -> None:
+    """Runs PyTorch's blocks of the book's chapter, as one program."""
+    page = Path(__file__).parents[2] / "docs" / "frameworks.md"
+    blocks = re.findall(r"^```py\n(.*?)^```$", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL)
+    assert blocks
+    exec("".join(blocks), {})
 
 
 def test_missing_package() -> None:
