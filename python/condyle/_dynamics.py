@@ -2,16 +2,13 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 
 from . import _operation_table as table
 from ._condyle import ConstraintSet, Model
-from ._operation_table import Reference
 from ._operations import Operation, Pool, Shape
-
-Array = TypeVar("Array")
 
 
 class Dynamics(ABC):
@@ -203,7 +200,9 @@ class Dynamics(ABC):
         index = self._frame(frame)
         return self._call(("pose", index), lambda: table.poses(self._pool, index), q)
 
-    def frame_velocity(self, q: Any, v: Any, frame: str | int, reference: Reference = "local") -> Any:
+    def frame_velocity(
+        self, q: Any, v: Any, frame: str | int, reference: Literal["local", "world", "local_world_aligned"] = "local"
+    ) -> Any:
         """Returns the velocity of a frame, 6 numbers, linear first (m/s, rad/s).
 
         q: position, nq numbers; v: velocity, nv numbers; frame: the frame's name or index; reference: 'local', 'world'
@@ -211,7 +210,14 @@ class Dynamics(ABC):
         """
         return self._frame_motion("frame_velocity", frame, reference, q, v)
 
-    def frame_acceleration(self, q: Any, v: Any, a: Any, frame: str | int, reference: Reference = "local") -> Any:
+    def frame_acceleration(
+        self,
+        q: Any,
+        v: Any,
+        a: Any,
+        frame: str | int,
+        reference: Literal["local", "world", "local_world_aligned"] = "local",
+    ) -> Any:
         """Returns the spatial acceleration of a frame, 6 numbers, linear first (m/s², rad/s²).
 
         q: position, nq numbers; v, a: velocity and acceleration, nv numbers each; frame, reference: as for
@@ -220,7 +226,12 @@ class Dynamics(ABC):
         return self._frame_motion("frame_acceleration", frame, reference, q, v, a)
 
     def frame_classical_acceleration(
-        self, q: Any, v: Any, a: Any, frame: str | int, reference: Reference = "local"
+        self,
+        q: Any,
+        v: Any,
+        a: Any,
+        frame: str | int,
+        reference: Literal["local", "world", "local_world_aligned"] = "local",
     ) -> Any:
         """Returns the classical acceleration of a frame, 6 numbers, linear first (m/s², rad/s²).
 
@@ -229,7 +240,9 @@ class Dynamics(ABC):
         """
         return self._frame_motion("frame_classical_acceleration", frame, reference, q, v, a)
 
-    def _frame_motion(self, name: str, frame: str | int, reference: Reference, *arguments: Any) -> Any:
+    def _frame_motion(
+        self, name: str, frame: str | int, reference: Literal["local", "world", "local_world_aligned"], *arguments: Any
+    ) -> Any:
         index = self._frame(frame)
         key = (name, index, reference)
         return self._call(key, lambda: table.frame_motion(self._pool, name, index, reference), *arguments)

@@ -17,7 +17,6 @@ from ._operations import Operation, Pool, Scratch, Slot
 
 _Array = NDArray[np.float64]
 _Row = list["_Array | float | None"]
-Reference = Literal["local", "world", "local_world_aligned"]
 
 
 def rnea(pool: Pool, forces: bool) -> Operation:
@@ -192,7 +191,7 @@ def poses(pool: Pool, frame: int | None) -> Operation:
 
     def jacobians(scratch: Scratch, needed: Sequence[bool], q: _Array) -> list[_Row]:
         (pose,), data = value(scratch, q), scratch.data
-        aligned: Reference = "local_world_aligned"
+        aligned: Literal["local_world_aligned"] = "local_world_aligned"
         if frame is not None:
             return [[slopes(pose, c.frame_jacobian(model, data, q, frame, aligned)).reshape(len(q), 16, -1)]]
         bodies = range(model.nbodies)
@@ -211,7 +210,9 @@ def poses(pool: Pool, frame: int | None) -> Operation:
     return Operation(name, pool, _motion(pool, 1), [Slot("pose", shape)], value, jacobians)
 
 
-def frame_motion(pool: Pool, name: str, frame: int, reference: Reference) -> Operation:
+def frame_motion(
+    pool: Pool, name: str, frame: int, reference: Literal["local", "world", "local_world_aligned"]
+) -> Operation:
     """Returns the velocity, the spatial acceleration or the classical acceleration of a frame."""
     model, velocity = pool.model, name == "frame_velocity"
     derivatives: Any = c.frame_velocity_derivative if velocity else getattr(c, f"{name}_derivatives")

@@ -151,6 +151,19 @@ def test_jacobian_is_the_librarys() -> None:
         assert np.allclose(y.numpy(), z, rtol=ROUNDING, atol=ROUNDING)
 
 
+def test_forward_over_reverse() -> None:
+    """Compares the tangent of a gradient without `create_graph` with the tangent of a gradient with it."""
+    robot, ad = ROBOTS["every joint"], torch.autograd.forward_ad
+    x = [a.detach() for a in tensors("every joint", CASES["aba"])]
+    direction, found = torch.sin(torch.arange(x[0].numel(), dtype=torch.float64)).reshape(x[0].shape), []
+    for create in (False, True):
+        with ad.dual_level():
+            q = ad.make_dual(x[0].clone().requires_grad_(), direction)
+            (slope,) = torch.autograd.grad(robot.aba(q, *x[1:]).sum(), q, create_graph=create)
+            found.append(ad.unpack_dual(slope).tangent)
+    assert torch.allclose(found[0], found[1], rtol=ROUNDING, atol=ROUNDING * found[1].abs().max().item())
+
+
 def test_tangent_space() -> None:
     """Checks that the derivative along `integrate` is the library's derivative in the tangent space."""
     model, robot = MODELS["every joint"], ROBOTS["every joint"]
