@@ -69,7 +69,7 @@ def motion(coefficients: Array) -> Motion:
     return Motion(*(part @ coefficients for part in series()))
 
 
-def exciting(model: Model, seed: int, candidates: int = 40) -> Motion:
+def exciting(model: Model, seed: int, candidates: int = 20) -> Motion:
     """Returns the motion with the best conditioned base regressor among random series within the robot's limits."""
     rng, limits = np.random.default_rng(seed), model.limits
     low, high = np.maximum(limits.lower, -2.5), np.minimum(limits.upper, 2.5)
