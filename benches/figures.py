@@ -29,7 +29,9 @@ COMMANDS = {
     "dynamics": "python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "dynamics_avx2": "CONDYLE_LEVEL=avx2 python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "fddp": ".venv/crocoddyl/bin/python benches/peers/ocp.py --cpu 1 --solver fddp reach trot walk humanoid",
-    "mpc": ".venv/crocoddyl/bin/python benches/peers/mpc.py --cpu 1",
+    "mpc": ".venv/crocoddyl/bin/python benches/peers/mpc.py --cpu 1 --records target/records",
+    "mpc_rust": "cargo bench --profile release -p condyle-benches --bench mpc -- "
+    "../target/records/go2_tick2.json ../target/records/g1_tick2.json",
     "threads": ".venv/crocoddyl/bin/python benches/peers/ocp_threads.py",
     "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_comparison.py",
     "generated": "CC=clang-19 .venv/pinocchio/bin/python benches/generated.py --cpu 1",
@@ -37,7 +39,7 @@ COMMANDS = {
     "factorisation": "cargo bench --profile release -p condyle-benches --bench factorisation",
     "divide_conquer": "cargo bench --profile release -p condyle-benches --bench divide_conquer",
 }
-"""Command for each part of the measurement."""
+"""Command for each part of the measurement. `mpc_rust` reads the records that `mpc` leaves in `target/records`."""
 WITHOUT_OPTION = ("casadi", "slopes")
 """Parts of the measurement whose command prints one JSON object and has no option --json."""
 

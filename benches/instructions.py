@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Counts the instructions of the algorithms at SIMD level AVX2. Fails if a count has grown by more than 3 %.
 
-    python3 benches/instructions.py [--write]
+    python3 benches/instructions.py [--write | --misses]
 
 The program runs benches/instructions.rs under callgrind (of valgrind), and compares the counts with
 benches/instructions.json, which --write replaces. Counts depend on the compiler. If the file was written with another
-compiler, the program prints the counts without a comparison.
+compiler, the program prints the counts without a comparison. The option --misses prints how often an instruction was
+not in the first cache, instead of the numbers of instructions: callgrind simulates a cache of 32 KB. A miss reads 64
+bytes of code, and takes some ten cycles.
 """
 
 import argparse
@@ -30,6 +32,8 @@ PHASES = {
 }
 """Names of the parts of an FDDP iteration, for each function of the solver."""
 GROWTH = 1.03
+MISSES = ("--cache-sim=yes", "--I1=32768,8,64", "--D1=49152,12,64")
+"""Options of callgrind that simulate the first caches of a processor."""
 LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured::(\w+)|((?:SolverLoop|LineSearch)::\w+))")
 
 
@@ -47,13 +51,16 @@ def build(bench: str = "instructions", profile: str = "release") -> Path:
     raise SystemExit("cargo built no program")
 
 
-def counts(program: Path, robot: str) -> dict[str, int]:
-    """Counts the instructions of each algorithm for one state, and of each part of an FDDP iteration for one knot."""
+def counts(program: Path, robot: str, are_misses: bool = False) -> dict[str, int]:
+    """Counts the instructions of each algorithm for one state, and of each part of an FDDP iteration for one knot.
+    Counts the misses of instructions instead if `are_misses` is set."""
+    options, event = (MISSES, "I1mr") if are_misses else ((), "Ir")
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
-        command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", program, robot)
-        run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
-        table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
+        command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", *options)
+        run(*command, program, robot, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
+        shown = (f"--show={event}", f"--sort={event}")
+        table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", *shown, profile)
     found: dict[str, int] = {}
     for match in filter(None, map(LINE.match, table.splitlines())):  # a function has one line per source file
         name, n = match[2] or match[3], int(match[1].replace(",", ""))
@@ -70,6 +77,7 @@ def counts(program: Path, robot: str) -> dict[str, int]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("--write", action="store_true", help=f"write {BASELINE.name}")
+    parser.add_argument("--misses", action="store_true", help="print misses of the first instruction cache")
     options = parser.parse_args()
     if shutil.which("valgrind") is None:
         print("NOT RUN: there is no valgrind to count instructions with")
@@ -78,6 +86,11 @@ def main() -> None:
         print("NOT RUN: this processor has no AVX2")
         return
     program, compiler = build(), run("rustc", "--version").strip()
+    if options.misses:
+        for robot in ROBOTS:
+            for name, n in counts(program, robot, are_misses=True).items():
+                print(f"{robot:10} {name:24} {n:9}")
+        return
     found = {robot: counts(program, robot) for robot in ROBOTS}
     if options.write:
         BASELINE.write_text(

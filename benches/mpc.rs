@@ -1,11 +1,13 @@
-//! Times the ticks of a record, and the calls of its policy by another thread: `cargo bench -p condyle-benches --bench
-//! mpc -- FILE [TICKS]`
+//! Times the ticks of records, and the calls of their policies by another thread: `cargo bench -p condyle-benches
+//! --bench mpc -- FILE … [TICKS] [--json]`
 //!
 //! `benches/peers/mpc.py --records FOLDER` writes such files. The ticks are replayed without a pause. Another thread
-//! calls the policy at 1 kHz meanwhile. The program prints the median and the 99th percentile of the durations.
+//! calls the policy at 1 kHz meanwhile. The program prints the median and the 99th percentile of the durations; with
+//! `--json`, a line of JSON for each record. Paths begin in the folder `benches`.
 
 use condyle::optimal::PolicyPublisher;
 use condyle::optimal::record::{Record, Recorded};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -20,17 +22,20 @@ fn percentiles(mut durations: Vec<Duration>) -> [f64; 2] {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let is_json = std::env::args().any(|argument| argument == "--json");
     let arguments: Vec<_> = std::env::args().filter(|argument| !argument.starts_with("--")).skip(1).collect();
-    let Some(file) = arguments.first() else {
+    let (numbers, files): (Vec<_>, Vec<_>) = arguments.iter().partition(|a| a.parse::<usize>().is_ok());
+    let most: usize = numbers.first().map_or(Ok(2000), |ticks| ticks.parse())?;
+    if files.is_empty() {
         println!("NOT RUN: expected the file of a record, from benches/peers/mpc.py --records FOLDER");
-        return Ok(());
-    };
-    let most: usize = arguments.get(1).map_or(Ok(2000), |ticks| ticks.parse())?;
-    let record: Record = serde_json::from_str(&std::fs::read_to_string(file)?)?;
-    match record.replay()? {
-        None => println!("{} ticks, the same bits", record.ticks().len()),
-        Some(difference) => println!("{difference}"),
     }
+    files.into_iter().try_for_each(|file| measure(Path::new(file), most, is_json))
+}
+
+/// Replays a record until `most` ticks are timed, and prints the durations.
+fn measure(file: &Path, most: usize, is_json: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let record: Record = serde_json::from_str(&std::fs::read_to_string(file)?)?;
+    let difference = record.replay()?.map(|difference| difference.to_string());
     let (mut ticks, mut calls) = (Vec::new(), Vec::new());
     while ticks.len() < most {
         let (mut problem, mut solver) = record.start()?;
@@ -64,9 +69,23 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             calls.extend(reader.join().expect("the reader has not failed"));
         });
     }
-    for (name, durations) in [("tick", ticks), ("call of the policy", calls)] {
-        let count = durations.len();
-        let [median, p99] = percentiles(durations);
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let counts = [ticks.len(), calls.len()];
+    let [tick, call] = [ticks, calls].map(percentiles);
+    if is_json {
+        let round = |numbers: [f64; 2]| numbers.map(|x| (100.0 * x).round() / 100.0);
+        let (tick, call) = (round(tick), round(call));
+        println!(
+            "{}",
+            serde_json::json!({
+                "record": name, "difference": difference, "ticks": counts[0], "tick_us": tick,
+                "policy_calls": counts[1], "policy_us": call,
+            })
+        );
+        return Ok(());
+    }
+    println!("{name}: {}", difference.unwrap_or_else(|| "the same bits".to_owned()));
+    for (name, count, [median, p99]) in [("tick", counts[0], tick), ("call of the policy", counts[1], call)] {
         println!("{name}: median {median:.1} µs, p99 {p99:.1} µs ({count})");
     }
     Ok(())

@@ -172,7 +172,7 @@ def main():
     good = True
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.records or Path(temporary)
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         for robot in options.robots or ["go2", "g1"]:
             for rule in [options.rule] if options.rule else ["tick2", "fddp1"]:
                 result = measure(robot, rule, folder, options)

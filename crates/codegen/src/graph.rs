@@ -4,7 +4,7 @@
 //! of sums and products are sorted, and a minus sign moves from a product to the sum that uses the product. Operations
 //! on constants are computed during recording. A product with 0 is 0, even if the other factor is infinite or NaN.
 
-use std::collections::HashMap;
+use rustc_hash::FxHashMap;
 use std::collections::hash_map::Entry;
 
 /// Index of a value in the graph, in recording order.
@@ -94,12 +94,13 @@ impl Node {
 #[derive(Debug)]
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,
-    known: HashMap<Node, Id>,
+    /// Index of each value that has been recorded. A fast hash suffices, because no caller chooses the values.
+    known: FxHashMap<Node, Id>,
 }
 
 impl Graph {
     pub(crate) fn new() -> Self {
-        let mut graph = Self { nodes: Vec::new(), known: HashMap::new() };
+        let mut graph = Self { nodes: Vec::new(), known: FxHashMap::default() };
         graph.constant(0.0);
         graph.constant(1.0);
         graph

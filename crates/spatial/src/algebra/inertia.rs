@@ -100,6 +100,12 @@ impl<S: Scalar> Mul<Motion<S>> for ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> ArticulatedInertia<S> {
+    /// Returns the force I v for the motion v that has the linear part `linear` and no angular part.
+    #[inline(always)]
+    pub fn act_linear(self, linear: Vec3<S>) -> Force<S> {
+        Force { linear: self.linear * linear, angular: self.coupling.transpose_mul(linear) }
+    }
+
     /// Returns I − s U Uᵀ, where I is this inertia.
     #[inline(always)]
     pub fn minus_outer(self, U: Force<S>, s: S) -> Self {

@@ -44,6 +44,16 @@ impl Block for FusedF64 {
         to[0] = self.0;
     }
     #[inline(always)]
+    fn load_first(from: &[f64]) -> Self {
+        Self(from.first().copied().unwrap_or_default())
+    }
+    #[inline(always)]
+    fn store_first(self, to: &mut [f64]) {
+        if let Some(first) = to.first_mut() {
+            *first = self.0;
+        }
+    }
+    #[inline(always)]
     fn transpose(_: &mut [Self]) {}
 }
 

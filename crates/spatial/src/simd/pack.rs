@@ -19,6 +19,10 @@ pub trait Block: Scalar {
     fn load(from: &[Self::Number]) -> Self;
     /// Writes the number of each lane.
     fn store(self, to: &mut [Self::Number]);
+    /// Loads a slice of at most `LANES` numbers, one per lane; the other lanes are 0.
+    fn load_first(from: &[Self::Number]) -> Self;
+    /// Writes the numbers of the first lanes to a slice of at most `LANES` numbers.
+    fn store_first(self, to: &mut [Self::Number]);
     /// Transposes `LANES` vectors: number i of vector k becomes number k of vector i.
     fn transpose(rows: &mut [Self]);
 }
@@ -31,16 +35,6 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     let (n, mut each) = (to.len(), [&from[..0]; MOST]);
     for (k, row) in each[..rows].iter_mut().enumerate() {
         *row = &from[k * n..][..n];
-    }
-    let mut last = [S::Number::zero(); MOST];
-    if n < S::LANES && 2 * n >= S::LANES && rows > 0 {
-        // Extends each row to the length of a vector, so that one load reads it. A row is extended by the start of the
-        // next row, and the last row by zeros.
-        for (k, row) in each[..rows - 1].iter_mut().enumerate() {
-            *row = &from[k * n..][..S::LANES];
-        }
-        last[..n].copy_from_slice(each[rows - 1]);
-        each[rows - 1] = &last[..S::LANES];
     }
     gather_rows(&each[..rows], to);
 }
@@ -86,8 +80,16 @@ pub fn scatter_rows<S: Block>(from: &[S], to: &mut [&mut [S::Number]]) {
 /// between the starts of consecutive rows.
 #[inline]
 pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
+    let columns = from.shape[1];
+    let is_one_row = stride == columns && from.shape[0] * columns >= S::LANES;
+    if size_of::<S>() == MASKED && columns < S::LANES && !is_one_row {
+        return S::enter(ScatterShort(*from, to, stride));
+    }
     S::enter(Scatter(*from, to, stride));
 }
+
+/// Size of the vectors that can store some of their lanes with one instruction (bytes): vectors of AVX-512.
+const MASKED: usize = 64;
 
 /// Matrix whose entries are vectors, stored with strides and with a sign.
 #[derive(Clone, Copy, Debug)]
@@ -110,23 +112,13 @@ impl<S: Block> Kernel for Gather<'_, S> {
         let Self(from, to) = self;
         let n = to.len();
         let row = |k: usize| from[k.min(from.len() - 1)];
-        if n < S::LANES && from.iter().all(|row| row.len() >= S::LANES) {
+        if n < S::LANES {
             let mut block = [S::zero(); MOST];
             for k in 0..S::LANES {
-                block[k] = S::load(&row(k)[..S::LANES]);
+                block[k] = S::load_first(&row(k)[..n]);
             }
             S::transpose(&mut block[..S::LANES]);
             to.copy_from_slice(&block[..n]);
-            return;
-        }
-        if n < S::LANES {
-            let mut lanes = [S::Number::zero(); MOST];
-            for (i, to) in to.iter_mut().enumerate() {
-                for k in 0..S::LANES {
-                    lanes[k] = row(k)[i];
-                }
-                *to = S::load(&lanes);
-            }
             return;
         }
         let mut i = 0;
@@ -256,6 +248,28 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
     }
 }
 
+/// Copy of a matrix whose rows are shorter than a vector.
+struct ScatterShort<'a, 'b, S: Block>(Strided<'a, S>, &'a mut [&'b mut [S::Number]], usize);
+
+impl<S: Block> Kernel for ScatterShort<'_, '_, S> {
+    #[inline(always)]
+    fn run(self) {
+        let Self(Strided { vectors: from, strides: [down, along], shape: [rows, columns], negative }, to, stride) =
+            self;
+        for i in 0..rows {
+            let mut tile = [S::zero(); MOST];
+            for j in 0..columns {
+                let x = from[i * down + j * along];
+                tile[j] = if negative { -x } else { x };
+            }
+            S::transpose(&mut tile[..S::LANES]);
+            for (to, x) in to.iter_mut().zip(tile) {
+                x.store_first(&mut to[i * stride..][..columns]);
+            }
+        }
+    }
+}
+
 /// Writes a matrix. `BESIDE` says whether consecutive columns are adjacent in memory.
 ///
 /// # Safety
@@ -328,6 +342,16 @@ macro_rules! single {
                 to[0] = self;
             }
             #[inline(always)]
+            fn load_first(from: &[Self]) -> Self {
+                from.first().copied().unwrap_or_default()
+            }
+            #[inline(always)]
+            fn store_first(self, to: &mut [Self]) {
+                if let Some(first) = to.first_mut() {
+                    *first = self;
+                }
+            }
+            #[inline(always)]
             fn transpose(_: &mut [Self]) {}
         }
     )*};
@@ -343,6 +367,14 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     #[inline(always)]
     fn store(self, to: &mut [T]) {
         *to.first_chunk_mut().expect("a slot for each lane") = self.to_array();
+    }
+    #[inline(always)]
+    fn load_first(from: &[T]) -> Self {
+        Self::load_first(from)
+    }
+    #[inline(always)]
+    fn store_first(self, to: &mut [T]) {
+        Self::store_first(self, to);
     }
     #[inline(always)]
     fn transpose(rows: &mut [Self]) {

@@ -55,6 +55,27 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn load(x: [T; N]) -> Self;
     /// Returns the lanes as an array.
     fn store(a: Self) -> [T; N];
+    /// Loads the numbers of a slice of at most N numbers; the other lanes are 0.
+    #[inline(always)]
+    fn load_first(x: &[T]) -> Self {
+        let mut all = [T::zero(); N];
+        for k in 0..N {
+            if k < x.len() {
+                all[k] = x[k];
+            }
+        }
+        Self::load(all)
+    }
+    /// Writes the first lanes to a slice of at most N numbers.
+    #[inline(always)]
+    fn store_first(a: Self, to: &mut [T]) {
+        let all = Self::store(a);
+        for k in 0..N {
+            if k < to.len() {
+                to[k] = all[k];
+            }
+        }
+    }
     /// Returns x in every lane.
     fn splat(x: T) -> Self;
     /// Returns 0 in every lane. Code that is compiled for any processor fills workspaces with this value. In such code,
@@ -172,6 +193,16 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
     #[inline(always)]
     pub fn to_array(self) -> [T; N] {
         T::Register::store(self.0)
+    }
+    /// Loads the numbers of a slice of at most N numbers; the other lanes are 0.
+    #[inline(always)]
+    pub(crate) fn load_first(x: &[T]) -> Self {
+        Self(T::Register::load_first(x))
+    }
+    /// Writes the first lanes to a slice of at most N numbers.
+    #[inline(always)]
+    pub(crate) fn store_first(self, to: &mut [T]) {
+        T::Register::store_first(self.0, to);
     }
     /// Transposes N vectors: number i of vector k becomes number k of vector i.
     #[inline(always)]

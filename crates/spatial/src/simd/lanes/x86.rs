@@ -89,7 +89,7 @@ macro_rules! avx2 {
 macro_rules! avx512 {
     (
         $register:ident of $n:literal $float:ident, $mask:ident: $($alike:ident)*;
-        $cmp:ident $blend:ident;
+        $cmp:ident $blend:ident $load_first:ident $store_first:ident;
         $($transpose:tt)*
     ) => {
         register! {
@@ -99,6 +99,14 @@ macro_rules! avx512 {
             fn and(a: $mask, b: $mask) -> $mask { a & b }
             fn or(a: $mask, b: $mask) -> $mask { a | b }
             fn any(mask: $mask) -> bool { mask != 0 }
+            fn load_first(x: &[$float]) -> Self {{
+                assert!(x.len() <= $n, "more numbers than lanes");
+                $load_first((1_u32 << x.len()).wrapping_sub(1) as $mask, x.as_ptr())
+            }}
+            fn store_first(a: Self, to: &mut [$float]) {{
+                assert!(to.len() <= $n, "more numbers than lanes");
+                $store_first(to.as_mut_ptr(), (1_u32 << to.len()).wrapping_sub(1) as $mask, a)
+            }}
             $($transpose)*
         }
     };
@@ -131,7 +139,7 @@ avx512! {
     __m512d of 8 f64, __mmask8:
     _mm512_loadu_pd _mm512_storeu_pd _mm512_set1_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
     _mm512_fmadd_pd _mm512_sqrt_pd _mm512_andnot_pd;
-    _mm512_cmp_pd_mask _mm512_mask_blend_pd;
+    _mm512_cmp_pd_mask _mm512_mask_blend_pd _mm512_maskz_loadu_pd _mm512_mask_storeu_pd;
     fn transpose(rows: &mut [Self; 8]) {{
         let [a, b, c, d, e, f, g, h] = *rows;
         let even = [
@@ -154,7 +162,7 @@ avx512! {
     __m512 of 16 f32, __mmask16:
     _mm512_loadu_ps _mm512_storeu_ps _mm512_set1_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps
     _mm512_fmadd_ps _mm512_sqrt_ps _mm512_andnot_ps;
-    _mm512_cmp_ps_mask _mm512_mask_blend_ps;
+    _mm512_cmp_ps_mask _mm512_mask_blend_ps _mm512_maskz_loadu_ps _mm512_mask_storeu_ps;
 }
 
 instructions! {
