@@ -8,6 +8,8 @@ use the same CasADi expressions. The loss is a linear function of all states and
 Its gradient is taken with respect to the initial state and to the goal. CasADi solves the problem with IPOPT by
 multiple shooting, and differentiates with `nlpsol(...).reverse(1)`. Condyle solves the problem with `Fddp`.
 
+For an arm of Condyle, the program prints times only.
+
 The program prints the largest relative difference of the gradients, and these times (the least of the rounds): an
 iteration of the solver, the creation of a `Sensitivity`, a gradient with it, and a gradient by CasADi. CasADi's
 gradient evaluates and factorises the optimality conditions each time, as the creation of a `Sensitivity` does.
@@ -23,8 +25,9 @@ from typing import Any, NamedTuple
 import casadi
 import numpy as np
 
+import condyle
 import condyle.casadi
-from condyle.optimal import Fddp, Problem, Sensitivity
+from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivity
 
 TOLERANCE = 1e-6
 
@@ -77,7 +80,8 @@ def chain(masses: int = 4) -> Case:
     v_next = v + h * (a - 0.2 * v)
     after = casadi.vertcat(p + h * v_next, v_next, end + h * u)
     cost = 0.5 * h * (25.0 * casadi.sumsqr(end - goal) + casadi.sumsqr(v) + 0.1 * casadi.sumsqr(u))
-    terminal = 0.5 * (25.0 * casadi.sumsqr(end - goal) + 10.0 * casadi.sumsqr(v))
+    # CasADi takes an equation with the multiplier 0 for an inactive one, so the cost depends on all final states
+    terminal = 0.5 * (25.0 * casadi.sumsqr(end - goal) + 10.0 * casadi.sumsqr(v) + 0.1 * casadi.sumsqr(p))
     line = np.linspace(0.0, 1.0, masses + 2)[1:-1]
     start = np.concatenate([np.outer(line, [1.0, 0.0, 0.0]).ravel(), np.zeros(n), [1.0, 0.0, 0.0]])
     goal_value = np.array([0.8, 0.4, 0.2])
@@ -147,11 +151,10 @@ def compare(case: Case, rounds: int) -> dict[str, Any]:
 
     expected = np.asarray(theirs()).ravel()
     error = float(np.abs(ours - expected).max() / np.abs(expected).max())
-    timed = Fddp(problem, max_iterations=10, tolerance=0.0)
-    seconds = timed.solve(solution.xs + 1e-3, solution.us).timings.total
-    iterations = len(timed.solution.trace) if timed.solution else 1
+    timed = Fddp(problem, max_iterations=20)
+    first = timed.solve(np.tile(case.x0, (n + 1, 1)), np.tile(case.u0, (n, 1)))
     times = {
-        "iteration": seconds / iterations,
+        "iteration": first.timings.total / len(first.trace),
         "create, exact": least(rounds, lambda: Sensitivity(solver)),
         "create, Gauss-Newton": least(rounds, lambda: Sensitivity(solver, curvature="gauss_newton")),
         "gradient by x0": least(10 * rounds, lambda: sensitivity.gradient("x0", by_xs, by_us)),
@@ -161,17 +164,43 @@ def compare(case: Case, rounds: int) -> dict[str, Any]:
     return {"problem": case.name, "error": error, "times": times}
 
 
+def robot(name: str, model: condyle.Model, posture: np.ndarray, rounds: int) -> dict[str, Any]:
+    """Returns times for a robot that moves to a posture, without a peer."""
+    x0, n = np.r_[posture, np.zeros(model.nv)], 50
+    rest = Cost("rest", 1.0, Residual.state(x0))
+    knot = FreeDynamics(model, 0.02, [rest, Cost("effort", 1e-3, Residual.control(np.zeros(model.nv)))])
+    moved = np.r_[posture + 0.3, np.zeros(model.nv)]
+    problem = Problem(moved, [knot], [0] * n, FreeDynamics(model, None, [rest]))
+    solver = Fddp(problem, max_iterations=200)
+    xs = np.tile(moved, (n + 1, 1))
+    solution = solver.solve(xs, problem.quasi_static(xs))
+    if solution.status != "converged":
+        raise RuntimeError(f"{name}: the solution has the status {solution.status}")
+    by_xs, by_us = np.ones((n + 1, 2 * model.nv)), np.ones((n, model.nv))
+    kinds = {kind: Sensitivity(solver, curvature=kind) for kind in ("exact", "dynamics", "gauss_newton")}
+    times = {"iteration": solution.timings.total / len(solution.trace)}
+    for kind, sensitivity in kinds.items():
+        times[f"create, {kind}"] = least(rounds, lambda kind=kind: Sensitivity(solver, curvature=kind))
+        times["gradient by x0"] = least(10 * rounds, lambda of=sensitivity: of.gradient("x0", by_xs, by_us))
+    sensitivity = kinds["exact"]
+    sensitivity.gradient("target/rest", by_xs, by_us)
+    times["gradient by target"] = least(10 * rounds, lambda: sensitivity.gradient("target/rest", by_xs, by_us))
+    return {"problem": name, "error": 0.0, "times": times}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=20, help="number of measurements of each time")
     parser.add_argument("--json", action="store_true", help="prints JSON")
     arguments = parser.parse_args()
     results = [compare(case, arguments.rounds) for case in (cartpole(), chain())]
+    arm = condyle.robots.arm7()
+    results.append(robot("arm of 7 joints", arm, np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0]), arguments.rounds))
     if arguments.json:
         print(json.dumps(results, indent=1))
         return
     for result in results:
-        print(f"{result['problem']}: gradients differ by {result['error']:.1e}")
+        print(result["problem"] + (f": gradients differ by {result['error']:.1e}" if result["error"] else ""))
         for name, seconds in result["times"].items():
             print(f"  {name:22} {1e6 * seconds:10.1f} us")
     if any(result["error"] > TOLERANCE for result in results):

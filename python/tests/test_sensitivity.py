@@ -24,7 +24,7 @@ KNOTS = 12
 STEP = 1e-4
 X0 = np.r_[0.1, 0.4, -0.2, 1.2, 0.3, 0.8, 0.2, np.zeros(7)]
 GOAL = np.array([0.3, 0.3, 0.5])
-BOUND = 24.0
+BOUND = 27.0
 
 
 @pytest.fixture(scope="module")
@@ -123,9 +123,9 @@ def test_bounds_need_no_parameter(arm, solver, loss):
     assert report.curvature == "exact"
     assert report.active_controls == np.count_nonzero(bounds.control_bounds) > 0
     assert report.strict_complementarity
-    numeric = difference(lambda p: problem_of(arm, bound=BOUND + p[0]), solver.solution, loss, 1)
+    numeric = difference(lambda p: problem_of(arm, bound=BOUND + 10.0 * p[0]), solver.solution, loss, 1) / 10.0
     ours = np.sum(bounds.control_bounds * np.sign(solver.solution.us))
-    assert abs(ours - numeric[0]) < 1e-6 * abs(numeric[0])
+    assert abs(ours - numeric[0]) < 1e-6 * np.abs(bounds.x0).max()
 
 
 def test_own_parameters(arm, solver, loss):
@@ -166,11 +166,11 @@ def test_the_approximations_differ_from_the_exact_gradient(solver, loss):
 def test_limits(kind):
     """A cart that must end at a point: the final position depends only on this point."""
     cart = condyle.ModelBuilder("cart")
-    inertia = condyle.Inertia(2.0, np.zeros(3), 0.1 * np.eye(3))
+    inertia = condyle.Inertia.from_com(2.0, np.zeros(3), 0.1 * np.eye(3))
     cart.body("cart", condyle.WORLD, condyle.Joint.prismatic([1, 0, 0]), np.eye(4), inertia)
     cart = cart.build()
     effort = Cost("effort", 1.0, Residual.control([0.0]))
-    end = FreeDynamics(cart, None, [], limits=[Limit.equality("end", Residual.state([0.5, 0.0]))])
+    end = FreeDynamics(cart, None, [], limits=[Limit("end", Residual.state([0.5, 0.0]))])
     problem = Problem(np.zeros(2), [FreeDynamics(cart, 0.1, [effort])], [0] * 10, end)
     solver = kind(problem)
     assert solver.solve(np.zeros((11, 2)), np.zeros((10, 1))).status == "converged"
@@ -198,7 +198,7 @@ def test_errors(arm, loss):
         sensitivity.gradient("entry_weights/effort", *loss)
     with pytest.raises(ValueError, match="by_xs"):
         sensitivity.gradient("x0", np.zeros((3, 14)))
-    with pytest.raises(ValueError, match="us"):
+    with pytest.raises(ValueError, match="by_us"):
         sensitivity.gradient("x0", by_us=np.zeros((KNOTS, 3)))
     with pytest.raises(ValueError, match="curvature: expected 'exact', 'dynamics' or 'gauss_newton', found 'hessian'"):
         Sensitivity(solver, curvature="hessian")

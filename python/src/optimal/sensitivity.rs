@@ -1,6 +1,6 @@
 //! Derivatives of solutions with respect to the parameters of their problem.
 
-use super::evaluation::{by_knot, controls};
+use super::evaluation::{by_knot, named_controls};
 use super::problem::{Problem, lock};
 use super::solvers::{AugmentedLagrangian, Fddp, InteriorPoint};
 use crate::arrays::{Give, class, matrix, output};
@@ -21,11 +21,11 @@ const MOST_ENTRIES: usize = 4096;
 /// The optimality conditions are linearised at the solution and factorised once. After that, the gradient of a loss
 /// with respect to a parameter is one pass over the knots, whatever the number of the parameter's entries.
 ///
-/// A parameter has a name. "x0" is the initial state. "target/NAME", "weight/NAME" and "entry_weights/NAME" are target,
-/// weight and weights of the entries of the cost NAME, "contact/NAME" is the placement of a contact, and "duration" is
-/// the duration of all knots. A parameter that several knots share changes at all of them. Changes are in the tangent
-/// space: 2 nv numbers for a state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear first. `define` adds
-/// parameters of your own.
+/// A parameter has a name. "x0" is the initial state, and "duration" is the duration of all knots. A cost NAME has the
+/// parameters "target/NAME", "weight/NAME" and "entry_weights/NAME", the weights of the entries of its residual.
+/// "contact/NAME" is the placement of a contact. A parameter that several knots share changes at all of them. Changes
+/// are in the tangent space: 2 nv numbers for a state, 3 for a rotation R exp(δ), 6 for a placement M exp(δ), linear
+/// first. `define` adds parameters of your own.
 ///
 /// Bounds that are active are held active. If `report.strict_complementarity` is False, a bound is active with a
 /// multiplier near zero; the solution has a kink there, and the derivative on the other side differs.
@@ -44,10 +44,11 @@ const MOST_ENTRIES: usize = 4096;
 ///
 /// >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual, Sensitivity
 /// >>> arm, x0 = condyle.robots.arm7(), np.full(14, 0.1)
-/// >>> effort = Cost("effort", 1e-2, Residual.control(np.zeros(7)))
+/// >>> rest, effort = Cost("rest", 1.0, Residual.state(x0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))
 /// >>> reach = Cost("reach", 10.0, Residual.frame_translation(arm, "tool", [0.4, 0.2, 0.5]))
-/// >>> problem = Problem(x0, [FreeDynamics(arm, 0.05, [effort, reach])], [0] * 10, FreeDynamics(arm, None, [reach]))
-/// >>> solver = Fddp(problem, max_iterations=200, tolerance=1e-12)
+/// >>> knot, end = FreeDynamics(arm, 0.05, [rest, effort, reach]), FreeDynamics(arm, None, [rest])
+/// >>> problem = Problem(x0, [knot], [0] * 10, end)
+/// >>> solver = Fddp(problem)
 /// >>> solver.solve(np.tile(x0, (11, 1)), np.zeros((10, 7))).status
 /// 'converged'
 /// >>> sensitivity = Sensitivity(solver)
@@ -300,7 +301,7 @@ impl Sensitivity {
             None => vec![0.0; rows * ndx],
         };
         let by_controls = match by_us {
-            Some(by_us) => controls(&problem, by_us)?,
+            Some(by_us) => named_controls("by_us", &problem, by_us)?,
             None => vec![0.0; problem.control_range(rows - 1).start],
         };
         Ok([by_states, by_controls])

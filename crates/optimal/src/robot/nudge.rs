@@ -32,7 +32,7 @@ enum Kind {
 }
 
 impl Nudge {
-    /// Reads the targets of a cost; `None` if the cost does not exist. The errors of the parameters of one cost name it.
+    /// Reads the targets of a cost; `None` if the cost does not exist.
     pub(crate) fn target(problem: &mut Problem, name: &str) -> Result<Option<Self>, Error> {
         Self::of_costs(problem, name, Kind::Target, |cost| {
             let target = cost.target().ok_or_else(|| lacks(cost, "target"))?;
@@ -94,6 +94,47 @@ impl Nudge {
         })?;
         let (name, placements) = (name.to_owned(), Vec::new());
         Ok(found.then(|| Self { name, kind, values, placements, size: sizes[0] }))
+    }
+
+    /// Returns the value, if it is the same everywhere; `None` if it differs.
+    pub(crate) fn value(&self) -> Option<Vec<f64>> {
+        let matrices = self.placements.iter().map(|placement| {
+            let mut numbers = vec![0.0; 16];
+            Target::Placement(*placement).write(&mut numbers);
+            numbers
+        });
+        let is_timed = |value: &Vec<f64>| self.kind != Kind::Duration || value[0] > 0.0; // an impact takes no time
+        let all: Vec<Vec<f64>> = self.values.iter().filter(|value| is_timed(value)).cloned().chain(matrices).collect();
+        all.iter().all(|value| *value == all[0]).then(|| all[0].clone())
+    }
+
+    /// Returns the number of entries of a value.
+    pub(crate) fn value_size(&self) -> usize {
+        self.values.first().map_or(16, Vec::len)
+    }
+
+    /// Sets the parameter to the same value everywhere.
+    pub(crate) fn set(&self, problem: &mut Problem, numbers: &[f64]) -> Result<(), Error> {
+        match self.kind {
+            Kind::Target => problem.change_costs(&self.name, |cost| cost.set_target_numbers(numbers))?,
+            Kind::Weight => problem.change_costs(&self.name, |cost| cost.set_weight(numbers[0]))?,
+            Kind::EntryWeights => problem.change_costs(&self.name, |cost| cost.set_entry_weights(numbers))?,
+            Kind::Contact => {
+                let Target::Placement(placement) = Target::Placement(Se3::identity()).of_numbers(numbers) else {
+                    unreachable!("the kind of a target does not change")
+                };
+                problem.change_contacts(&self.name, |contact| contact.target.placement = placement)?
+            }
+            Kind::Duration => {
+                for t in 0..problem.horizon() {
+                    if problem.duration(t).is_some_and(|dt| dt > 0.0) {
+                        problem.set_duration(t, numbers[0])?;
+                    }
+                }
+                true
+            }
+        };
+        Ok(())
     }
 
     /// Returns the number of entries of a change.

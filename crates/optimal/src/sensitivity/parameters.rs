@@ -70,6 +70,67 @@ impl FromStr for Parameter {
     }
 }
 
+impl Parameter {
+    /// Reads the parameter of a robot's problem; `None` for the initial state.
+    fn nudge(&self, problem: &mut Problem) -> Result<Option<Nudge>, Error> {
+        let nudge = match self {
+            Self::InitialState => return Ok(None),
+            Self::Target(name) => Nudge::target(problem, name),
+            Self::Weight(name) => Nudge::weight(problem, name),
+            Self::EntryWeights(name) => Nudge::entry_weights(problem, name),
+            Self::Contact(name) => Nudge::contact(problem, name),
+            Self::Duration => Nudge::duration(problem),
+        };
+        nudge?.map(Some).ok_or_else(|| wrong(format!("the problem does not have the parameter `{self}`")))
+    }
+}
+
+/// Named parameters as vectors.
+impl Problem {
+    /// Returns the value of a parameter: the initial state (nx), a target in the form of
+    /// [`set_references`](Self::set_references), a weight, the weights of entries, the placement of a contact as a
+    /// homogeneous matrix (16 numbers, row by row), or a duration (s). Allocates.
+    ///
+    /// # Errors
+    /// [`Error::Sensitivity`] if the problem does not have the parameter, or if its value differs from knot to knot.
+    pub fn parameter(&mut self, parameter: &Parameter) -> Result<Vec<f64>, Error> {
+        match parameter.nudge(self)? {
+            None => Ok(self.x0().to_vec()),
+            Some(nudge) => {
+                nudge.value().ok_or_else(|| wrong(format!("the value of `{parameter}` differs from knot to knot")))
+            }
+        }
+    }
+
+    /// Sets a parameter to a value, in the form that [`parameter`](Self::parameter) returns, at all knots that have it.
+    /// The problem is not built again, and solvers continue with it.
+    ///
+    /// ```
+    /// # use condyle_dynamics::{Vec3, robots};
+    /// # use condyle_optimal::Problem;
+    /// # use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+    /// # let arm = std::sync::Arc::new(robots::arm7());
+    /// # let reach = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
+    /// # let costs = vec![Cost::new("reach", 1.0, reach, Activation::Quadratic)];
+    /// # let knot = FreeDynamics::running(arm.clone(), 0.02, costs.clone())?;
+    /// # let end = FreeDynamics::terminal(arm, costs)?;
+    /// # let mut problem = Problem::new(vec![0.0; 14], vec![Box::new(knot)], vec![0; 20], Box::new(end))?;
+    /// problem.set_parameter(&"target/reach".parse()?, &[0.3, 0.2, 0.5])?;
+    /// assert_eq!(problem.parameter(&"target/reach".parse()?)?, [0.3, 0.2, 0.5]);
+    /// # Ok::<(), condyle_optimal::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Sensitivity`] if the problem does not have the parameter, [`Error::Length`] for another number of
+    /// entries, and the errors of the setter of the parameter.
+    pub fn set_parameter(&mut self, parameter: &Parameter, numbers: &[f64]) -> Result<(), Error> {
+        let Some(nudge) = parameter.nudge(self)? else { return self.set_x0(numbers) };
+        let expected = nudge.value_size();
+        Error::check("numbers", numbers, expected)?;
+        nudge.set(self, numbers)
+    }
+}
+
 /// Derivatives of the optimality conditions of all knots with respect to one parameter.
 #[derive(Debug, Clone)]
 pub struct ParameterJacobian {
@@ -278,19 +339,11 @@ pub(super) fn jacobian(
     problem: &mut Problem,
     parameter: &Parameter,
 ) -> Result<ParameterJacobian, Error> {
-    let nudge = match parameter {
-        Parameter::InitialState => {
-            let mut differences = Differences::new(point, point.shape.ndx, problem);
-            differences.jacobian.initial.fill_with_identity();
-            return Ok(differences.jacobian);
-        }
-        Parameter::Target(name) => Nudge::target(problem, name),
-        Parameter::Weight(name) => Nudge::weight(problem, name),
-        Parameter::EntryWeights(name) => Nudge::entry_weights(problem, name),
-        Parameter::Contact(name) => Nudge::contact(problem, name),
-        Parameter::Duration => Nudge::duration(problem),
+    let Some(nudge) = parameter.nudge(problem)? else {
+        let mut differences = Differences::new(point, point.shape.ndx, problem);
+        differences.jacobian.initial.fill_with_identity();
+        return Ok(differences.jacobian);
     };
-    let nudge = nudge?.ok_or_else(|| wrong(format!("the problem does not have the parameter `{parameter}`")))?;
     let mut differences = Differences::new(point, nudge.size(), problem);
     let result = write_all(&nudge, problem, &mut differences);
     nudge.restore(problem)?;

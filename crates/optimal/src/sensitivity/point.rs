@@ -84,7 +84,7 @@ impl Point {
         for t in (0..=horizon).rev() {
             let L_u = point.control_gradient(t, problem, report);
             let Self { knots, lambda, rows, .. } = &mut point;
-            let (knot, Rows { C, y, .. }) = (&mut knots[t], &rows[t]);
+            let (knot, Rows { C, y, .. }) = (&knots[t], &rows[t]);
             let mut costate = knot.q.clone();
             if t < horizon {
                 costate.gemv_tr(1.0, &knot.A, &lambda[t + 1], 1.0);
@@ -93,9 +93,9 @@ impl Point {
             let active: Vec<f64> = rows[t].active.iter().map(|(row, _)| y[*row]).collect();
             costate.gemv_tr(1.0, C, &DVector::from_vec(active), 1.0);
             lambda[t] = costate;
-            knot.rows.clear();
         }
-        point.gradients = point.gradients(problem, [&point.xs, &point.us], &mut problem.lq_knots());
+        point.gradients = point.gradients_of(&point.knots);
+        point.knots.iter_mut().for_each(|knot| knot.rows.clear());
         report.primal = report.primal.max(point.largest_gap(problem));
         report.active_controls = point.controls.iter().map(Vec::len).sum();
         report.active_rows = point.rows.iter().map(|rows| rows.active.len()).sum();
@@ -212,6 +212,11 @@ impl Point {
         knots: &mut [LqKnot],
     ) -> Vec<DVector<f64>> {
         problem.calc_diff_as(Evaluation::Rows, xs, us, knots);
+        self.gradients_of(knots)
+    }
+
+    /// Returns the gradients ∇Lₜ from the derivatives of all knots, with the multipliers of this solution.
+    fn gradients_of(&self, knots: &[LqKnot]) -> Vec<DVector<f64>> {
         let gradient = |(t, knot): (usize, &LqKnot)| {
             let (ndx, nu) = (knot.ndx(), knot.nu());
             let mut all = DVector::zeros(ndx + nu);

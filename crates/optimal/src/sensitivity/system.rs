@@ -7,8 +7,8 @@
 //! ξ⁺ = Aξ + Bυ + e⁺,   ξ₀ = e₀        Cξ + Dυ + c = 0
 //! ```
 //!
-//! Controls at a bound are taken out: their columns of B, S and D are zero, and their row of R is a row of the identity.
-//! The rows C, D enter by a method of multipliers: ρ (Cξ + Dυ + c)² / 2 is added to the cost, whose sweep is
+//! Controls at a bound are taken out: their columns of B, S and D are zero, and their rows of R are rows of the
+//! identity. The rows C, D enter by a method of multipliers: ρ (Cξ + Dυ + c)² / 2 is added to the cost, whose sweep is
 //! factorised, and γ ← γ + ρ (Cξ + Dυ + c) is repeated until the rows hold. Source: Bertsekas, Constrained
 //! Optimization and Lagrange Multiplier Methods, 1982, ch. 2.
 

@@ -1,6 +1,6 @@
 //! Faults that sensitivities report, and derivatives that do not exist.
 
-use super::{arm, first_solution, solve_tightly};
+use super::{arm, first_solution, quadruped, solve_tightly};
 use condyle_optimal::{
     ActionModel, Curvature, Error, Fddp, LqKnot, Parameter, Problem, Sensitivity, SensitivitySettings, Settings,
 };
@@ -41,6 +41,28 @@ fn faults_are_named() {
     assert_eq!(late, "sensitivity: knot 0 of the problem has changed since the sensitivity was created");
     let changed = text(Sensitivity::new(&mut problem, &solution, None, settings()));
     assert!(changed.contains("has not converged, or the problem has changed since the solve"), "{changed}");
+}
+
+/// Checks that parameters are vectors that can be read and set by their names.
+#[test]
+fn parameters_are_vectors() {
+    let mut problem = quadruped(&[0.0; 9]);
+    let names = ["x0", "target/centre", "weight/effort", "entry_weights/rest", "contact/LF_foot", "duration"];
+    for (name, size) in names.into_iter().zip([37, 3, 1, 36, 16, 1]) {
+        let parameter: Parameter = name.parse().unwrap();
+        let mut value = problem.parameter(&parameter).unwrap();
+        assert_eq!(value.len(), size, "{name}");
+        let last = if size == 16 { 3 } else { size - 1 }; // of a placement: the x coordinate
+        value[last] += 0.25;
+        problem.set_parameter(&parameter, &value).unwrap();
+        assert_eq!(problem.parameter(&parameter).unwrap(), value, "{name}");
+        assert!(problem.set_parameter(&parameter, &[0.5; 40]).is_err());
+        assert_eq!(problem.parameter(&parameter).unwrap(), value, "{name}");
+    }
+    assert_eq!(problem.duration(3), Some(0.02 + 0.25));
+    problem.set_duration(3, 0.1).unwrap();
+    let differs = problem.parameter(&Parameter::Duration).unwrap_err().to_string();
+    assert_eq!(differs, "sensitivity: the value of `duration` differs from knot to knot");
 }
 
 /// Action x⁺ = x + u with the cost ½ (x − 1)² + c u⁴/4 − ½ b u², and a bound u ≤ 0.5.
